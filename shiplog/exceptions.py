@@ -1,0 +1,57 @@
+"""What a user can mend: every message says what was found, what was expected and what to do next."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class ShiplogError(Exception):
+    """The input is at fault. The command line prints it without a traceback and exits with 1."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message}\n  {self.hint}" if self.hint else self.message
+
+
+class LogUnreadable(ShiplogError):
+    """The file is no MCAP log, or nothing in it can be recovered."""
+
+
+class ProfileError(ShiplogError):
+    """A ship profile is missing, malformed, or says something that cannot be."""
+
+
+class ChannelMissing(ShiplogError):
+    """A ship profile asks for a topic or field that the log does not carry."""
+
+
+class StoreError(ShiplogError):
+    """The store cannot take or give what was asked of it."""
+
+
+class WindowError(ShiplogError):
+    """No window of the asked length can be cut from these voyages."""
+
+
+class RunError(ShiplogError):
+    """A run folder is missing, unfinished, or belongs to other settings."""
+
+
+def nearest(name: str, available: Iterable[str]) -> str:
+    """A half sentence naming the closest spelling, or nothing: ``; did you mean '/gyro'?``"""
+    close = difflib.get_close_matches(name, list(available), n=1, cutoff=0.5)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Names for a message, cut where a reader would stop reading."""
+    names = sorted(names)
+    if not names:
+        return "none"
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown}, and {len(names) - most} more"

@@ -1,0 +1,50 @@
+"""What a log's health report consists of: one finding a fault, with its time, size and sentence."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+
+CONTRACT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is not as it should be. Times are seconds from the voyage's first row."""
+
+    kind: str  # one of KINDS
+    channel: str  # a canonical channel, an actuator, a topic, or "log"
+    sentence: str
+    start_s: float | None = None
+    end_s: float | None = None
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    unit: str = ""
+
+
+KINDS = (
+    "gap", "held", "spike", "blank", "jump", "duplicate", "out_of_order", "limits", "crc",
+    "truncated", "clock_offset", "heading_offset", "antenna_offset", "yaw_rate_bias",
+    "yaw_rate_scale", "velocity_scale", "external",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class VoyageReport:
+    """The contract's answer of `check` and `ingest` for one log."""
+
+    name: str
+    messages_read: int
+    messages_lost: int | None  # None: a lost chunk does not say how many it held
+    rows: int
+    seconds: float
+    findings: tuple[Finding, ...] = field(default=())
+
+    def as_json(self) -> dict:
+        return {
+            "name": self.name,
+            "messages": {"read": self.messages_read, "lost": self.messages_lost},
+            "rows": self.rows,
+            "seconds": self.seconds,
+            "findings": [asdict(finding) for finding in self.findings],
+        }
