@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from enum import IntFlag
 
+DEGREE = math.pi / 180.0
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:

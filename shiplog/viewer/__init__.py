@@ -1,0 +1,17 @@
+"""Measured against simulated in Rerun. Only this package imports it, and only when it is asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shiplog.comparison import Actuator, Comparison
+from shiplog.viewer.native import Served, open_viewer, serve
+
+__all__ = ["Actuator", "Comparison", "Served", "open_viewer", "save", "serve"]
+
+
+def save(comparison: Comparison, path: str | Path) -> None:
+    """Write the comparison as an .rrd, under a temporary name until it is whole."""
+    from shiplog.viewer import recording  # half a second of imports that most commands never need
+
+    recording.write(comparison, Path(path))

@@ -1,0 +1,1 @@
+"""What is fast, measured: each module prints its figures with the peer in the same run."""

@@ -1,0 +1,72 @@
+"""The main job on the sample logs, from MCAP to a recording: what a new user sees first."""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.evaluate import compare_runs
+from pipelines.prepare import ingest_logs
+from pipelines.train import choose_split, train_run
+from shiplog.config import Config
+from shiplog.exceptions import ShiplogError, listed
+from shiplog.store import Store
+
+log = logging.getLogger(__name__)
+
+DATASETS = ("ref", "d-ref")  # the paper's two voyages, and four that met the test's wind
+SEEDS = (0, 1, 2)
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What the demo says and where the recording is."""
+
+    text: str
+    content: dict
+    recording: Path
+
+
+def run_demo(out: Path, logs: Path | None) -> Demo:
+    """Ingest, train, evaluate, compare. Resumes: what is in `out` already is not done again."""
+    began = time.monotonic()
+    folder = logs or sample_logs()
+    store = Store(out / "store")
+    log.info("1/3 ingesting %s", folder)
+    done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
+    if not done.reports:
+        raise ShiplogError(f"No log in {folder} could be ingested.", hint="see the messages above.")
+    paths = []
+    for data in DATASETS:
+        path = out / "runs" / data
+        paths.append(path)
+        if path.exists():
+            log.info("2/3 %s is trained already", path)
+            continue
+        split = choose_split(store, (), (), data, 100)
+        log.info("2/3 training on %s: %s, validating on %s", data, listed(split.training),
+                 listed(split.validation))  # fmt: skip
+        train_run(Config(data=data, seeds=SEEDS, split=split), store, path)
+    log.info("3/3 comparing on the test voyage")
+    result = compare_runs(paths, store, (), out / "compare.rrd")
+    took = time.monotonic() - began
+    ending = (
+        f"{result.text}\n\nTook {took:.0f} s. The voyages are in {store.path}, the runs in "
+        f"{out / 'runs'}.\nLook at it again: rerun {result.recording}"
+    )
+    return Demo(ending, result.content | {"seconds": round(took, 1)}, result.recording)
+
+
+def sample_logs() -> Path:
+    """The folder of the checkout this runs from. Raises ShiplogError."""
+    here = (Path.cwd(), Path(__file__).resolve().parent.parent)
+    for folder in here:
+        if any((folder / "sample_logs").glob("*.mcap")):
+            return folder / "sample_logs"
+    raise ShiplogError(
+        f"There is no folder sample_logs in {here[0]}.",
+        hint="run the demo from a clone of shiplog, or make the logs again with "
+        "`python -m pipelines.known_ship sample_logs` and give them with --logs.",
+    )

@@ -1,0 +1,247 @@
+"""Trained runs against measured voyages: errors, floors, coverage, and the recording of both."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+import torch
+
+from pipelines.prepare import seconds
+from pipelines.train import plan
+from shiplog import coverage as covering
+from shiplog import evaluate, floors, report, runs, table, windows
+from shiplog.channels import STATE
+from shiplog.comparison import Actuator, Comparison
+from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.runs import Run
+from shiplog.store import Store
+from shiplog.windows import Windows
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Every run and both floors on the same test windows.
+
+    errors     run, seed, voyage, window, elapsed, and evaluate.ERRORS: one row a window and seed
+    rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
+    coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
+    floors     mean L of holding the velocity and of quadratic least squares, first run's data
+    """
+
+    runs: tuple[Run, ...]
+    voyages: tuple[str, ...]
+    too_short: tuple[str, ...]
+    rows: pl.DataFrame
+    errors: pl.DataFrame
+    rollouts: pl.DataFrame
+    coverage: pl.DataFrame
+    floors: dict[str, float]
+
+    def answer(self, run: Run) -> dict:
+        """The contract's JSON for one run."""
+        errors = self.errors.filter(pl.col("run") == run.name)
+        return report.evaluation_json(errors, self.floors, self.coverage)
+
+    def text(self) -> str:
+        """Markdown: models against floors, voyages, the worst windows of the first run."""
+        answers = {f"{run.name}: {run.config.label}": self.answer(run) for run in self.runs}
+        first = next(iter(answers.values()))
+        errors = self.errors.filter(pl.col("run") == self.runs[0].name)
+        count = first["windows"]
+        lines = [
+            f"L is the paper's evaluation function (Eq. 8), mean over {count} windows of "
+            f"{self.runs[0].config.window} s and over seeds; yaw rate in deg/s.",
+            "", report.models_table(answers, self.floors), "",
+            f"Per voyage, {self.runs[0].name}:", "", report.voyages_table(first), "",
+            "Worst windows, and whether the training data had been there:", "",
+            report.windows_table(errors, self.coverage),
+        ]  # fmt: skip
+        if self.too_short:
+            lines += ["", f"Without a window of that length: {listed(self.too_short)}."]
+        return "\n".join(lines)
+
+
+def evaluate_runs(paths: Sequence[Path], store: Store, voyages: Sequence[str]) -> Evaluation:
+    """Roll every run's models out over the chosen voyages. Raises ShiplogError."""
+    opened = tuple(runs.load(path) for path in paths)
+    first = opened[0]
+    for other in opened[1:]:
+        if other.config.window != first.config.window:
+            raise RunError(
+                f"{first.name} has windows of {first.config.window} s, {other.name} of "
+                f"{other.config.window} s.", hint="compare runs with the same window.")  # fmt: skip
+        _same_ship(first, other.profile.columns, other.name)
+    names = _test_voyages(first, store, voyages)
+    profile = store.profile(names)
+    _same_ship(first, profile.columns, "the chosen voyages")
+    rows = table.with_elapsed(seconds(store, names, profile))
+    size = first.config.window
+    planned = plan(rows, "ref", size)
+    cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
+    numbered = _numbered(cut)
+    scored = [
+        (run, seed, evaluate.score(model, cut))
+        for run in opened
+        for seed, model in run.models().items()
+    ]
+    return Evaluation(
+        runs=opened,
+        voyages=tuple(names),
+        too_short=tuple(sorted(set(names) - set(cut.plan["voyage"]))),
+        rows=rows,
+        errors=pl.concat(
+            [_labelled(numbered, run, seed).hstack(s.errors) for run, seed, s in scored]
+        ),
+        rollouts=pl.concat([_rollout(numbered, cut, run, seed, s) for run, seed, s in scored]),
+        coverage=_coverage(first, rows, numbered, size),
+        floors=_floors(first, cut),
+    )
+
+
+def save(evaluation: Evaluation) -> None:
+    """errors.parquet and rollouts.parquet into each run's folder."""
+    for run in evaluation.runs:
+        mine = pl.col("run") == run.name
+        run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
+
+
+def comparison(evaluation: Evaluation, title: str) -> Comparison:
+    """What the viewer shows of an evaluation."""
+    run = evaluation.runs[0]
+    labels = {r.name: f"{r.name} ({r.config.recipe})" for r in evaluation.runs}
+    profile = run.profile
+    return Comparison(
+        title=title,
+        ship_length=profile.ship.length_m,
+        ship_breadth=profile.ship.breadth,
+        actuators=tuple(Actuator(a.name, a.kind, a.si_unit) for a in profile.actuators),
+        has_wind=profile.has_wind,
+        measured=evaluation.rows.select(
+            "voyage", pl.col("elapsed").alias("time"), *profile.columns
+        ),
+        simulated=evaluation.rollouts.with_columns(
+            model=pl.col("run").replace_strict(labels, return_dtype=pl.String)
+        ).drop("run"),
+        training=run.training().select(profile.columns),
+        summary=evaluation.text(),
+        banks=profile.site.banks,
+    )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What `compare` says and where the recording is."""
+
+    text: str
+    content: dict
+    recording: Path
+
+
+def compare_runs(
+    paths: Sequence[Path], store: Store, voyages: Sequence[str], save_to: Path | None
+) -> Compared:
+    """Evaluate the runs on the same windows and record both sides; in the first run's folder
+    unless a path is given."""
+    from shiplog import viewer
+
+    found = evaluate_runs(paths, store, voyages)
+    save(found)
+    recording = save_to or found.runs[0].path / "compare.rrd"
+    title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
+    viewer.save(comparison(found, title), recording)
+    answers = {run.name: found.answer(run) for run in found.runs}
+    content = {"contract": 1, "recording": str(recording), "runs": answers}
+    return Compared(f"{found.text()}\n\nRecording: {recording}", content, recording)
+
+
+def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
+    """The user's choice, else the run's own test voyages, else what it has not learned from."""
+    used = {*run.config.split.training, *run.config.split.validation}
+    if voyages:
+        names = store.select(list(voyages))
+        seen = [n for n in names if n in used]
+        if seen:
+            log.warning("%s was trained or validated on: its errors there are no test", listed(seen))
+        return names
+    stored = store.select()
+    names = [n for n in run.config.split.test if n in stored]
+    names = names or [n for n in stored if n not in used]
+    if not names:
+        raise StoreError(
+            f"Every voyage in {store.path} was used to train or validate {run.name}.",
+            hint="ingest voyages it has not seen, or name some with --voyages.",
+        )
+    return names
+
+
+def _same_ship(run: Run, columns: tuple[str, ...], other: str) -> None:
+    if run.profile.columns != columns:
+        mine, theirs = set(run.profile.columns), set(columns)
+        raise RunError(
+            f"{run.name} is of a ship with {listed(mine - theirs) if mine - theirs else 'the same'}"
+            f" columns and {other} with {listed(theirs - mine)} instead.",
+            hint="choose voyages and runs of one ship.",
+        )
+
+
+def _numbered(cut: Windows) -> pl.DataFrame:
+    """voyage, window (counted in each voyage), elapsed."""
+    return cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
+        "elapsed",
+    )  # fmt: skip
+
+
+def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:
+    return numbered.select(
+        pl.lit(run.name).alias("run"), pl.lit(seed).alias("seed"), "voyage", "window", "elapsed"
+    )
+
+
+def _rollout(
+    numbered: pl.DataFrame, cut: Windows, run: Run, seed: int, scores: evaluate.Scores
+) -> pl.DataFrame:
+    count, size, _ = scores.simulated.shape
+    since = torch.cat((torch.zeros(count, 1, dtype=torch.float64), cut.dt.cumsum(1)), 1)
+    every = pl.Series("row", range(count)).repeat_by(size).explode()
+    index = _labelled(numbered, run, seed)[every.to_list()]
+    states = scores.simulated.reshape(-1, len(STATE)).numpy()
+    return index.select("run", "seed", "voyage", "window").hstack(
+        pl.DataFrame(
+            {"time": index["elapsed"].to_numpy() + since.flatten().numpy()}
+            | {c.name: states[:, j] for j, c in enumerate(STATE)}
+            | {"d": scores.d.flatten().numpy()}
+        )
+    )
+
+
+def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:
+    seen = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
+    measured = seen.table(rows, numbered, size)
+    whole = numbered.hstack(measured)
+    reasons = []
+    for row in whole.to_dicts():
+        within = rows.filter(
+            (pl.col("voyage") == row["voyage"])
+            & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)
+        )
+        reasons.append(covering.reason(row, within))
+    return whole.drop("segment", "start", "elapsed").with_columns(reason=pl.Series(reasons))
+
+
+def _floors(run: Run, cut: Windows) -> dict[str, float]:
+    """Mean L of both floors on the same windows; the fitted one learns what the run learned."""
+    size = run.config.window
+    names = (run.profile.actuator_names, run.profile.wind_names)
+    learnt = windows.cut(run.training(), plan(run.training(), "ref", size), size, *names)
+    fitted = floors.least_squares(learnt)
+    return {
+        name: float(evaluate.score(model, cut).errors["loss"].mean())  # type: ignore[arg-type]
+        for name, model in (("hold", floors.hold), ("least_squares", fitted))
+    }

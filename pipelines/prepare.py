@@ -1,0 +1,104 @@
+"""Logs into the store, and voyages out of it as 1 Hz tables."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from shiplog import profile as profiles
+from shiplog import table
+from shiplog.exceptions import ProfileError, ShiplogError, listed
+from shiplog.findings import VoyageReport
+from shiplog.ingest import ingest
+from shiplog.logs.read import contents
+from shiplog.profile import Profile
+from shiplog.store import Store
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Ingested:
+    """What became of each log: its report, or why it was refused."""
+
+    reports: list[VoyageReport]
+    refused: dict[str, ShiplogError]
+
+    @property
+    def complete(self) -> bool:
+        """Every log was taken and no message of it was lost."""
+        return not self.refused and all(r.messages_lost == 0 for r in self.reports)
+
+
+def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ingested:
+    """Each log into the store; one that cannot be taken does not stop the others."""
+    chosen = profiles.load(profile) if profile else None
+    reports: list[VoyageReport] = []
+    refused: dict[str, ShiplogError] = {}
+    for path in paths:
+        try:
+            voyage = ingest(path, chosen or fitting_profile(path))
+            state = store.add(voyage)
+        except ShiplogError as error:
+            refused[str(path)] = error
+            log.warning("%s refused: %s", path, error.message)
+            continue
+        reports.append(voyage.report)
+        log.info("%s: %s, %d rows, %d findings", voyage.name, state, voyage.table.height,
+                 len(voyage.report.findings))  # fmt: skip
+    return Ingested(reports, refused)
+
+
+def fitting_profile(path: Path) -> Profile:
+    """The shipped profile that the log names, or whose topics it carries. Raises ProfileError."""
+    found = contents(path)
+    ship = found.metadata.get("voyage", {}).get("ship")
+    fitting = [
+        candidate
+        for candidate in map(profiles.load, profiles.shipped())
+        if set(candidate.wanted()) <= set(found.topics)
+    ]
+    named = [candidate for candidate in fitting if candidate.ship.name == ship]
+    if len(named or fitting) == 1:
+        return (named or fitting)[0]
+    topics = listed(found.topics)
+    if fitting:
+        raise ProfileError(
+            f"{path.name} fits several profiles: {listed(c.source for c in fitting)}.",
+            hint="say which with --profile.",
+        )
+    raise ProfileError(
+        f"No shipped profile fits {path.name}. Its topics: {topics}.",
+        hint=f"draft one with `shiplog profile {path}`, look it over, and give it with --profile.",
+    )
+
+
+def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFrame:
+    """The sorted 1 Hz table of these voyages."""
+    return table.resample(store.scan(names), profile.columns, profile.circular)
+
+
+def expand(paths: Iterable[Path]) -> list[Path]:
+    """Folders stand for the logs in them."""
+    found: list[Path] = []
+    for path in paths:
+        found += sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    return found
+
+
+def check_logs(paths: Sequence[Path]) -> Ingested:
+    """The health of each log by itself; nothing is stored."""
+    from shiplog.logs.check import check
+
+    reports: list[VoyageReport] = []
+    refused: dict[str, ShiplogError] = {}
+    for path in expand(paths):
+        try:
+            reports.append(check(path))
+        except ShiplogError as error:
+            refused[str(path)] = error
+    return Ingested(reports, refused)

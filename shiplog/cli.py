@@ -1,0 +1,291 @@
+"""The commands: one short function each. Only here does the library call `pipelines`.
+
+Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fault, 2 wrong usage,
+3 done but something was lost or refused.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from shiplog import report
+from shiplog.exceptions import ShiplogError
+from shiplog.runs import finite
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+                  pretty_exceptions_enable=False,
+                  help="Learn a ship's dynamic model from its logs, and see where it fails.")  # fmt: skip
+
+LOST = 3
+
+Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]
+StoreOption = Annotated[Path, typer.Option("--store", help="Folder of ingested voyages.")]
+ProfileOption = Annotated[
+    str | None, typer.Option("--profile", help="A shipped profile's name, or a TOML's path.")
+]
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.")
+]
+Voyages = Annotated[
+    list[str] | None,
+    typer.Option("--voyages", help="Names or shell patterns; can be given several times."),
+]
+STORE = Path("store")
+
+
+def main() -> None:
+    """Entry point: a fault of the input is a message and exit code 1, never a traceback."""
+    logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
+    logging.getLogger("shiplog").setLevel(logging.INFO)
+    logging.getLogger("pipelines").setLevel(logging.INFO)
+    try:
+        app()
+    except ShiplogError as error:
+        _fail(error)
+    except KeyboardInterrupt:
+        typer.echo("stopped; what was finished is kept", err=True)
+        sys.exit(130)
+
+
+def _fail(error: ShiplogError) -> NoReturn:
+    typer.echo(str(error), err=True)
+    sys.exit(1)
+
+
+def _answer(text: str, content: dict, json_to: str | None) -> None:
+    """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
+    if json_to == "-":
+        typer.echo(text, err=True)
+        typer.echo(json.dumps(finite(content), indent=1))
+        return
+    typer.echo(text)
+    if json_to:
+        try:
+            Path(json_to).write_text(json.dumps(finite(content), indent=1), encoding="utf-8")
+        except OSError as error:
+            raise ShiplogError(f"{json_to} cannot be written: {error.strerror}.",
+                               hint="give --json a path in a folder that exists.") from error  # fmt: skip
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Where store, run and recording go.")] = Path("demo"),
+    view: Annotated[bool, typer.Option("--view/--no-view", help="Open the viewer.")] = True,
+    logs: Annotated[
+        Path | None, typer.Option(help="Sample logs; found beside the source otherwise.")
+    ] = None,
+    json_to: JsonOption = None,
+) -> None:
+    """The main job on sample_logs: ingest, train, evaluate, compare.
+
+    Example: shiplog demo --out demo --no-view
+    """
+    from pipelines.demo import run_demo
+
+    result = run_demo(out, logs)
+    _answer(result.text, result.content, json_to)
+    if view:
+        _show(result.recording, web=False)
+
+
+@app.command()
+def check(logs: Logs, json_to: JsonOption = None) -> None:
+    """Health of logs without ingesting them: what is readable, lost, late, out of order.
+
+    Example: shiplog check sample_logs/voyage_1.mcap
+    """
+    from pipelines.prepare import check_logs
+
+    checked = check_logs(logs)
+    _answer(_reports(checked.reports), report.voyages_json(checked.reports), json_to)
+    _leave(checked)
+
+
+@app.command()
+def ingest(
+    logs: Logs, profile: ProfileOption = None, store: StoreOption = STORE,
+    json_to: JsonOption = None,
+) -> None:  # fmt: skip
+    """Logs into the store: aligned, reduced to midship, faults marked. Idempotent by content.
+
+    Example: shiplog ingest sample_logs --store store
+    """
+    from pipelines.prepare import expand, ingest_logs
+    from shiplog.store import Store
+
+    done = ingest_logs(expand(logs), profile, Store(store))
+    _answer(_reports(done.reports), report.voyages_json(done.reports), json_to)
+    _leave(done)
+
+
+def _reports(reports) -> str:
+    return "\n".join(line for one in reports for line in report.voyage_lines(one))
+
+
+def _leave(done) -> None:
+    """Exit 1 where nothing could be taken, 3 where something was lost or refused."""
+    for path, error in done.refused.items():
+        typer.echo(f"{path}: {error}", err=True)
+    if done.refused and not done.reports:
+        raise typer.Exit(1)
+    if not done.complete:
+        raise typer.Exit(LOST)
+
+
+@app.command()
+def convert(
+    tables: Annotated[list[Path], typer.Argument(help="CSV or Parquet tables, or folders of one "
+                                                      "table a topic.")],
+    profile: Annotated[str, typer.Option("--profile", help="The profile whose [table] section "
+                                                           "names the columns.")],
+    out: Annotated[Path, typer.Option(help="Folder for the logs.")],
+    json_to: JsonOption = None,
+) -> None:  # fmt: skip
+    """Tables to contract MCAP.
+
+    Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
+    """
+    from pipelines.convert import convert as convert_tables
+    from shiplog import profile as profiles
+
+    written, refused = convert_tables(tables, profiles.load(profile), out)
+    content = {"contract": 1, "logs": [str(path) for path in written], "refused": refused}
+    _answer(f"{len(written)} logs in {out}", content, json_to)
+    for path, why in refused.items():
+        typer.echo(f"{path}: {why}", err=True)
+    if refused:
+        raise typer.Exit(LOST if written else 1)
+
+
+@app.command()
+def profile(
+    log: Annotated[Path, typer.Argument(help="An MCAP log of an unknown ship.")],
+    out: Annotated[Path | None, typer.Option(help="Write the draft here, not to stdout.")] = None,
+) -> None:
+    """Draft a ship profile from a log's topics, schemas and units.
+
+    Example: shiplog profile unknown.mcap --out my-ship.toml
+    """
+    from shiplog.draft import draft
+
+    text = draft(log)
+    if out is None:
+        typer.echo(text)
+    elif out.exists():
+        raise ShiplogError(f"{out} exists already.", hint="choose another --out.")
+    else:
+        out.write_text(text, encoding="utf-8")
+        typer.echo(f"draft written to {out}: look over every line that says CHECK")
+
+
+@app.command()
+def voyages(store: StoreOption = STORE, json_to: JsonOption = None) -> None:
+    """What is in the store.
+
+    Example: shiplog voyages --store store
+    """
+    from dataclasses import asdict
+
+    from shiplog.store import Store
+
+    entries = Store(store).entries()
+    content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
+    _answer(report.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
+
+
+@app.command()
+def train(
+    out: Annotated[Path, typer.Option(help="The run folder to make.")],
+    model: Annotated[str, typer.Option(help="Which dynamic model: feedforward.")] = "feedforward",
+    data: Annotated[str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")] = "ref",
+    voyages: Voyages = None,
+    validation: Annotated[
+        list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 1,
+    recipe: Annotated[str, typer.Option(help="fast (seconds) or paper (hours).")] = "fast",
+    window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
+    width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
+    wind_input: Annotated[
+        str, typer.Option(help="angle (the paper's) or components (cos and sin).")
+    ] = "angle",
+    epochs: Annotated[
+        int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
+    ] = None,
+    store: StoreOption = STORE,
+    json_to: JsonOption = None,
+) -> None:
+    """Train a model; interrupted, give the same command again and it goes on.
+
+    Example: shiplog train --data ref --seeds 3 --out runs/ref
+    """
+    from pipelines.train import train_command
+
+    answer = train_command(
+        store, out, model=model, data=data, voyages=voyages or [], validation=validation or [],
+        seeds=seeds, recipe=recipe, window=window, width=width, wind_input=wind_input,
+        epochs=epochs,
+    )  # fmt: skip
+    _answer(answer.text, answer.content, json_to)
+
+
+@app.command()
+def evaluate(
+    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    json_to: JsonOption = None,
+) -> None:
+    """L, RMSE per channel, end errors, coverage, against two floors.
+
+    Example: shiplog evaluate runs/ref --voyages voyage_6
+    """
+    from pipelines.evaluate import evaluate_runs, save
+    from shiplog.store import Store
+
+    found = evaluate_runs([run], Store(store), voyages or [])
+    save(found)
+    _answer(found.text(), found.answer(found.runs[0]), json_to)
+
+
+@app.command()
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="One or more trained runs.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the recording here and open nothing.")
+    ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Serve it on 127.0.0.1.")] = False,
+    json_to: JsonOption = None,
+) -> None:
+    """Measured against simulated in Rerun.
+
+    Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
+    """
+    from pipelines.evaluate import compare_runs
+    from shiplog.store import Store
+
+    result = compare_runs(runs, Store(store), voyages or [], save)
+    _answer(result.text, result.content, json_to)
+    if save is None:
+        _show(result.recording, web)
+
+
+def _show(recording: Path, web: bool) -> None:
+    from shiplog import viewer
+
+    if web:
+        viewer.serve(recording)
+    else:
+        viewer.open_viewer(recording)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""What a comparison consists of: plain tables that `evaluate` fills and `viewer` draws.
+
+SI and radians throughout; the viewer converts when it labels an axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import polars as pl
+
+from shiplog import channels
+from shiplog.channels import Channel
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """One actuator's column: its name, what it is, and the SI unit it is in."""
+
+    name: str
+    kind: str  # rudder | propeller | azimuth | thruster
+    unit: str  # rad, rev/s or 1
+
+    @property
+    def channel(self) -> Channel:
+        """The actuator as a channel, so that it is scaled and labelled as the others are."""
+        symbol = {"rudder": "δ", "propeller": "n", "azimuth": "α"}.get(self.kind, "u")
+        return Channel(self.name, symbol, self.unit, circular=self.kind == "azimuth")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured voyages beside what every model and seed made of them.
+
+    measured    voyage, time [s from the voyage's start], the six states, one column per
+                actuator, wind_speed and wind_angle if `has_wind`
+    simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 6]
+    training    what the models were trained on: the channels of `measured`
+    summary     Markdown: errors, floors, coverage, findings
+    banks       lines of (x0, y0) points a chart shows
+    """
+
+    title: str
+    ship_length: float  # m
+    ship_breadth: float  # m
+    actuators: tuple[Actuator, ...]
+    has_wind: bool
+    measured: pl.DataFrame
+    simulated: pl.DataFrame
+    training: pl.DataFrame
+    summary: str
+    banks: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+    @property
+    def voyages(self) -> list[str]:
+        """The voyages in the order in which they were given."""
+        return self.measured["voyage"].unique(maintain_order=True).to_list()
+
+    @property
+    def models(self) -> list[str]:
+        """The models in the order in which they were given, which fixes their colours."""
+        return self.simulated["model"].unique(maintain_order=True).to_list()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Every channel that `measured` and `training` must carry."""
+        driven = tuple(actuator.channel for actuator in self.actuators)
+        return channels.STATE + driven + (channels.WIND if self.has_wind else ())

@@ -1,0 +1,91 @@
+"""What a training is: every value of it, frozen, saved beside its weights as TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from shiplog.exceptions import RunError
+
+
+class Section(BaseModel):
+    """A part of the configuration: frozen, and every key known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Paper(Section):
+    """Table 5 and Sec. 4.3 of the paper."""
+
+    learning_rate: float = Field(default=1e-4, gt=0)
+    regularisation: float = Field(default=1e-2, ge=0)  # λ of Eq. 7, on all parameters
+    subsets: int = Field(default=3, gt=0)
+    smoothing: float = Field(default=0.1, gt=0, le=1)  # α of Eq. 23
+    least_epochs: int = Field(default=10_000, ge=0)
+    rise: float = Field(default=0.1, gt=0)  # the stopping rule's share, Eq. 24
+    most_epochs: int | None = None  # a cap the paper does not have, for those who cannot wait
+
+
+class Fast(Section):
+    """Short-window warm start with Adam, then L-BFGS on whole rollouts; not the paper's."""
+
+    warm_steps: int = Field(default=5, gt=0)  # Euler steps of a warm-start window
+    warm_epochs: int = Field(default=30, ge=0)
+    warm_subsets: int = Field(default=12, gt=0)
+    warm_learning_rate: float = Field(default=1e-3, gt=0)
+    regularisation: float = Field(default=1e-2, ge=0)
+    memory: int = Field(default=30, gt=0)
+    iterations: int = Field(default=300, gt=0)
+    patience: int = Field(default=60, gt=0)  # iterations without a better validation loss
+    smoothing: float = Field(default=0.1, gt=0, le=1)
+
+
+class Network(Section):
+    width: int = Field(default=256, gt=0)
+    depth: int = Field(default=4, gt=0)
+    wind_input: Literal["angle", "components"] = "angle"
+    input_tanh: bool = False
+
+
+class Split(Section):
+    """Whole voyages, never parts of one on both sides."""
+
+    training: tuple[str, ...]
+    validation: tuple[str, ...]
+    test: tuple[str, ...] = ()
+    chosen_by: str = ""
+
+
+class Config(Section):
+    """A run: which model learns what from which voyages, and how."""
+
+    model: str = "feedforward"
+    data: str = "ref"
+    window: int = Field(default=100, ge=2)
+    recipe: Literal["paper", "fast"] = "fast"
+    seeds: tuple[int, ...] = (0,)
+    split: Split
+    network: Network = Network()
+    paper: Paper = Paper()
+    fast: Fast = Fast()
+
+    @property
+    def label(self) -> str:
+        """How results are headed, the recipe always among it."""
+        return f"{self.model} {self.data} ({self.recipe} recipe)"
+
+    def to_toml(self) -> str:
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+
+
+def load(path: Path) -> Config:
+    """A config from TOML. Raises RunError naming what is wrong."""
+    try:
+        return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+        raise RunError(f"{path} is no configuration of a run: {error}.",
+                       hint="train the run again.") from error  # fmt: skip

@@ -1,0 +1,93 @@
+"""The health of a log without a profile: what is readable, lost, late, out of order, missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import polars as pl
+
+from shiplog.findings import Finding, VoyageReport
+
+from . import faults
+from .read import Reading, read
+
+LATE = 0.05  # s: a median delay worth a word
+VERY_LATE = 1.0  # s: a single delay worth a word
+DROPOUT = 5.0  # periods without a message, and more than
+LEAST_GAP = 1.0  # s
+MOST_GAPS = 20  # findings on a topic; the rest is summed up
+
+
+def check(path: str | Path) -> VoyageReport:
+    """What stands in a log and what does not, from all of its topics."""
+    path = Path(path)
+    reading = read(path)
+    first = min(_first(frame) for frame in reading.frames.values())
+    last = max(int(frame["log_time"][-1]) for frame in reading.frames.values())
+    findings = [*reading.health.findings, *_undecodable(reading)]
+    for topic, frame in reading.frames.items():
+        findings += late(topic, frame)
+        findings += dropouts(topic, frame, first)
+    return VoyageReport(
+        name=path.stem,
+        messages_read=reading.health.messages_read,
+        messages_lost=reading.health.messages_lost,
+        rows=0,  # rows are what `ingest` makes
+        seconds=(last - first) / faults.SECOND,
+        findings=tuple(findings),
+    )
+
+
+def late(topic: str, frame: pl.DataFrame) -> list[Finding]:
+    """Messages recorded well after they were measured, by a delay that is not steady.
+
+    A steady delay is a clock offset with a value; this one has only its range and a sentence.
+    """
+    delay = frame.select(pl.col("log_time") - pl.col("stamp")).to_series()
+    median, low, high = faults.quantiles(delay)
+    if median is None:
+        return []
+    most = float(delay.max() or 0) / faults.SECOND  # type: ignore[arg-type]
+    if (median <= LATE and most <= VERY_LATE) or (median > LATE and high - low <= median):
+        return []
+    sentence = (
+        f"Messages on {topic} arrive late, and not evenly: {median:.3g} s in the median, "
+        f"{most:.3g} s at most."
+    )
+    return [Finding("clock_offset", topic, sentence, low=low, high=high, unit="s")]
+
+
+def dropouts(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
+    """Silences of a topic: longer than a second and than five of its usual periods."""
+    times_are_stamps = frame["stamp"].null_count() == 0
+    times = frame["stamp" if times_are_stamps else "log_time"].sort()
+    steps = times.diff()
+    period = float(steps.median() or 0)  # type: ignore[arg-type]
+    least = max(DROPOUT * period, LEAST_GAP * faults.SECOND)
+    ends = (steps > least).arg_true().to_list()
+    if not ends or period <= 0:
+        return []
+    offset = int((frame["log_time"] - frame["stamp"]).median() or 0)  # type: ignore[arg-type]
+    offset = offset if times_are_stamps else 0  # told on the log's own time line
+    findings = []
+    for end in ends[:MOST_GAPS]:
+        start_s, end_s = ((int(times[i]) + offset - first) / faults.SECOND for i in (end - 1, end))
+        sentence = f"{topic} is silent for {end_s - start_s:.3g} s from {start_s:.1f} s."
+        findings.append(Finding("gap", topic, sentence, start_s, end_s, end_s - start_s, unit="s"))
+    if len(ends) > MOST_GAPS:
+        rest = ends[MOST_GAPS:]
+        total = sum(int(times[i]) - int(times[i - 1]) for i in rest) / faults.SECOND
+        sentence = f"{topic} is silent {len(rest)} times more, {total:.3g} s in all."
+        findings.append(Finding("gap", topic, sentence, value=total, unit="s"))
+    return findings
+
+
+def _undecodable(reading: Reading) -> list[Finding]:
+    return [
+        Finding("crc", topic, f"{topic} cannot be decoded: {reason}.")
+        for topic, reason in sorted(reading.health.undecodable.items())
+    ]
+
+
+def _first(frame: pl.DataFrame) -> int:
+    return int(frame["log_time"][0])

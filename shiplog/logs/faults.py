@@ -1,0 +1,153 @@
+"""What a log says against itself: losses, disorder, repeats and clocks, each as a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import polars as pl
+
+from shiplog.findings import Finding
+
+from .container import Loss
+from .gather import DIGEST, Order
+
+SECOND = 1_000_000_000
+OFFSET = 0.05  # s: closer clocks than this are one clock
+CLOCKS = (
+    ("log_time", "publish_time", "The recorder's clock", "the publishers'"),
+    ("publish_time", "stamp", "The publishers' clock", "the messages' own stamps"),
+)
+
+
+def losses(found: list[Loss], first: int | None, lost: int | None) -> list[Finding]:
+    """Damage in the file, one finding a stretch."""
+    findings = []
+    for loss in found:
+        start, end = seconds(loss.start, first), seconds(loss.end, first)
+        what = "The chunk at byte" if loss.chunk else "The file at byte"
+        sentence = f"{what} {loss.offset} {loss.reason}"
+        if loss.kind == "truncated":
+            sentence = f"The log is cut off: at byte {loss.offset} it {loss.reason}"
+        if loss.chunk and start is not None and end is not None:
+            sentence += f"; its messages from {start:.1f} s to {end:.1f} s are lost"
+        findings.append(Finding(loss.kind, "log", sentence + ".", start, end))
+    if lost and not found:
+        sentence = f"{lost} messages that the log's own statistics count are not in it."
+        findings.append(Finding("crc", "log", sentence, value=float(lost)))
+    return findings
+
+
+def disorder(order: Mapping[str, Order]) -> list[Finding]:
+    """Messages written behind a later one of their own topic."""
+    back = {topic: o for topic, o in order.items() if o.back}
+    if not back:
+        return []
+    count = sum(o.back for o in back.values())
+    largest = max(o.largest for o in back.values()) / SECOND
+    sentence = (
+        f"The log's times step back {count} times on {_topics(back)}, by up to {largest:.3g} s; "
+        "the messages were sorted."
+    )
+    return [Finding("out_of_order", "log", sentence, value=largest, unit="s")]
+
+
+def repeats(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
+    """Stamps that step back, and messages that came twice. `frame` is sorted by log time."""
+    stamp = frame["stamp"]
+    if stamp.null_count() == frame.height:
+        return []
+    step = stamp.drop_nulls().diff()
+    if (step.drop_nulls() > 0).all():
+        return []
+    findings = []
+    back = step.filter(step < 0)
+    if len(back):
+        largest = -float(back.min()) / SECOND  # type: ignore[arg-type]
+        sentence = f"The stamps on {topic} step back {len(back)} times, by up to {largest:.3g} s."
+        findings.append(Finding("out_of_order", topic, sentence, value=largest, unit="s"))
+    same = frame.select("log_time", "stamp", DIGEST).filter(
+        stamp.is_duplicated() & stamp.is_not_null()
+    )
+    twice = same.filter(~pl.struct("stamp", DIGEST).is_first_distinct())
+    if twice.height:
+        start = seconds(int(twice["log_time"][0]), first)
+        times = "once" if twice.height == 1 else f"{twice.height} times"
+        sentence = f"A message on {topic} came again {times} with the same stamp and content."
+        findings.append(
+            Finding("duplicate", topic, sentence, start_s=start, value=float(twice.height))
+        )
+    return findings
+
+
+def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
+    """Steady offsets between the recorder's, the publishers' and the messages' own clocks."""
+    findings = []
+    for ahead, behind, one, other in CLOCKS:
+        steady: dict[str, float] = {}
+        for topic, frame in frames.items():
+            median, low, high = spread(frame, ahead, behind)
+            if median is not None and abs(median) > OFFSET and high - low <= abs(median):
+                steady[topic] = median
+        for topics in _alike(steady, frames, ahead, behind):
+            median, low, high = _pooled(topics, frames, ahead, behind)
+            if median is None:
+                continue
+            side = "ahead of" if median > 0 else "behind"
+            channel = topics[0] if len(topics) == 1 else "log"
+            sentence = f"{one} is {abs(median):.3g} s {side} {other} on {_topics(topics)}."
+            findings.append(
+                Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
+            )
+    return findings
+
+
+def spread(frame: pl.DataFrame, ahead: str, behind: str) -> tuple[float | None, float, float]:
+    return quantiles(frame.select(pl.col(ahead) - pl.col(behind)).to_series())
+
+
+def quantiles(difference: pl.Series) -> tuple[float | None, float, float]:
+    """Median, 5 % and 95 % points in seconds; None when there is nothing."""
+    difference = difference.drop_nulls()
+    if difference.is_empty():
+        return None, 0.0, 0.0
+    low, median, high = (
+        float(difference.quantile(q, "nearest") or 0) / SECOND for q in (0.05, 0.5, 0.95)
+    )
+    return median, low, high
+
+
+def seconds(time: int | None, first: int | None) -> float | None:
+    """Seconds from the first message."""
+    return None if time is None or first is None else (time - int(first)) / SECOND
+
+
+def _pooled(
+    topics: list[str], frames: Mapping[str, pl.DataFrame], ahead: str, behind: str
+) -> tuple[float | None, float, float]:
+    return quantiles(
+        pl.concat([frames[t].select(pl.col(ahead) - pl.col(behind)) for t in topics]).to_series()
+    )
+
+
+def _alike(
+    medians: dict[str, float], frames: Mapping[str, pl.DataFrame], ahead: str, behind: str
+) -> list[list[str]]:
+    """Topics that share one offset: all of them if they are steady together, else in groups."""
+    if not medians:
+        return []
+    median, low, high = _pooled(list(medians), frames, ahead, behind)
+    if median is not None and high - low <= abs(median):
+        return [list(medians)]
+    groups: list[list[str]] = []
+    start = 0.0
+    for topic, offset in sorted(medians.items(), key=lambda item: (item[1], item[0])):
+        if not groups or offset - start > max(OFFSET, 0.25 * abs(start)):
+            groups.append([])
+            start = offset
+        groups[-1].append(topic)
+    return groups
+
+
+def _topics(names: Iterable[str]) -> str:
+    names = list(names)
+    return names[0] if len(names) == 1 else f"{len(names)} topics"

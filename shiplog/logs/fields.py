@@ -1,0 +1,150 @@
+"""Field paths (`position_covariance[0]`, `value.lon` inside JSON text) and time stamps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import polars as pl
+
+NANOS = 1_000_000_000
+STAMPS = (
+    "timestamp", "stamp", "header.stamp", "header.timestamp",
+    "transforms[0].timestamp", "transforms[0].header.stamp",
+)  # fmt: skip
+PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
+EPOCHS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000), (1e8, NANOS))  # a number's unit, by its size
+
+Steps = tuple[str | int, ...]
+
+
+def steps(path: str) -> Steps:
+    """`a.b[0].c` as ("a", "b", 0, "c")."""
+    found = re.findall(r"\[(\d+)\]|([^.\[\]]+)", path)
+    return tuple(int(index) if index else name for index, name in found)
+
+
+def locate(path: str, layout: Mapping[str, pl.DataType]) -> tuple[str, Steps] | None:
+    """The leaf that holds `path`, and the steps left to take inside its values."""
+    if path in layout:
+        return path, ()
+    way = steps(path)
+    for cut in range(len(way), 0, -1):
+        if any(isinstance(step, int) for step in way[:cut]):
+            continue
+        leaf = ".".join(map(str, way[:cut]))
+        if leaf in layout and _leads_on(layout[leaf], way[cut:]):
+            return leaf, way[cut:]
+    return None
+
+
+def _leads_on(dtype: pl.DataType, rest: Steps) -> bool:
+    for step in rest:
+        if isinstance(dtype, (pl.String, pl.Binary)):
+            return True  # JSON inside: only its values can say
+        if isinstance(step, int) and isinstance(dtype, (pl.List, pl.Array)):
+            dtype = _made(dtype.inner)
+        elif isinstance(step, str) and isinstance(dtype, pl.Struct):
+            inner = {field.name: _made(field.dtype) for field in dtype.fields}
+            if step not in inner:
+                return False
+            dtype = inner[step]
+        else:
+            return False
+    return True
+
+
+def _made(dtype) -> pl.DataType:
+    return dtype() if isinstance(dtype, type) else dtype
+
+
+def value(leaf: str, rest: Steps, dtype: pl.DataType) -> pl.Expr:
+    """The column at the end of `rest`; text taken out of JSON stays text until `settled`."""
+    column = pl.col(leaf)
+    for taken, step in enumerate(rest):
+        if isinstance(dtype, (pl.String, pl.Binary)):
+            inside = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in rest[taken:])
+            return column.cast(pl.String, strict=False).str.json_path_match(f"${inside}")
+        if isinstance(step, int):
+            column = column.list.get(step, null_on_oob=True)
+            dtype = _made(dtype.inner) if isinstance(dtype, pl.List) else dtype
+        else:
+            column = column.struct.field(step)
+            named = {f.name: f.dtype for f in dtype.fields} if isinstance(dtype, pl.Struct) else {}
+            dtype = _made(named.get(step, pl.Null))
+    return column
+
+
+def is_text(leaf: str, rest: Steps, layout: Mapping[str, pl.DataType]) -> bool:
+    """Whether `value` reaches into JSON, so that its column needs `settled`."""
+    dtype = layout[leaf]
+    for step in rest:
+        if isinstance(dtype, (pl.String, pl.Binary)):
+            return True
+        if isinstance(dtype, pl.List):
+            dtype = _made(dtype.inner)
+        elif isinstance(dtype, pl.Struct):
+            dtype = _made({f.name: f.dtype for f in dtype.fields}[str(step)])
+    return False
+
+
+def settled(column: pl.Series) -> pl.Series:
+    """Texts out of JSON as the numbers or truths they all are, else as texts."""
+    present = column.drop_nulls()
+    if present.is_empty():
+        return column
+    if present.is_in(["true", "false"]).all():
+        return (column == "true").rename(column.name)
+    number = column.cast(pl.Float64, strict=False)
+    return number if number.null_count() == column.null_count() else column
+
+
+def stamp_leaves(layout: Mapping[str, pl.DataType]) -> tuple[str, ...]:
+    """The paths a message's own measurement time is made of: (seconds, nanos), (one value,), ()."""
+    for base in STAMPS:
+        for pair in PARTS:
+            if all((at := locate(f"{base}.{part}", layout)) and not is_text(*at, layout)
+                   for part in pair):  # fmt: skip
+                return f"{base}.{pair[0]}", f"{base}.{pair[1]}"
+        at = locate(base, layout)
+        if at and not at[1] and (layout[base].is_numeric() or layout[base] == pl.String):
+            return (base,)
+    return ()
+
+
+def stamps(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series:
+    """Measurement times in ns [Int64], null where a message has none."""
+    nothing = pl.Series("stamp", [None] * frame.height, pl.Int64)
+    if not paths:
+        return nothing
+    columns = []
+    for path in paths:
+        at = locate(path, frame.schema)
+        if at is None:
+            return nothing
+        columns.append(frame.select(value(*at, frame.schema[at[0]]).alias("stamp")).to_series())
+    if len(columns) == 2:
+        seconds, nanos = (c.cast(pl.Int64, strict=False) for c in columns)
+        beyond = seconds.abs() > 9_000_000_000  # would overflow; no clock says so
+        return (seconds.set(beyond, None) * NANOS + nanos).rename("stamp")
+    return _single(columns[0]) if columns[0].dtype != pl.Null else nothing
+
+
+def _single(column: pl.Series) -> pl.Series:
+    if column.dtype == pl.String:
+        when = column.str.to_datetime(
+            "%+", strict=False, time_unit="ns", time_zone="UTC"
+        ).to_physical()
+        local = column.str.to_datetime(
+            "%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="ns"
+        ).to_physical()  # without a zone: taken as UTC
+        return when.fill_null(local)
+    size = float(column.cast(pl.Float64).abs().fill_nan(None).max() or 0.0)  # type: ignore[arg-type]
+    factor = next((factor for least, factor in EPOCHS if size >= least), None)
+    if factor is None:  # a counter or a time since start-up: no clock to compare with
+        return pl.Series("stamp", [None] * len(column), pl.Int64)
+    if column.dtype.is_integer():
+        return column.cast(pl.Int64, strict=False) * factor
+    whole = column.floor()
+    rest = ((column - whole) * factor).round().cast(pl.Int64, strict=False)
+    return whole.cast(pl.Int64, strict=False) * factor + rest

@@ -1,0 +1,115 @@
+"""The paper's network: ν̇ = σ_acc · f_NN(s) + μ_acc, Eqs. 20-22 and Table 4."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from shiplog.channels import VELOCITY_IN_STATE
+from shiplog.models.base import kinematics
+from shiplog.windows import Windows
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What makes two networks interchangeable.
+
+    wind_input  "angle" is the paper's: U_A and γ_A in [0, 2π), which jumps at the bow;
+                "components" is U_A cos γ_A and U_A sin γ_A, which does not
+    input_tanh  the paper's table gives its input layer an activation; off is the usual reading
+    """
+
+    actuators: int
+    wind: bool = True
+    width: int = 256
+    depth: int = 4
+    wind_input: str = "angle"
+    input_tanh: bool = False
+
+    @property
+    def inputs(self) -> int:
+        return 3 + self.actuators + (2 if self.wind else 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """Mean and standard deviation of (ν, u, ω) [inputs] and of ν̇ [3] over the reference set."""
+
+    input_mean: Tensor
+    input_std: Tensor
+    output_mean: Tensor
+    output_std: Tensor
+
+    def to(self, dtype: torch.dtype) -> Scaling:
+        return Scaling(*(getattr(self, name).to(dtype) for name in self.__slots__))
+
+
+def exogenous(actuator: Tensor, wind: Tensor, wind_input: str) -> Tensor:
+    """What drives the network besides its own state: [..., A + 0|2] from [..., A] and [..., 0|2]."""
+    if wind.shape[-1] == 0:
+        return actuator
+    speed, angle = wind[..., :1], wind[..., 1:]
+    if wind_input == "components":
+        return torch.cat((actuator, speed * torch.cos(angle), speed * torch.sin(angle)), -1)
+    return torch.cat((actuator, speed, torch.remainder(angle, 2.0 * math.pi)), -1)
+
+
+def scaling(reference: Windows, wind_input: str) -> Scaling:
+    """Of the reference dataset, whatever the augmentation (Sec. 4.2).
+
+    ν̇ is differentiated from ν, since it is not measured: forward, as Euler integrates. A channel
+    that never changes gets a standard deviation of 1, so that it is passed on as zero.
+    """
+    driven = exogenous(reference.actuator, reference.wind, wind_input)
+    inputs = torch.cat((reference.velocity, driven), -1).flatten(0, 1)
+    rate = (reference.velocity.diff(dim=1) / reference.dt[..., None]).flatten(0, 1)
+    return Scaling(inputs.mean(0), _spread(inputs), rate.mean(0), _spread(rate))
+
+
+def _spread(values: Tensor) -> Tensor:
+    std = values.std(0, unbiased=False)
+    constant = std <= 1e-9 * values.abs().amax(0).clamp(min=1.0)
+    return torch.where(constant, torch.ones_like(std), std)
+
+
+class FeedForward(nn.Module):
+    """A fully connected tanh network on standardised (ν, u, ω), giving standardised ν̇."""
+
+    def __init__(self, shape: Shape, scaling: Scaling) -> None:
+        super().__init__()
+        self.shape, self.scaling = shape, scaling
+        widths = [shape.inputs, *[shape.width] * shape.depth, 3]
+        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:], strict=False))
+
+    @property
+    def weights(self) -> list[Tensor]:
+        """W₁, b₁, W₂, b₂, ...: each W is [out, in]."""
+        return [p for layer in self.layers for p in (layer.weight, layer.bias)]  # type: ignore[attr-defined]
+
+    def initialise(self, generator: torch.Generator) -> FeedForward:
+        """PyTorch's default, U(-1/√fan_in, 1/√fan_in), from a stream of its own."""
+        with torch.no_grad():
+            for layer in self.layers:
+                bound = 1.0 / math.sqrt(layer.in_features)  # type: ignore[arg-type]
+                for parameter in (layer.weight, layer.bias):
+                    parameter.uniform_(-bound, bound, generator=generator)  # type: ignore[operator]
+        return self
+
+    def acceleration(self, velocity: Tensor, driven: Tensor) -> Tensor:
+        """ν̇ [..., 3] of ν [..., 3] and the exogenous inputs [..., A + 0|2]."""
+        scale = self.scaling
+        hidden = (torch.cat((velocity, driven), -1) - scale.input_mean) / scale.input_std
+        if self.shape.input_tanh:
+            hidden = torch.tanh(hidden)
+        for layer in self.layers[:-1]:
+            hidden = torch.tanh(layer(hidden))
+        return self.layers[-1](hidden) * scale.output_std + scale.output_mean
+
+    def forward(self, state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
+        """ẋ [..., 6] of Eq. 2."""
+        velocity = state[..., list(VELOCITY_IN_STATE)]
+        driven = exogenous(actuator, wind, self.shape.wind_input)
+        return kinematics(state, self.acceleration(velocity, driven))

@@ -1,0 +1,322 @@
+"""The ship profile: which topic and field is which channel, in which unit, measured where.
+
+A TOML of sections [ship], [sensors.<channel>], [[actuators]], [site] and [table]; keys in the
+contract's words. Unknown keys are refused with the nearest known one, so that a typing error
+never silently becomes a default.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from shiplog import channels, units
+from shiplog.exceptions import ProfileError, listed, nearest
+
+Clock = Literal["message", "log", "publish"]
+
+
+class Section(BaseModel):
+    """A part of a profile: frozen, and every key known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Ship(Section):
+    """Particulars. What is left out is estimated where it is needed, and said."""
+
+    name: str
+    length_m: float = Field(gt=0)
+    breadth_m: float | None = Field(default=None, gt=0)
+    draught_m: float | None = Field(default=None, gt=0)
+    mass_kg: float | None = Field(default=None, gt=0)
+    x_g_m: float | None = None
+    block_coefficient: float | None = Field(default=None, gt=0, le=1)
+    frontal_area_m2: float | None = Field(default=None, gt=0)
+    lateral_area_m2: float | None = Field(default=None, gt=0)
+    outline: tuple[tuple[float, float], ...] | None = None  # [ahead, starboard] points, m
+
+    @property
+    def breadth(self) -> float:
+        """m; a sixth of the length where the profile does not say."""
+        return self.breadth_m or self.length_m / 6.0
+
+
+class Source(Section):
+    """Where one channel's values stand in a log, and how they become SI."""
+
+    topic: str
+    fields: tuple[str, ...] = ()
+    field: str | None = None
+    unit: str | None = None
+    units: tuple[str, ...] = ()
+    sign: float | tuple[float, ...] = 1.0
+    offset: float | tuple[float, ...] = 0.0  # raw value that stands for zero, in the raw unit
+    clock: Clock = "message"
+    tolerance_s: float | None = Field(default=None, gt=0)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        return self.fields or ((self.field,) if self.field else ())
+
+    def _each(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
+        return value if isinstance(value, tuple) else (value,) * len(self.paths)
+
+    def scale(self) -> list[tuple[float, float]]:
+        """(offset, factor) per field: SI value = (raw - offset) · factor."""
+        given = self.units or ((self.unit,) * len(self.paths) if self.unit else ())
+        named = given or ("1",) * len(self.paths)
+        return [
+            (offset, sign * units.factor(unit))
+            for offset, sign, unit in zip(
+                self._each(self.offset), self._each(self.sign), named, strict=True
+            )
+        ]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Source:
+        if not self.paths:
+            raise ValueError("neither `field` nor `fields` is given")
+        if self.field and self.fields:
+            raise ValueError("both `field` and `fields` are given; keep one")
+        for name in ("units", "sign", "offset"):
+            value = getattr(self, name)
+            if isinstance(value, tuple) and value and len(value) != len(self.paths):
+                raise ValueError(f"`{name}` has {len(value)} entries for {len(self.paths)} fields")
+        return self
+
+
+class Sensor(Source):
+    """A sensor of the ship's motion or of the wind."""
+
+    kind: str | None = None
+    lever_arm_m: tuple[float, float] = (0.0, 0.0)  # [ahead, starboard] of midship
+    sigma: float | tuple[float, ...] | None = None  # accuracy, in `unit`; position always in m
+
+
+KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
+    "position": ("geodetic", "local"),
+    "velocity": ("sog_cog", "body", "ned", "enu"),
+    "heading": ("angle", "quaternion_enu", "quaternion_ned"),
+    "yaw_rate": ("rate",),
+    "wind": ("from_bow",),
+}
+WIDTH = {"geodetic": 2, "local": 2, "sog_cog": 2, "body": 2, "ned": 2, "enu": 2, "angle": 1,
+         "quaternion_enu": 2, "quaternion_ned": 2, "rate": 1, "from_bow": 2}  # fmt: skip
+
+
+class Sensors(Section):
+    position: Sensor
+    velocity: Sensor
+    heading: Sensor
+    yaw_rate: Sensor | None = None  # differentiated from the heading where there is none
+    wind: Sensor | None = None
+
+    @model_validator(mode="after")
+    def _kinds(self) -> Sensors:
+        for name, kinds in KINDS.items():
+            sensor = getattr(self, name)
+            if sensor is None:
+                continue
+            kind = sensor.kind or kinds[0]
+            if kind not in kinds:
+                raise ValueError(f"sensors.{name}.kind is {kind!r}; it can be {listed(kinds)}")
+            if len(sensor.paths) != WIDTH[kind]:
+                raise ValueError(
+                    f"sensors.{name} of kind {kind!r} needs {WIDTH[kind]} field(s), "
+                    f"not {len(sensor.paths)}"
+                )
+        return self
+
+    def kind(self, name: str) -> str:
+        return getattr(self, name).kind or KINDS[name][0]
+
+    def items(self) -> list[tuple[str, Sensor]]:
+        return [(name, getattr(self, name)) for name in KINDS if getattr(self, name) is not None]
+
+
+class Actuator(Source):
+    """One actuator value, in model order. SI: rad, rev/s, or 1 for a dimensionless command."""
+
+    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
+    kind: Literal["rudder", "propeller", "azimuth", "thruster"]
+    limits: tuple[float, float] | None = None  # in `unit`
+    position_m: tuple[float, float] = (0.0, 0.0)
+    diameter_m: float | None = Field(default=None, gt=0)
+    area_m2: float | None = Field(default=None, gt=0)
+    span_m: float | None = Field(default=None, gt=0)
+
+    @property
+    def circular(self) -> bool:
+        """An azimuth turns through ±180°; a rudder never does."""
+        return self.kind == "azimuth"
+
+    @property
+    def si_unit(self) -> str:
+        unit = self.unit or "1"
+        return {"deg": "rad", "rad": "rad", "rpm": "rev/s", "rps": "rev/s", "rev/s": "rev/s"}.get(
+            unit, "1"
+        )
+
+
+class Site(Section):
+    """What a chart shows; all optional."""
+
+    banks: tuple[tuple[tuple[float, float], ...], ...] = ()
+    depth_m: float | None = None
+    density: float | None = None
+    datum: tuple[float, float] | None = None  # latitude, longitude [deg] of x₀ = y₀ = 0
+
+
+class Column(Section):
+    """One column of a table that `convert` turns into a log."""
+
+    channel: str
+    unit: str = "1"
+    sign: float = 1.0
+    offset: float = 0.0
+
+
+class Profile(Section):
+    """A ship, its sensors and actuators, and where they are measured."""
+
+    ship: Ship
+    sensors: Sensors
+    actuators: Annotated[tuple[Actuator, ...], Field(min_length=1)]
+    site: Site = Site()
+    table: dict[str, Column] = {}
+    source: str = Field(default="", exclude=True)  # name or path it was loaded from
+
+    @model_validator(mode="after")
+    def _names(self) -> Profile:
+        names = [actuator.name for actuator in self.actuators]
+        canonical = {c.name for c in (*channels.STATE, *channels.WIND)} | {"time", "quality"}
+        doubled = {name for name in names if names.count(name) > 1 or name in canonical}
+        if doubled:
+            raise ValueError(f"actuator name(s) already taken: {listed(doubled)}")
+        known = canonical - {"quality"} | set(names) | {"voyage"}
+        for column, entry in self.table.items():
+            if entry.channel not in known:
+                raise ValueError(
+                    f"[table] {column!r} is meant for the channel {entry.channel!r}, which this "
+                    f"ship does not have{nearest(entry.channel, known)}"
+                )
+        return self
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        return tuple(actuator.name for actuator in self.actuators)
+
+    @property
+    def has_wind(self) -> bool:
+        return self.sensors.wind is not None
+
+    @property
+    def wind_names(self) -> tuple[str, ...]:
+        return tuple(c.name for c in channels.WIND) if self.has_wind else ()
+
+    @property
+    def circular(self) -> frozenset[str]:
+        """Columns whose mean is a circular one."""
+        states = {c.name for c in (*channels.STATE, *channels.WIND) if c.circular}
+        return frozenset(states | {a.name for a in self.actuators if a.circular})
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Every value column of this ship's tables, in order."""
+        state = tuple(c.name for c in channels.STATE)
+        return (*state, *self.actuator_names, *self.wind_names)
+
+    def wanted(self) -> dict[str, set[str]]:
+        """Topic → field paths that this profile reads from a log."""
+        wanted: dict[str, set[str]] = {}
+        for source in (*(s for _, s in self.sensors.items()), *self.actuators):
+            wanted.setdefault(source.topic, set()).update(source.paths)
+        return wanted
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the profiles that come with shiplog."""
+    folder = resources.files("shiplog") / "profiles"
+    return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir()
+                        if f.name.endswith(".toml")))  # fmt: skip
+
+
+def load(name_or_path: str | Path) -> Profile:
+    """A shipped profile by its name, or any by its path. Raises ProfileError."""
+    path = Path(name_or_path)
+    if path.suffix == ".toml" or path.exists():
+        if not path.is_file():
+            raise ProfileError(
+                f"There is no profile file {path}.",
+                hint=f"shipped profiles: {listed(shipped())}; "
+                "or draft one with `shiplog profile LOG`.",
+            )
+        text, source = path.read_text(encoding="utf-8"), str(path)
+    else:
+        name = str(name_or_path)
+        if name not in shipped():
+            raise ProfileError(
+                f"There is no profile named {name!r}{nearest(name, shipped())}.",
+                hint=f"shipped profiles: {listed(shipped())}; or give the path of a .toml, "
+                "which `shiplog profile LOG` drafts.",
+            )
+        text = (resources.files("shiplog") / "profiles" / f"{name}.toml").read_text("utf-8")
+        source = name
+    return parse(text, source)
+
+
+def parse(text: str, source: str) -> Profile:
+    """A profile from TOML text. Raises ProfileError naming each wrong key."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(f"{source} is not valid TOML: {error}.",
+                           hint="mend that line; see the shipped profiles.") from error  # fmt: skip
+    table = content.get("table")
+    if isinstance(table, dict):  # `"column" = "channel"` is short for SI values
+        content["table"] = {
+            k: {"channel": v} if isinstance(v, str) else v for k, v in table.items()
+        }
+    try:
+        profile = Profile.model_validate({**content, "source": source})
+        for item in (*(s for _, s in profile.sensors.items()), *profile.actuators):
+            item.scale()  # a unit that is not known is said now, not in the middle of a log
+        for column in profile.table.values():
+            units.factor(column.unit)
+        return profile
+    except ValidationError as error:
+        raise ProfileError(
+            f"The profile {source} cannot be used: {advice(error)}.",
+            hint="mend these keys; the shipped profiles show each of them.",
+        ) from error
+
+
+def advice(error: ValidationError) -> str:
+    """Pydantic's findings in a user's words, with the nearest known key for an unknown one."""
+    sentences = []
+    for item in error.errors():
+        place = ".".join(str(part) for part in item["loc"]) or "it"
+        if item["type"] == "extra_forbidden":
+            known = _keys_at(item["loc"][:-1])
+            sentences.append(f"{place} is not a known key{nearest(str(item['loc'][-1]), known)}")
+        elif item["type"] == "missing":
+            sentences.append(f"{place} is missing")
+        else:
+            sentences.append(f"{place}: {item['msg'].removeprefix('Value error, ')}")
+    return "; ".join(sentences)
+
+
+def _keys_at(location: tuple) -> list[str]:
+    sections = {"ship": Ship, "sensors": Sensors, "actuators": Actuator, "site": Site,
+                "table": Column}  # fmt: skip
+    if not location:
+        return list(Profile.model_fields)
+    section = sections.get(str(location[0]), Profile)
+    if section is Sensors and len(location) > 1:
+        section = Sensor
+    return list(section.model_fields)

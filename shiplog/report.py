@@ -1,0 +1,165 @@
+"""Tables and sentences for people, in Markdown; their JSON twins for machines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import polars as pl
+
+from shiplog.findings import CONTRACT, VoyageReport
+from shiplog.profile import Profile
+from shiplog.store import Entry
+
+MOST_FINDINGS = 12
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table with aligned columns."""
+    text = [[_cell(value) for value in row] for row in rows]
+    widths = [max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
+              for i, h in enumerate(head)]  # fmt: skip
+    numeric = [bool(rows) and all(isinstance(r[i], (int, float)) for r in rows)
+               for i in range(len(head))]  # fmt: skip
+
+    def line(cells: Sequence[str]) -> str:
+        padded = [c.rjust(w) if n else c.ljust(w)
+                  for c, w, n in zip(cells, widths, numeric, strict=True)]  # fmt: skip
+        return f"| {' | '.join(padded)} |"
+
+    rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
+    return "\n".join([line(list(head)), line(rule), *map(line, text)])
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool) or not isinstance(value, float):
+        return str(value)
+    if not math.isfinite(value):
+        return "diverged" if value > 0 else "-"
+    if value != 0 and abs(value) < 0.001:
+        return f"{value:.1e}"
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def voyage_lines(report: VoyageReport) -> list[str]:
+    """What one log's health is, in a few lines."""
+    lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
+    lines = [
+        f"{report.name}: {report.messages_read} messages read, {lost} lost; "
+        f"{report.rows} rows, {report.seconds:.1f} s"
+    ]
+    lines += [f"  {finding.kind}: {finding.sentence}" for finding in report.findings[:MOST_FINDINGS]]
+    left = len(report.findings) - MOST_FINDINGS
+    if left > 0:
+        lines.append(f"  and {left} more findings (all of them with --json).")
+    return lines
+
+
+def voyages_json(reports: Sequence[VoyageReport]) -> dict:
+    """The contract's answer of `check` and `ingest`."""
+    return {"contract": CONTRACT, "voyages": [report.as_json() for report in reports]}
+
+
+def catalogue(entries: Sequence[Entry]) -> str:
+    rows = [(e.name, e.ship, e.start[:19], e.seconds, e.rows, e.findings) for e in entries]
+    return table(("voyage", "ship", "start", "seconds", "rows", "findings"), rows)
+
+
+def estimated(profile: Profile) -> list[str]:
+    """Which particulars the profile leaves out."""
+    missing = [
+        name
+        for name in ("breadth_m", "draught_m", "mass_kg", "x_g_m", "block_coefficient",
+                     "frontal_area_m2", "lateral_area_m2")
+        if getattr(profile.ship, name) is None
+    ]  # fmt: skip
+    if not missing:
+        return []
+    return [f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}; the learned "
+            "model does without them."]  # fmt: skip
+
+
+def summary(errors: pl.DataFrame) -> dict:
+    """The figures of one model: L per seed and their mean, RMSE, end errors.
+
+    errors: one row per window and seed, with seed, voyage, window and `evaluate.ERRORS`. RMSE is
+    over all windows of a seed, then the mean over seeds; end errors are means over both.
+    """
+    per_seed = errors.group_by("seed").agg(
+        pl.col("loss").mean(),
+        *[pl.col(f"rmse_{name}").pow(2).mean().sqrt() for name in ("surge", "sway", "yaw_rate")],
+        pl.col("end_position_m", "end_heading_deg").mean(),
+    ).sort("seed")  # fmt: skip
+    windows = errors.select("voyage", "window").unique().height
+    return {
+        "loss": float(per_seed["loss"].mean()),  # type: ignore[arg-type]
+        "windows": windows,
+        "seeds": per_seed["loss"].to_list(),
+        "rmse": {
+            name: float(per_seed[f"rmse_{name}"].mean())  # type: ignore[arg-type]
+            for name in ("surge", "sway", "yaw_rate")
+        },
+        "end_position_m": float(per_seed["end_position_m"].mean()),  # type: ignore[arg-type]
+        "end_heading_deg": float(per_seed["end_heading_deg"].mean()),  # type: ignore[arg-type]
+    }
+
+
+def evaluation_json(
+    errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame
+) -> dict:
+    """The contract's answer of `evaluate`.
+
+    coverage: one row per window, with voyage, window and coverage (0 to 1).
+    """
+    per_voyage = errors.group_by("voyage").agg(
+        pl.col("loss").mean(), windows=pl.col("window").n_unique()
+    )
+    covered = coverage.group_by("voyage").agg(pl.col("coverage").mean())
+    voyages = {
+        row["voyage"]: {key: row[key] for key in ("loss", "windows", "coverage")}
+        for row in per_voyage.join(covered, on="voyage").sort("voyage").to_dicts()
+    }
+    return {"contract": CONTRACT, **summary(errors), "floors": floors, "voyages": voyages}
+
+
+def models_table(summaries: dict[str, dict], floors: dict[str, float]) -> str:
+    """One line a model and a floor: what a reader looks at first."""
+    rows = []
+    for label, s in summaries.items():
+        spread = f"{min(s['seeds']):.0f} to {max(s['seeds']):.0f}" if len(s["seeds"]) > 1 else "-"
+        rows.append(
+            (label, s["loss"], spread, s["rmse"]["surge"], s["rmse"]["sway"],
+             math.degrees(s["rmse"]["yaw_rate"]), s["end_position_m"], s["end_heading_deg"])
+        )  # fmt: skip
+    names = {"hold": "floor: hold the velocity",
+             "least_squares": "floor: quadratic least squares"}  # fmt: skip
+    dash = "-"
+    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
+    head = ("model", "L", "L over seeds", "RMSE u [m/s]", "RMSE v [m/s]", "RMSE r [deg/s]",
+            "end position [m]", "end heading [deg]")  # fmt: skip
+    return table(head, rows)
+
+
+def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -> str:
+    """The worst windows, with where they left the training data."""
+    mean = errors.group_by("voyage", "window").agg(
+        pl.col("loss", "end_position_m", "end_heading_deg").mean(), pl.col("elapsed").first()
+    )
+    rows = (
+        mean.join(coverage, on=["voyage", "window"])
+        .sort("loss", descending=True)
+        .head(most)
+        .select("voyage", "elapsed", "loss", "end_position_m", "end_heading_deg", "coverage",
+                "reason")
+        .rows()
+    )  # fmt: skip
+    shown = [(v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows]
+    return table(("voyage", "from [s]", "L", "end position [m]", "end heading [deg]", "covered",
+                  "outside the training data"), shown)  # fmt: skip
+
+
+def voyages_table(answer: dict) -> str:
+    """L, windows and coverage of each voyage."""
+    rows = [(name, v["windows"], v["loss"], f"{v['coverage']:.0%}")
+            for name, v in answer["voyages"].items()]  # fmt: skip
+    return table(("voyage", "windows", "L", "covered"), rows)

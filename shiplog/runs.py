@@ -1,0 +1,255 @@
+"""Run folders: a model, one dataset, all its seeds. The only module that writes them.
+
+    <run>/config.toml  provenance.json      every resolved value; versions, hashes, times
+    <run>/profile.json                      the ship the run is of
+    <run>/windows.parquet                     which windows it learned from
+    <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from
+    <run>/scaling.safetensors               mean and std of inputs and accelerations
+    <run>/seed<k>/model.safetensors  training.parquet   weights; epoch, losses; never redone
+    <run>/errors.parquet  rollouts.parquet  of the latest evaluation, per window, step and seed
+
+While it is being trained a run is called <run>.partial; it is renamed when every seed is done.
+Killed, it goes on from the finished seeds and, in the paper's recipe, from the last checkpoint.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+
+from shiplog import config as configuration
+from shiplog.config import Config
+from shiplog.exceptions import RunError
+from shiplog.models.feedforward import FeedForward, Scaling, Shape
+from shiplog.profile import Profile
+from shiplog.train import HISTORY, Progress
+
+
+@dataclass(frozen=True)
+class Run:
+    """An opened run folder, finished or partial."""
+
+    path: Path
+    config: Config
+    profile: Profile
+
+    @property
+    def name(self) -> str:
+        return self.path.name.removesuffix(".partial")
+
+    @property
+    def shape(self) -> Shape:
+        net = self.config.network
+        return Shape(len(self.profile.actuators), self.profile.has_wind, net.width, net.depth,
+                     net.wind_input, net.input_tanh)  # fmt: skip
+
+    def scaling(self) -> Scaling:
+        tensors = _tensors(self.path / "scaling.safetensors")
+        return Scaling(*(tensors[name] for name in Scaling.__slots__))
+
+    def windows(self) -> pl.DataFrame:
+        """The plan of the training windows: voyage, segment, start, copy."""
+        return pl.read_parquet(self.path / "windows.parquet")
+
+    def training(self) -> pl.DataFrame:
+        """The 1 Hz rows the run was trained on, sorted, as `table.resample` gave them."""
+        return pl.read_parquet(self.path / "training.parquet")
+
+    def validation(self) -> pl.DataFrame:
+        """The 1 Hz rows of the validation voyages, likewise."""
+        return pl.read_parquet(self.path / "validation.parquet")
+
+    def empty_model(self) -> FeedForward:
+        return FeedForward(self.shape, self.scaling())
+
+    def models(self) -> dict[int, FeedForward]:
+        """Seed → trained network in float64."""
+        return {seed: self.model(seed) for seed in self.config.seeds}
+
+    def model(self, seed: int) -> FeedForward:
+        model = self.empty_model()
+        _fill(model, _tensors(self._seed(seed) / "model.safetensors"))
+        return model.double()
+
+    def history(self, seed: int) -> pl.DataFrame:
+        """epoch, training, validation, smoothed."""
+        return pl.read_parquet(self._seed(seed) / "training.parquet")
+
+    def finished(self, seed: int) -> bool:
+        return (self._seed(seed) / "training.parquet").is_file()
+
+    def save_seed(self, seed: int, progress: Progress) -> None:
+        """The best weights and the history; the checkpoint has served its purpose."""
+        folder = self._seed(seed)
+        folder.mkdir(exist_ok=True)
+        _save(folder / "model.safetensors", _named(progress.best_weights))
+        history = pl.DataFrame(progress.history, schema=list(HISTORY), orient="row")
+        partial = folder / "training.partial"
+        history.write_parquet(partial)
+        partial.replace(folder / "training.parquet")  # last: this is what `finished` looks for
+        (folder / "checkpoint.safetensors").unlink(missing_ok=True)
+
+    def save_checkpoint(self, seed: int, progress: Progress) -> None:
+        """Everything a killed training needs to go on as if nothing had happened."""
+        folder = self._seed(seed)
+        folder.mkdir(exist_ok=True)
+        tensors = {
+            **_named(progress.weights),
+            **{f"best.{name}": w for name, w in _named(progress.best_weights).items()},
+            **{f"moment.{i:02d}": m.contiguous() for i, m in enumerate(progress.moments)},
+            "history": torch.tensor(progress.history, dtype=torch.float64),
+            "numbers": torch.tensor(
+                [progress.best, progress.first, progress.smoothed, progress.steps],
+                dtype=torch.float64,
+            ),
+        }
+        if progress.stream is not None:
+            tensors["stream"] = progress.stream
+        _save(folder / "checkpoint.safetensors", tensors)
+
+    def load_checkpoint(self, seed: int) -> Progress | None:
+        """Where an unfinished seed stands, or None."""
+        path = self._seed(seed) / "checkpoint.safetensors"
+        if not path.is_file():
+            return None
+        tensors = _tensors(path)
+        rows = [(int(row[0]), *row[1:]) for row in tensors["history"].tolist()]
+        best, first, smoothed, steps = tensors["numbers"].tolist()
+        order = list(_named([torch.empty(0)] * sum(n.startswith("layer") for n in tensors)))
+        return Progress(
+            epoch=rows[-1][0],
+            weights=[tensors[name] for name in order],
+            best_weights=[tensors[f"best.{name}"] for name in order],
+            best=best,
+            first=first,
+            smoothed=smoothed,
+            moments=[tensors[n] for n in sorted(tensors) if n.startswith("moment.")],
+            steps=int(steps),
+            stream=tensors.get("stream"),
+            history=rows,
+        )
+
+    def save_evaluation(self, errors: pl.DataFrame, rollouts: pl.DataFrame) -> None:
+        """What the latest evaluation found: errors.parquet and rollouts.parquet."""
+        for name, frame in (("errors", errors), ("rollouts", rollouts)):
+            partial = self.path / f"{name}.partial"
+            frame.write_parquet(partial)
+            partial.replace(self.path / f"{name}.parquet")
+
+    def finish(self, provenance: dict) -> Run:
+        """Say where it came from and give it its name."""
+        write_json(self.path / "provenance.json", provenance)
+        final = self.path.with_name(self.name)
+        self.path.rename(final)
+        return Run(final, self.config, self.profile)
+
+    def _seed(self, seed: int) -> Path:
+        return self.path / f"seed{seed}"
+
+
+def create(
+    path: Path, config: Config, profile: Profile, scaling: Scaling, windows: pl.DataFrame,
+    training: pl.DataFrame, validation: pl.DataFrame,
+) -> Run:
+    """Begin a run, or go on with one of the same settings that was interrupted.
+
+    Raises RunError where the name is taken by a finished run or by other settings.
+    """  # fmt: skip
+    partial = path.with_name(f"{path.name}.partial")
+    if path.exists():
+        raise RunError(f"{path} exists already.", hint="choose another --out, or remove it.")
+    if partial.is_dir() and (partial / "config.toml").is_file():
+        begun = configuration.load(partial / "config.toml")
+        same = begun == config and _same_rows(partial, training)
+        if not same:
+            raise RunError(
+                f"{partial} was begun with other settings or data and is not finished.",
+                hint=f"finish it with its own settings, choose another --out, or remove {partial}.",
+            )
+        return Run(partial, config, profile)
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    windows.write_parquet(partial / "windows.parquet")
+    training.write_parquet(partial / "training.parquet")
+    validation.write_parquet(partial / "validation.parquet")
+    write_json(partial / "profile.json", profile.model_dump(mode="json"))
+    _save(partial / "scaling.safetensors",
+          {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__})  # fmt: skip
+    # Last: a folder with a config is one that can be gone on with.
+    (partial / "config.toml").write_text(config.to_toml(), encoding="utf-8")
+    return Run(partial, config, profile)
+
+
+def load(path: str | Path) -> Run:
+    """A finished run. Raises RunError."""
+    path = Path(path)
+    if not (path / "config.toml").is_file():
+        begun = path.with_name(f"{path.name}.partial")
+        if begun.is_dir():
+            raise RunError(f"The run {path} is not finished.",
+                           hint="give the same `shiplog train` again: it goes on.")  # fmt: skip
+        raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+    return open_folder(path)
+
+
+def open_folder(path: Path) -> Run:
+    """A run folder as it stands, finished or partial."""
+    profile = Profile.model_validate(json.loads((path / "profile.json").read_text("utf-8")))
+    return Run(path, configuration.load(path / "config.toml"), profile)
+
+
+def write_json(path: Path, content: dict) -> None:
+    """JSON, whole or not at all; a number that is not finite becomes null."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
+    partial.replace(path)
+
+
+def finite(value):
+    """JSON has no infinity: null it, at any depth."""
+    if isinstance(value, dict):
+        return {k: finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _same_rows(partial: Path, training: pl.DataFrame) -> bool:
+    return pl.read_parquet(partial / "training.parquet").equals(training)
+
+
+def _named(weights: list[torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {
+        f"layer{i // 2:02d}.{('weight', 'bias')[i % 2]}": w.contiguous()
+        for i, w in enumerate(weights)
+    }
+
+
+def _fill(model: FeedForward, tensors: dict[str, torch.Tensor]) -> None:
+    with torch.no_grad():
+        for name, parameter in zip(_named(model.weights), model.weights, strict=True):
+            parameter.copy_(tensors[name])
+
+
+def _tensors(path: Path) -> dict[str, torch.Tensor]:
+    try:
+        return load_file(path)
+    except (OSError, SafetensorError) as error:
+        raise RunError(f"{path} cannot be read: {error}.", hint="train the run again.") from error
+
+
+def _save(path: Path, tensors: dict[str, torch.Tensor]) -> None:
+    partial = path.with_name(f"{path.name}.partial")
+    save_file(tensors, partial)
+    partial.replace(path)

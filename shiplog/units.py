@@ -1,0 +1,30 @@
+"""Units that logs and tables come in, and their factor to SI (rev/s for shafts)."""
+
+from __future__ import annotations
+
+import math
+
+from shiplog.exceptions import ProfileError, listed, nearest
+
+DEGREE = math.pi / 180.0
+
+TO_SI = {
+    "1": 1.0, "%": 0.01, "permille": 0.001,
+    "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048,
+    "m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6, "kn": 1852 / 3600, "knots": 1852 / 3600,
+    "rad": 1.0, "deg": DEGREE,
+    "rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60,
+    "rps": 1.0, "rev/s": 1.0, "rpm": 1 / 60,
+    "pwm": 1 / 400,  # half a servo's travel, 400 µs, is full command
+    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
+}  # fmt: skip
+
+
+def factor(unit: str) -> float:
+    """What a value in `unit` is multiplied by. Raises ProfileError for a unit not in the table."""
+    if unit not in TO_SI:
+        raise ProfileError(
+            f"The unit {unit!r} is not known{nearest(unit, TO_SI)}.",
+            hint=f"use one of: {listed(TO_SI, most=40)}.",
+        )
+    return TO_SI[unit]

@@ -1,0 +1,81 @@
+"""One comparison as one Rerun recording: what every view sends, and how they share the screen."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from shiplog.comparison import Comparison
+from shiplog.exceptions import ShiplogError
+from shiplog.viewer import display, histogram, report, style, timeline, trajectory
+from shiplog.viewer.display import Drawn
+
+# A view sends entities and says where it stands: beside the others of a voyage, or, asked without
+# a voyage, on a tab of its own.
+VIEWS = {
+    "trajectory": trajectory,
+    "timeline": timeline,
+    "histogram": histogram,
+    "report": report,
+}
+LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
+MOST_TABS = 6  # voyages beyond are in the entity tree: more tabs than fit are not found either
+
+
+def write(comparison: Comparison, path: Path) -> None:
+    """Write the recording whole or not at all."""
+    rr.set_strict_mode(True)  # else what Rerun cannot draw is left out with a warning
+    recording = rr.RecordingStream("shiplog")
+    picture = display.drawn(comparison)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        with _saying_what_failed(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            recording.save(partial, default_blueprint=layout(picture))
+        recording.send_recording_name(comparison.title)
+        for view in VIEWS.values():
+            view.send(recording, picture)
+        with _saying_what_failed(path):
+            recording.flush()
+            recording.disconnect()
+            partial.replace(path)
+    finally:
+        recording.disconnect()
+        partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def _saying_what_failed(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, RuntimeError) as error:  # RuntimeError: Rerun's own, such as a full disk
+        raise ShiplogError(
+            f"The recording {path} could not be written: {error}.",
+            hint="is the disk full, the folder writable, the variable RERUN unset?",
+        ) from error
+
+
+def layout(picture: Drawn) -> rrb.Blueprint:
+    """A tab a voyage, the track left and time right, then what belongs to no voyage alone."""
+    tabs: list[rrb.View | rrb.Container] = []
+    for voyage in picture.voyages[:MOST_TABS]:
+        parts = {name: view.blueprint(picture, voyage) for name, view in VIEWS.items()}
+        left = [part for name in LEFT if (part := parts.pop(name)) is not None]
+        right = [part for part in parts.values() if part is not None]
+        track = rrb.Vertical(*left, row_shares=[2.2, 1.0][: len(left)])
+        tabs.append(rrb.Horizontal(track, *right, column_shares=[1.0, 1.45], name=voyage))
+    own = (view.blueprint(picture, None) for view in VIEWS.values())
+    tabs += [part for part in own if part is not None]
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=style.TIMELINE, play_state="paused"),
+        auto_views=False,
+        auto_layout=False,
+    )

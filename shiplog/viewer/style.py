@@ -1,0 +1,44 @@
+"""How things look: one colour per model, dark for what was measured, and light backgrounds."""
+
+from __future__ import annotations
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+Colour = tuple[int, int, int, int]
+
+TIMELINE = "sim_time"
+MEASURED: Colour = (25, 25, 25, 255)
+MODELS: tuple[Colour, ...] = (  # Okabe and Ito: told apart by colour-blind readers too
+    (0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 255), (204, 121, 167, 255),
+    (230, 159, 0, 255), (86, 180, 233, 255), (120, 80, 40, 255), (150, 150, 0, 255),
+)  # fmt: skip
+ACTUATORS = MODELS  # never in one view with a model
+TRAINING: Colour = (150, 160, 175, 255)
+TEST: Colour = (213, 94, 0, 255)
+GRID: Colour = (222, 226, 230, 255)
+BANK: Colour = (140, 110, 70, 255)
+TICK: Colour = (30, 30, 30, 255)
+PAPER: Colour = (250, 250, 250, 255)
+
+
+def colours(models: list[str]) -> dict[str, Colour]:
+    """A fixed colour for every model, in the order they were given."""
+    return {model: MODELS[i % len(MODELS)] for i, model in enumerate(models)}
+
+
+def faded(colour: Colour, share: float = 0.35) -> Colour:
+    """The same colour mixed into the paper, for what stands behind: Rerun's lines are opaque."""
+    red, green, blue = (
+        round(share * c + (1.0 - share) * p) for c, p in zip(colour[:3], PAPER[:3], strict=True)
+    )
+    return (red, green, blue, 255)
+
+
+def entity(*parts: str) -> str:
+    """An entity path: names of voyages and models keep their spaces and slashes, escaped."""
+    return rr.new_entity_path(list(parts))
+
+
+def plot_background() -> rrb.archetypes.PlotBackground:
+    return rrb.archetypes.PlotBackground(color=PAPER, show_grid=False)

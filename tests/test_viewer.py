@@ -1,0 +1,309 @@
+"""The recording holds what was compared, in the units its axes say, and the viewer shows it."""
+
+import math
+import urllib.request
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from rerun.chunk import RrdReader
+
+from shiplog import viewer
+from shiplog.comparison import Actuator, Comparison
+from shiplog.exceptions import ShiplogError
+from shiplog.viewer import display, histogram, native, timeline, trajectory
+
+SECONDS = 201
+TURNING = math.radians(6.0)  # rad/s: passes north every minute
+
+
+def circle(voyage, east=0.0):
+    """A steady turn to starboard at 0.5 m/s, of which everything is known in closed form."""
+    time = np.arange(SECONDS, dtype=float)
+    heading = TURNING * time
+    radius = 0.5 / TURNING
+    return pl.DataFrame(
+        {
+            "voyage": [voyage] * SECONDS,
+            "time": time,
+            "x0": radius * np.sin(heading),
+            "surge": np.full(SECONDS, 0.5),
+            "y0": east + radius * (1.0 - np.cos(heading)),
+            "sway": np.full(SECONDS, -0.05),
+            "heading": np.arctan2(np.sin(heading), np.cos(heading)),
+            "yaw_rate": np.full(SECONDS, TURNING),
+            "rudder_port": np.full(SECONDS, math.radians(-35.0)),
+            "propeller": np.full(SECONDS, 10.0),
+            "wind_speed": np.full(SECONDS, 3.1),
+            "wind_angle": np.full(SECONDS, math.radians(-50.0)),
+        }
+    )
+
+
+def rollouts(measured, model, seed):
+    """Two windows of 100 s in which the surge drifts off by a speed that the seed decides."""
+    starboard = 0.01 * (seed + 1)
+    return measured.filter(pl.col("time") < 200).select(
+        "voyage", "time", "x0", "y0", "sway", "heading", "yaw_rate",
+        model=pl.lit(model),
+        seed=pl.lit(seed),
+        window=(pl.col("time") // 100).cast(pl.Int64),
+        surge=pl.col("surge") + starboard * (pl.col("time") % 100) / 100,
+        d=(starboard * (pl.col("time") % 100)) ** 2,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def compared():
+    measured = pl.concat([circle("harbour"), circle("open sea", east=20.0)])
+    simulated = [
+        rollouts(measured, model, seed) for model in ("network fast", "mmg") for seed in (0, 1)
+    ]
+    return Comparison(
+        title="two circles",
+        ship_length=3.0,
+        ship_breadth=0.5,
+        actuators=(
+            Actuator("rudder_port", "rudder", "rad"),
+            Actuator("propeller", "propeller", "rev/s"),
+        ),
+        has_wind=True,
+        measured=measured,
+        simulated=pl.concat(simulated),
+        training=measured.drop("voyage", "time").head(60).with_columns(wind_speed=pl.lit(2.0)),
+        summary="| model | L |\n|---|---|\n| mmg | 1 |\n",
+        banks=(((-10.0, -10.0), (-10.0, 40.0)),),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def saved(compared, tmp_path_factory):
+    path = tmp_path_factory.mktemp("viewer") / "compare.rrd"
+    viewer.save(compared, path)
+    return path
+
+
+def column(path, entity, component):
+    """The values of a component at an entity, rows in order of time."""
+    chunks = RrdReader(path).stream().filter(content=entity)
+    batches = [pl.DataFrame(pl.from_arrow(c.to_record_batch())) for c in chunks]
+    tables = [t for t in batches if component in t.columns]
+    assert tables, f"{entity} has no {component}"
+    table = pl.concat(tables)
+    return table.sort("sim_time") if "sim_time" in table.columns else table
+
+
+def scalars(path, entity):
+    table = column(path, entity, "Scalars:scalars")
+    return table["Scalars:scalars"].explode().to_numpy()
+
+
+def tensor(path, entity, component):
+    """A tensor's values, which polars cannot hold."""
+    (chunk,) = RrdReader(path).stream().filter(content=entity)
+    (row,) = chunk.to_record_batch().to_pylist()
+    (value,) = row[component]
+    return np.array(value["buffer"]).reshape(value["shape"])
+
+
+def test_everything_compared_is_an_entity(saved):
+    text = RrdReader(saved).store().summary()
+    for path in (
+        r"/track/harbour/measured", r"/track/harbour/simulated/network\ fast",
+        r"/track/open\ sea/simulated/mmg", "/track/harbour/banks", "/state/harbour/surge/measured",
+        "/state/harbour/yaw_rate/simulated/mmg", "/actuator/harbour/angle/rudder_port",
+        "/actuator/harbour/revolutions/propeller", "/wind/harbour/wind_speed", "/error/harbour/mmg",
+        "/hist/surge/training", "/hist/surge/test", "/hist/propeller/test", "/hist/wind/training",
+        "/hist/wind/test", "/report",
+    ):  # fmt: skip
+        assert path in text, path
+    assert not list(saved.parent.glob("*.partial")) + list(saved.parent.glob(".*"))
+
+
+def test_columns_are_whole_and_in_the_units_their_axes_say(saved):
+    surge = scalars(saved, "/state/harbour/surge/measured")
+    assert surge == pytest.approx(np.full(SECONDS, 0.5))
+    assert scalars(saved, "/state/harbour/yaw_rate/measured") == pytest.approx(
+        np.full(SECONDS, 6.0)
+    )
+    assert scalars(saved, "/actuator/harbour/angle/rudder_port")[0] == pytest.approx(-35.0)
+    assert scalars(saved, "/wind/harbour/wind_angle")[0] == pytest.approx(310.0)
+    heading = scalars(saved, "/state/harbour/heading/measured")
+    assert heading == pytest.approx(6.0 * np.arange(SECONDS))  # 1200 deg, never back to -180
+
+
+def test_windows_start_anew_and_keep_to_the_measured_turn(saved):
+    table = column(saved, "/state/harbour/heading/simulated/mmg", "Scalars:scalars")
+    heading = table["Scalars:scalars"].explode().to_numpy()
+    assert len(heading) == 201  # two windows of 100, and the gap between them
+    assert np.isnan(heading[100]) and np.isfinite(np.delete(heading, 100)).all()
+    assert np.delete(heading, 100) == pytest.approx(6.0 * np.arange(200))
+    strips = column(saved, "/track/harbour/simulated/mmg", "LineStrips2D:strips")
+    assert len(strips["LineStrips2D:strips"][0]) == 2
+
+
+def test_the_error_is_logarithmic_and_of_the_median_seed(saved, compared):
+    assert display.shown_seeds(compared) == {"network fast": 0, "mmg": 0}
+    error = scalars(saved, "/error/harbour/mmg")
+    assert error[99] == pytest.approx(math.log10(1.0 + 0.99**2))
+    spread = column(saved, "/error/harbour/seeds/mmg", "Scalars:scalars")["Scalars:scalars"]
+    lowest, highest = spread[99]
+    assert (lowest, highest) == pytest.approx(
+        (math.log10(1.0 + 0.99**2), math.log10(1.0 + 1.98**2))
+    )
+
+
+def test_a_turn_to_starboard_turns_clockwise_on_the_chart():
+    at = pl.DataFrame({"x0": [0.0, 0.0], "y0": [0.0, 100.0], "heading": [0.0, 90.0]})
+    north, east = trajectory.hulls(at, length=4.0, breadth=1.0)
+    assert north[0] == pytest.approx((0.0, -2.0))  # bow up: Rerun's y points down
+    assert east[0] == pytest.approx((102.0, 0.0))  # bow to the right
+    assert north[1][0] == pytest.approx(0.5)  # starboard side to the right
+
+
+def test_a_chart_of_the_sea_is_in_kilometres(compared):
+    at_sea = compared.measured.with_columns(pl.col("x0") * 1000.0)
+    far, unit = trajectory.in_chart_units(display.drawn(replace(compared, measured=at_sea)))
+    assert unit == "kilometres" and far.ship_length == pytest.approx(0.003)
+    assert far.measured["x0"].max() == pytest.approx(compared.measured["x0"].max())
+    assert trajectory.in_chart_units(display.drawn(compared))[1] == "metres"
+
+
+def test_histograms_count_every_row(saved, compared):
+    bars = tensor(saved, "/hist/surge/training", "BarChart:values")
+    assert bars.max() == pytest.approx(math.log10(61.0)) == bars.sum()  # 60 rows of 0.5 m/s
+    bars = tensor(saved, "/hist/surge/test", "BarChart:values")
+    assert bars.max() == pytest.approx(math.log10(1.0 + 2 * SECONDS)) == bars.sum()
+    winds = tensor(saved, "/hist/wind/test", "Tensor:data")
+    assert winds.shape[0] == 18 and winds[15, 12] == pytest.approx(math.log10(1.0 + 2 * SECONDS))
+    drawn = display.drawn(compared)
+    counts = histogram.wind_counts(drawn.measured, fastest=4.0)
+    assert counts.shape == (18, 16)  # 20 deg and 0.25 m/s
+    assert counts[15, 12] == 2 * SECONDS == counts.sum()  # 310 deg, 3.1 m/s
+    counts = histogram.wind_counts(drawn.training, fastest=4.0)
+    assert counts[15, 8] == 60 == counts.sum()  # 2.0 m/s belongs to the bin it begins
+
+
+@pytest.mark.parametrize(
+    "values", [[0.0], [-1.0, 1.0], [3.0, 3.8], [1e-9, 2e-9], [-105.0, 35.0], [0.3, 0.3]]
+)
+def test_bins_are_round_few_and_hold_every_value(values):
+    values = np.array(values)
+    edges = histogram.bins(values)
+    assert 1 <= len(edges) - 1 <= histogram.MOST_BINS + 1
+    assert np.histogram(values, edges)[0].sum() == len(values)
+    width = edges[1] - edges[0]
+    assert width / 10.0 ** math.floor(math.log10(width) + 1e-9) == pytest.approx(
+        round(width / 10.0 ** math.floor(math.log10(width) + 1e-9))
+    )
+
+
+def test_a_diverging_model_does_not_shrink_the_axis():
+    measured = pl.DataFrame({"surge": [0.0, 1.0]})
+    simulated = pl.DataFrame({"surge": [0.5, 1e9, math.inf]})
+    low, high = timeline.readable_range(measured, simulated, ["surge"])
+    assert low == pytest.approx(-0.08) and high == pytest.approx(1.68)
+
+
+def test_an_axis_carries_two_labels():
+    assert timeline.with_two_labels(0.17, 0.95) == (0.0, 1.0)
+    assert timeline.with_two_labels(-0.2, 0.25) == (-0.2, 0.25)  # has 0.0, 0.1 and more
+    assert timeline.with_two_labels(-3.0, 3.6) == (-3.0, 3.6)  # ten would flatten it
+
+
+def test_without_wind_nothing_of_wind_is_shown(compared, tmp_path):
+    winds = ("wind_speed", "wind_angle")
+    calm = replace(
+        compared,
+        has_wind=False,
+        measured=compared.measured.drop(winds),
+        training=compared.training.drop(winds),
+    )
+    viewer.save(calm, tmp_path / "calm.rrd")
+    text = RrdReader(tmp_path / "calm.rrd").store().summary()
+    assert "/wind/" not in text and "/hist/surge/test" in text
+
+
+def test_gaps_and_a_voyage_no_model_saw_are_drawn_as_they_are(compared, tmp_path):
+    holes = compared.measured.filter(~pl.col("time").is_between(50, 80)).with_columns(
+        surge=pl.when(pl.col("time") == 10).then(None).otherwise(pl.col("surge"))
+    )
+    seen = compared.simulated.filter(pl.col("voyage") == "harbour")
+    partly = replace(compared, measured=holes, simulated=seen)
+    viewer.save(partly, tmp_path / "partly.rrd")
+    surge = scalars(tmp_path / "partly.rrd", "/state/harbour/surge/measured")
+    assert len(surge) == SECONDS - 31 + 1 and np.isnan(surge).sum() == 2
+
+
+def test_what_cannot_be_written_whole_is_not_there(compared, tmp_path, monkeypatch):
+    def fails(recording, comparison):
+        raise RuntimeError("the disk is full")
+
+    monkeypatch.setattr(histogram, "send", fails)
+    with pytest.raises(RuntimeError, match="disk"):
+        viewer.save(compared, tmp_path / "compare.rrd")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_is_full_is_said_and_leaves_no_half_a_recording(compared, tmp_path):
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(ShiplogError, match="could not be written"):
+            viewer.save(compared, tmp_path / "compare.rrd")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_display_the_viewer_says_what_to_do(saved, monkeypatch):
+    monkeypatch.setattr(native.sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ShiplogError, match="No display") as said:
+        viewer.open_viewer(saved)
+    assert "--save" in said.value.hint and "--web" in said.value.hint
+
+
+def test_a_recording_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ShiplogError, match=r"missing\.rrd"):
+        viewer.serve(tmp_path / "missing.rrd")
+
+
+@pytest.mark.viewer
+def test_the_web_viewer_listens_on_this_machine_only(saved):
+    psutil = pytest.importorskip("psutil")
+    with viewer.serve(saved, port=0) as served:
+        listening = psutil.Process(served.process.pid).net_connections("inet")
+        hosts = {c.laddr.ip for c in listening if c.status == psutil.CONN_LISTEN}
+        assert hosts == {"127.0.0.1"}
+        with urllib.request.urlopen(served.address, timeout=10) as page:
+            assert page.status == 200 and b"<html" in page.read()[:2000]
+    assert served.process.poll() is not None
+
+
+@pytest.mark.viewer
+def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path):
+    from shiplog.viewer.screenshot import screenshot
+
+    try:
+        state = screenshot(saved, tmp_path / "seen.png", time_s=100.0)
+    except ShiplogError as error:
+        pytest.skip(f"no headless viewer here: {error.message}")
+    names = {view.name for view in state.views}
+    for name in (
+        "error: log10(1 + d), dots where a window starts", "surge u [m/s]", "sway v_m [m/s]",
+        "yaw rate r [deg/s]", "heading ψ [deg]", "north x₀ [m]", "east y₀ [m]", "rudders [deg]",
+        "propellers [rev/s]", "apparent wind speed U_A [m/s]", "Report",
+        "Apparent wind, training [rows, log scale]", "Apparent wind, test [rows, log scale]",
+        "surge u [m/s]: log10(1 + rows)",
+    ):  # fmt: skip
+        assert name in names, name
+    assert any(name.startswith("Track, north up, metres") for name in names)
+    assert not [report for view in state.views for report in view.reports]
+    (recording,) = [r for r in state.recordings if r.timelines]
+    (time,) = [t for t in recording.timelines if t.name == "sim_time"]
+    assert (time.start, time.end) == (0, 200_000_000_000)
+    assert (tmp_path / "seen.png").stat().st_size > 50_000
