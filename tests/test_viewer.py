@@ -113,7 +113,8 @@ def test_everything_compared_is_an_entity(saved):
         r"/track/harbour/measured", r"/track/harbour/simulated/network\ fast",
         r"/track/open\ sea/simulated/mmg", "/track/harbour/banks", "/state/harbour/surge/measured",
         "/state/harbour/yaw_rate/simulated/mmg", "/actuator/harbour/angle/rudder_port",
-        "/actuator/harbour/revolutions/propeller", "/wind/harbour/wind_speed", "/error/harbour/mmg",
+        "/actuator/harbour/revolutions/propeller", "/wind/harbour/wind_speed",
+        "/error/harbour/simulated/mmg",
         "/hist/surge/training", "/hist/surge/test", "/hist/propeller/test", "/hist/wind/training",
         "/hist/wind/test", "/report",
     ):  # fmt: skip
@@ -145,7 +146,7 @@ def test_windows_start_anew_and_keep_to_the_measured_turn(saved):
 
 def test_the_error_is_logarithmic_and_of_the_median_seed(saved, compared):
     assert display.shown_seeds(compared) == {"network fast": 0, "mmg": 0}
-    error = scalars(saved, "/error/harbour/mmg")
+    error = scalars(saved, "/error/harbour/simulated/mmg")
     assert error[99] == pytest.approx(math.log10(1.0 + 0.99**2))
     spread = column(saved, "/error/harbour/seeds/mmg", "Scalars:scalars")["Scalars:scalars"]
     lowest, highest = spread[99]

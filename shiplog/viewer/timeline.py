@@ -62,7 +62,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
             for c in channels.WIND
         ]
     return rrb.Horizontal(
-        rrb.Vertical(*first, row_shares=[1.4, 1.0, 1.0, 1.0, 1.0]), rrb.Vertical(*second)
+        rrb.Vertical(*first, row_shares=[1.15, 0.95, 0.95, 0.95, 1.1]), rrb.Vertical(*second)
     )
 
 
@@ -162,16 +162,15 @@ def _send_simulated(
         time, begins = display.column(bold, "time"), display.pieces(bold)
         spread = _spread(rollouts) if rollouts["seed"].n_unique() > 1 else None
         for name, parent in curves:
-            middle = () if name == "d" else ("simulated",)
             values = display.column(bold, name)[:, None]
-            path = entity(*parent, *middle, model)
+            path = entity(*parent, "simulated", model)
             _send_lines(recording, path, time, values, begins, [model], colour, 1.25)
             if spread is not None:
                 both = np.column_stack([display.column(spread, name + s) for s in SPREAD])
-                names = [model] * 2
+                names = ["lowest, highest seed"] * 2  # of one name: one line in the legend
                 _send_lines(
                     recording,
-                    entity(*parent, "seeds", model),
+                    entity(*parent, "seeds", model),  # drawn in order of names: before simulated
                     display.column(spread, "time"),
                     both,
                     display.pieces(spread),
