@@ -21,8 +21,12 @@ SCHEMAS = {  # the contract's topic to its schema
     "/ship/state": "shiplog.ShipState", "/wind/apparent": "shiplog.Wind", "/gyro": "shiplog.Gyro",
     "/gnss/velocity": "shiplog.GnssVelocity", "/gnss/fix": "foxglove.LocationFix",
 }  # fmt: skip
-FAMILIES = {"rudder": "shiplog.Rudder", "propeller": "shiplog.Propeller",
-            "azimuth": "shiplog.Azimuth", "thruster": "shiplog.Thruster"}  # fmt: skip
+FAMILIES = {
+    "rudder": "shiplog.Rudder",
+    "propeller": "shiplog.Propeller",
+    "azimuth": "shiplog.Azimuth",
+    "thruster": "shiplog.Thruster",
+}
 
 
 def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path], dict[str, str]]:
@@ -37,8 +41,13 @@ def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path]
                 continue
             for name, table in voyages(read_table(path), profile, path):
                 target = out / f"{name}.mcap"
-                write_log(target, series(table, profile), ship=profile.ship.name,
-                          datum=profile.site.datum, notes={"table": path.name})  # fmt: skip
+                write_log(
+                    target,
+                    series(table, profile),
+                    ship=profile.ship.name,
+                    datum=profile.site.datum,
+                    notes={"table": path.name},
+                )
                 log.info("%s: %d rows", target.name, table.height)
                 written.append(target)
         except ShiplogError as error:
@@ -55,8 +64,7 @@ def read_table(path: Path) -> pl.DataFrame:
     try:
         return readers[path.suffix.lower()](path)
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise ChannelMissing(f"{path} cannot be read: {error}.",
-                             hint="check the file.") from error  # fmt: skip
+        raise ChannelMissing(f"{path} cannot be read: {error}.", hint="check the file.") from error
 
 
 def voyages(
@@ -67,8 +75,10 @@ def voyages(
     Rows without a time are dropped; where the profile names no voyage column, the file is one.
     """
     if not profile.table:
-        raise ProfileError(f"The profile {profile.source} has no [table] section.",
-                           hint="say which column is which channel there.")  # fmt: skip
+        raise ProfileError(
+            f"The profile {profile.source} has no [table] section.",
+            hint="say which column is which channel there.",
+        )
     # Two sources of one ship may name a column differently; what is not in this table is left out.
     present = {name: c for name, c in profile.table.items() if name in table.columns}
     wanted = {"time", *profile.columns}
@@ -88,9 +98,12 @@ def voyages(
             for name, c in present.items()
             if c.channel != "voyage"
         ],
-        *[pl.col(n).cast(pl.String).alias("voyage") for n, c in present.items()
-          if c.channel == "voyage"],
-    ).filter(pl.col("time").is_not_null() & pl.col("time").is_not_nan())  # fmt: skip
+        *[
+            pl.col(n).cast(pl.String).alias("voyage")
+            for n, c in present.items()
+            if c.channel == "voyage"
+        ],
+    ).filter(pl.col("time").is_not_null() & pl.col("time").is_not_nan())
     dropped = table.height - si.height
     if dropped:
         log.warning("%s: %d rows without a time left out", path.name, dropped)
@@ -109,8 +122,13 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
         "position": ("x0", "y0"), "velocity": ("surge", "sway"), "heading": ("heading",),
         "yaw_rate": ("yaw_rate",), "wind": tuple(c.name for c in WIND),
     }  # fmt: skip
-    reduced = {"position": "local", "velocity": "body", "heading": "angle", "yaw_rate": "rate",
-               "wind": "from_bow"}  # fmt: skip
+    reduced = {
+        "position": "local",
+        "velocity": "body",
+        "heading": "angle",
+        "yaw_rate": "rate",
+        "wind": "from_bow",
+    }
     for name, sensor in profile.sensors.items():
         if profile.sensors.kind(name) != reduced[name]:
             raise ProfileError(
@@ -127,10 +145,16 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
             columns[path] = table[name].fill_null(np.nan).to_numpy() / factor + offset
     rate = 1e9 / float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     return [
-        Series(topic, _schema(topic), time, columns, frame_id="midship",
-               metadata={"nominal_hz": f"{rate:.3g}", "clock": "of the table"})
+        Series(
+            topic,
+            _schema(topic),
+            time,
+            columns,
+            frame_id="midship",
+            metadata={"nominal_hz": f"{rate:.3g}", "clock": "of the table"},
+        )
         for topic, columns in topics.items()
-    ]  # fmt: skip
+    ]
 
 
 def convert_topics(folder: Path, profile: Profile, out: Path) -> Path:
@@ -159,8 +183,10 @@ def convert_topics(folder: Path, profile: Profile, out: Path) -> Path:
             )
         )
     if not parts:
-        raise ChannelMissing(f"{folder} holds no table with a column log_time_ns.",
-                             hint="give one .parquet a topic, or a single table.")  # fmt: skip
+        raise ChannelMissing(
+            f"{folder} holds no table with a column log_time_ns.",
+            hint="give one .parquet a topic, or a single table.",
+        )
     target = out / f"{folder.name}.mcap"
     write_log(target, parts, ship=profile.ship.name, datum=profile.site.datum)
     log.info("%s: %d topics", target.name, len(parts))

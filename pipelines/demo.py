@@ -46,8 +46,12 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
             log.info("2/3 %s is trained already", path)
             continue
         split = choose_split(store, (), (), data, 100)
-        log.info("2/3 training on %s: %s, validating on %s", data, listed(split.training),
-                 listed(split.validation))  # fmt: skip
+        log.info(
+            "2/3 training on %s: %s, validating on %s",
+            data,
+            listed(split.training),
+            listed(split.validation),
+        )
         train_run(Config(data=data, seeds=SEEDS, split=split), store, path)
     log.info("3/3 comparing on the test voyage")
     result = compare_runs(paths, store, (), out / "compare.rrd")

@@ -57,11 +57,17 @@ class Evaluation:
         lines = [
             f"L is the paper's evaluation function (Eq. 8), mean over {count} windows of "
             f"{self.runs[0].config.window} s and over seeds; yaw rate in deg/s.",
-            "", report.models_table(answers, self.floors), "",
-            f"Per voyage, {self.runs[0].name}:", "", report.voyages_table(first), "",
-            "Worst windows, and whether the training data had been there:", "",
+            "",
+            report.models_table(answers, self.floors),
+            "",
+            f"Per voyage, {self.runs[0].name}:",
+            "",
+            report.voyages_table(first),
+            "",
+            "Worst windows, and whether the training data had been there:",
+            "",
             report.windows_table(errors, self.coverage),
-        ]  # fmt: skip
+        ]
         if self.too_short:
             lines += ["", f"Without a window of that length: {listed(self.too_short)}."]
         return "\n".join(lines)
@@ -75,7 +81,9 @@ def evaluate_runs(paths: Sequence[Path], store: Store, voyages: Sequence[str]) -
         if other.config.window != first.config.window:
             raise RunError(
                 f"{first.name} has windows of {first.config.window} s, {other.name} of "
-                f"{other.config.window} s.", hint="compare runs with the same window.")  # fmt: skip
+                f"{other.config.window} s.",
+                hint="compare runs with the same window.",
+            )
         _same_ship(first, other.profile.columns, other.name)
     names = _test_voyages(first, store, voyages)
     profile = store.profile(names)
@@ -167,7 +175,9 @@ def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
         names = store.select(list(voyages))
         seen = [n for n in names if n in used]
         if seen:
-            log.warning("%s was trained or validated on: its errors there are no test", listed(seen))
+            log.warning(
+                "%s was trained or validated on: its errors there are no test", listed(seen)
+            )
         return names
     stored = store.select()
     names = [n for n in run.config.split.test if n in stored]
@@ -193,9 +203,12 @@ def _same_ship(run: Run, columns: tuple[str, ...], other: str) -> None:
 def _numbered(cut: Windows) -> pl.DataFrame:
     """voyage, window (counted in each voyage), elapsed."""
     return cut.plan.select(
-        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
+        "voyage",
+        pl.int_range(pl.len()).over("voyage").alias("window"),
+        "segment",
+        "start",
         "elapsed",
-    )  # fmt: skip
+    )
 
 
 def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:

@@ -48,8 +48,13 @@ def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ing
             log.warning("%s refused: %s", path, error.message)
             continue
         reports.append(voyage.report)
-        log.info("%s: %s, %d rows, %d findings", voyage.name, state, voyage.table.height,
-                 len(voyage.report.findings))  # fmt: skip
+        log.info(
+            "%s: %s, %d rows, %d findings",
+            voyage.name,
+            state,
+            voyage.table.height,
+            len(voyage.report.findings),
+        )
     return Ingested(reports, refused)
 
 

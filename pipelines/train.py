@@ -9,8 +9,10 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from multiprocessing import get_context
@@ -47,25 +49,58 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     warn_of_shared_rows(rows, split)
 
     names = (profile.actuator_names, profile.wind_names)
-    reference = windows.cut(learnt, plan(learnt, "ref", config.window), config.window, *names)
-    chosen = plan(learnt, config.data, config.window)
-    windows.cut(held, plan(held, "ref", config.window), config.window, *names)  # or say so now
-    run = runs.create(out, config, profile, scaling(reference, config.network.wind_input), chosen,
-                      learnt, held)  # fmt: skip
-    log.info("training %s on %d windows of %s", config.label, chosen.height,
-             listed(split.training))  # fmt: skip
+    size = config.window
+    reference = windows.cut(learnt, plan(learnt, "ref", size), size, *names)
+    chosen = plan(learnt, config.data, size)
+    windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
+    run = runs.create(
+        out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
+    )
+    log.info("training %s on %d windows of %s", config.label, chosen.height, listed(split.training))
 
     began = time.time()
     todo = [seed for seed in config.seeds if not run.finished(seed)]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     workers = max(1, min(cores, len(todo)))
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(train_seed, run.path, s, cores // workers): s for s in todo}
-        for future in as_completed(futures):
-            best, epochs, took = future.result()
-            log.info("seed %d: best validation L %.0f after %d epochs, %.0f s",
-                     futures[future], best, epochs, took)  # fmt: skip
+    with (
+        _threads(max(1, cores // workers)),
+        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
+    ):
+        futures = {pool.submit(train_seed, run.path, s, max(1, cores // workers)): s for s in todo}
+        try:
+            for future in as_completed(futures):
+                best, epochs, took = future.result()
+                log.info(
+                    "seed %d: best validation L %.0f after %d epochs, %.0f s",
+                    futures[future],
+                    best,
+                    epochs,
+                    took,
+                )
+        except BrokenProcessPool as error:
+            raise RunError(
+                "A training process was ended from outside, perhaps for want of memory.",
+                hint="give the same command again: finished seeds and checkpoints are kept.",
+            ) from error
     return run.finish(provenance(store, split, began))
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    """Numerical libraries of child processes read these once, at import: one core, one training."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, str(count)))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 def train_seed(path: Path, seed: int, threads: int) -> tuple[float, int, float]:
@@ -78,15 +113,20 @@ def train_seed(path: Path, seed: int, threads: int) -> tuple[float, int, float]:
     learnt = _cut(run, run.training(), run.windows())
     learnt = windows.jittered(learnt, seeds.generator(seed, "jitter"))
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
-    batches = [engine.batch(w, scale, shape, torch.float32) for w in (learnt, held)]
+    training, validation = (engine.batch(w, scale, shape, torch.float32) for w in (learnt, held))
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
     if config.recipe == "paper":
         progress = train.paper(
-            model, *batches, config.paper, seed, resume=run.load_checkpoint(seed),
+            model,
+            training,
+            validation,
+            config.paper,
+            seed,
+            resume=run.load_checkpoint(seed),
             checkpoint=lambda p: run.save_checkpoint(seed, p),
-        )  # fmt: skip
+        )
     else:
-        progress = train.fast(model, *batches, config.fast, seed)
+        progress = train.fast(model, training, validation, config.fast, seed)
     run.save_seed(seed, progress)
     return progress.best, progress.epoch, time.time() - began
 
@@ -116,15 +156,21 @@ def choose_split(
         held = store.select(list(validation))
         training = tuple(n for n in names if n not in held)
         if not training:
-            raise StoreError("Every training voyage is also a validation voyage.",
-                             hint="name other voyages with --voyages.")  # fmt: skip
+            raise StoreError(
+                "Every training voyage is also a validation voyage.",
+                hint="name other voyages with --voyages.",
+            )
         return Split(training=training, validation=tuple(held), chosen_by="the user")
     if not voyages and set(SAMPLE_VOYAGES) <= set(names):
         names = list(SAMPLE_VOYAGES)
     if len(names) == 6 and (voyages or names == list(SAMPLE_VOYAGES)):
         count = PAPER_TRAINING.get(data, 2)
-        return Split(training=tuple(names[:count]), validation=(names[4],), test=(names[5],),
-                     chosen_by="the paper's Table 4, voyages 1 to 6 in order")  # fmt: skip
+        return Split(
+            training=tuple(names[:count]),
+            validation=(names[4],),
+            test=(names[5],),
+            chosen_by="the paper's Table 4, voyages 1 to 6 in order",
+        )
     return _deal(store, names, size)
 
 
@@ -205,8 +251,13 @@ def _utc(stamp: float) -> str:
 def _commit() -> str | None:
     """The source's commit, where shiplog runs from a checkout."""
     try:
-        done = subprocess.run(["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"],
-                              capture_output=True, text=True, timeout=5, check=False)  # fmt: skip
+        done = subprocess.run(
+            ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"],
+            capture_output=True,
+            text=True,
+            timeout=5,
+            check=False,
+        )
     except OSError:
         return None
     return done.stdout.strip() or None
@@ -221,32 +272,54 @@ class Answer:
 
 
 def train_command(
-    store_path: Path, out: Path, *, model: str, data: str, voyages: Sequence[str],
-    validation: Sequence[str], seeds: int, recipe: str, window: int, width: int, wind_input: str,
+    store_path: Path,
+    out: Path,
+    *,
+    model: str,
+    data: str,
+    voyages: Sequence[str],
+    validation: Sequence[str],
+    seeds: int,
+    recipe: str,
+    window: int,
+    width: int,
+    wind_input: str | None,
     epochs: int | None,
 ) -> Answer:
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
     for value, allowed, option in (
-        (model, tuple(MODELS), "--model"), (data, tuple(AUGMENTATIONS), "--data"),
+        (model, tuple(MODELS), "--model"),
+        (data, tuple(AUGMENTATIONS), "--data"),
         (recipe, ("fast", "paper"), "--recipe"),
-        (wind_input, ("angle", "components"), "--wind-input"),
-    ):  # fmt: skip
+        (wind_input or "angle", ("angle", "components"), "--wind-input"),
+    ):
         if value not in allowed:
-            raise RunError(f"{option} {value!r} does not exist{nearest(value, allowed)}.",
-                           hint=f"{option} can be {listed(allowed)}.")  # fmt: skip
+            raise RunError(
+                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
+                hint=f"{option} can be {listed(allowed)}.",
+            )
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
-    log.info("split by %s: training %s; validation %s; test %s", split.chosen_by,
-             listed(split.training), listed(split.validation), listed(split.test))  # fmt: skip
+    log.info(
+        "split by %s: training %s; validation %s; test %s",
+        split.chosen_by,
+        listed(split.training),
+        listed(split.validation),
+        listed(split.test),
+    )
     config = Config.model_validate(
         {
-            "model": model, "data": data, "recipe": recipe, "window": window, "split": split,
+            "model": model,
+            "data": data,
+            "recipe": recipe,
+            "window": window,
+            "split": split,
             "seeds": tuple(range(seeds)),
-            "network": {"width": width, "wind_input": wind_input},
+            "network": {"width": width} | ({"wind_input": wind_input} if wind_input else {}),
             "paper": {"most_epochs": epochs} if epochs else {},
             "fast": {"iterations": epochs} if epochs else {},
         }
-    )  # fmt: skip
+    )
     run = train_run(config, store, out)
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     said = ", ".join(f"{loss:.0f}" for loss in best.values())
@@ -254,7 +327,12 @@ def train_command(
         f"{config.label} in {run.path}: best validation L {said} (seeds 0 to {seeds - 1}).\n"
         f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
-    content = {"contract": CONTRACT, "run": str(run.path), "label": config.label,
-               "windows": run.windows().height, "validation_loss": list(best.values()),
-               "split": split.model_dump(mode="json")}  # fmt: skip
+    content = {
+        "contract": CONTRACT,
+        "run": str(run.path),
+        "label": config.label,
+        "windows": run.windows().height,
+        "validation_loss": list(best.values()),
+        "split": split.model_dump(mode="json"),
+    }
     return Answer(text, content)

@@ -73,8 +73,9 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     known = samples.time
     if len(known) == 0:
         empty = np.full((count, width), np.nan)
-        return OnGrid(empty, np.ones(count, bool), _near(times, samples.blank),
-                      np.zeros(count, bool))  # fmt: skip
+        return OnGrid(
+            empty, np.ones(count, bool), _near(times, samples.blank), np.zeros(count, bool)
+        )
     right = np.searchsorted(known, times, side="left").clip(0, len(known) - 1)
     left = (right - (known[right] > times)).clip(0)
     span = known[right] - known[left]

@@ -18,9 +18,13 @@ from shiplog import report
 from shiplog.exceptions import ShiplogError
 from shiplog.runs import finite
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None,
-                  pretty_exceptions_enable=False,
-                  help="Learn a ship's dynamic model from its logs, and see where it fails.")  # fmt: skip
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Learn a ship's dynamic model from its logs, and see where it fails.",
+)
 
 LOST = 3
 
@@ -69,8 +73,10 @@ def _answer(text: str, content: dict, json_to: str | None) -> None:
         try:
             Path(json_to).write_text(json.dumps(finite(content), indent=1), encoding="utf-8")
         except OSError as error:
-            raise ShiplogError(f"{json_to} cannot be written: {error.strerror}.",
-                               hint="give --json a path in a folder that exists.") from error  # fmt: skip
+            raise ShiplogError(
+                f"{json_to} cannot be written: {error.strerror}.",
+                hint="give --json a path in a folder that exists.",
+            ) from error
 
 
 @app.command()
@@ -109,9 +115,11 @@ def check(logs: Logs, json_to: JsonOption = None) -> None:
 
 @app.command()
 def ingest(
-    logs: Logs, profile: ProfileOption = None, store: StoreOption = STORE,
+    logs: Logs,
+    profile: ProfileOption = None,
+    store: StoreOption = STORE,
     json_to: JsonOption = None,
-) -> None:  # fmt: skip
+) -> None:
     """Logs into the store: aligned, reduced to midship, faults marked. Idempotent by content.
 
     Example: shiplog ingest sample_logs --store store
@@ -140,13 +148,15 @@ def _leave(done) -> None:
 
 @app.command()
 def convert(
-    tables: Annotated[list[Path], typer.Argument(help="CSV or Parquet tables, or folders of one "
-                                                      "table a topic.")],
-    profile: Annotated[str, typer.Option("--profile", help="The profile whose [table] section "
-                                                           "names the columns.")],
+    tables: Annotated[
+        list[Path], typer.Argument(help="CSV or Parquet tables, or folders of one table a topic.")
+    ],
+    profile: Annotated[
+        str, typer.Option("--profile", help="The profile whose [table] section names the columns.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],
     json_to: JsonOption = None,
-) -> None:  # fmt: skip
+) -> None:
     """Tables to contract MCAP.
 
     Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
@@ -203,7 +213,9 @@ def voyages(store: StoreOption = STORE, json_to: JsonOption = None) -> None:
 def train(
     out: Annotated[Path, typer.Option(help="The run folder to make.")],
     model: Annotated[str, typer.Option(help="Which dynamic model: feedforward.")] = "feedforward",
-    data: Annotated[str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")] = "ref",
+    data: Annotated[
+        str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")
+    ] = "ref",
     voyages: Voyages = None,
     validation: Annotated[
         list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
@@ -213,8 +225,9 @@ def train(
     window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
     width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
     wind_input: Annotated[
-        str, typer.Option(help="angle (the paper's) or components (cos and sin).")
-    ] = "angle",
+        str | None,
+        typer.Option(help="angle (default of the paper's recipe) or components (of the fast one)."),
+    ] = None,
     epochs: Annotated[
         int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
     ] = None,
@@ -228,10 +241,19 @@ def train(
     from pipelines.train import train_command
 
     answer = train_command(
-        store, out, model=model, data=data, voyages=voyages or [], validation=validation or [],
-        seeds=seeds, recipe=recipe, window=window, width=width, wind_input=wind_input,
+        store,
+        out,
+        model=model,
+        data=data,
+        voyages=voyages or [],
+        validation=validation or [],
+        seeds=seeds,
+        recipe=recipe,
+        window=window,
+        width=width,
+        wind_input=wind_input,
         epochs=epochs,
-    )  # fmt: skip
+    )
     _answer(answer.text, answer.content, json_to)
 
 

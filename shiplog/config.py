@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from shiplog.exceptions import RunError
 
@@ -47,7 +47,7 @@ class Fast(Section):
 class Network(Section):
     width: int = Field(default=256, gt=0)
     depth: int = Field(default=4, gt=0)
-    wind_input: Literal["angle", "components"] = "angle"
+    wind_input: Literal["angle", "components"]
     input_tanh: bool = False
 
 
@@ -69,14 +69,25 @@ class Config(Section):
     recipe: Literal["paper", "fast"] = "fast"
     seeds: tuple[int, ...] = (0,)
     split: Split
-    network: Network = Network()
+    network: Network = Field(default_factory=lambda: Network(wind_input="components"))
     paper: Paper = Paper()
     fast: Fast = Fast()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _wind_as_the_recipe_has_it(cls, values: dict) -> dict:
+        """The paper's recipe takes the wind angle as it is; the fast one, its components."""
+        network = dict(values.get("network") or {})
+        network.setdefault(
+            "wind_input", "angle" if values.get("recipe") == "paper" else "components"
+        )
+        return {**values, "network": network}
 
     @property
     def label(self) -> str:
         """How results are headed, the recipe always among it."""
-        return f"{self.model} {self.data} ({self.recipe} recipe)"
+        wind = {"angle": "wind angle", "components": "wind components"}[self.network.wind_input]
+        return f"{self.model} {self.data} ({self.recipe} recipe, {wind})"
 
     def to_toml(self) -> str:
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
@@ -87,5 +98,6 @@ def load(path: Path) -> Config:
     try:
         return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
-        raise RunError(f"{path} is no configuration of a run: {error}.",
-                       hint="train the run again.") from error  # fmt: skip
+        raise RunError(
+            f"{path} is no configuration of a run: {error}.", hint="train the run again."
+        ) from error

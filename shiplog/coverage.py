@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from shiplog.channels import VELOCITY
 
@@ -36,7 +36,7 @@ class Coverage:
     names: tuple[str, ...]
     mean: np.ndarray
     std: np.ndarray
-    tree: cKDTree
+    tree: KDTree
     limit: float
     bins: dict[str, set[int]]
     wind_bins: set[tuple[int, int]]
@@ -86,9 +86,11 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
     if even.all():  # less than two blocks: nothing to compare with but itself
         even = np.arange(len(features)) % 2 == 0
     apart = np.concatenate(
-        (cKDTree(features[even]).query(features[~even])[0],
-         cKDTree(features[~even]).query(features[even])[0])
-    )  # fmt: skip
+        (
+            KDTree(features[even]).query(features[~even])[0],
+            KDTree(features[~even]).query(features[even])[0],
+        )
+    )
     limit = max(float(np.quantile(apart, QUANTILE)), 1e-9)
     bins = {
         name: set(_bins(training[name].to_numpy(), std[j]).tolist())
@@ -96,8 +98,9 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
         if name not in wind
     }
     seen = set(zip(*_wind_bins(training), strict=True)) if has_wind else set()
-    return Coverage(names, mean, std, cKDTree(features), limit, bins, seen, tuple(actuators),
-                    has_wind)  # fmt: skip
+    return Coverage(
+        names, mean, std, KDTree(features), limit, bins, seen, tuple(actuators), has_wind
+    )
 
 
 def reason(row: dict, seconds: pl.DataFrame) -> str:

@@ -53,14 +53,20 @@ GUESSES = {  # in order of trust; the first that matches is taken
         Guess("rate", (r"angular(_velocity)?\.z$",), "rad/s"),
     ),
     "wind": (
-        Guess("from_bow", (r"speed(_\w+)?$", r"(direction|angle)(_\w+)?$"), "m/s deg", r"wind|anemo"),
+        Guess("from_bow", (r"speed(_\w+)?$", r"(direction|angle)(_\w+)?$"), "m/s deg",
+              r"wind|anemo"),
     ),
 }  # fmt: skip
 ACTUATORS = (  # kind, in the topic's name, and the field that holds the value
     ("rudder", r"rudder|steer", r"angle(_\w+)?$|position(_\w+)?$|data$", "deg"),
     ("propeller", r"prop|shaft|engine", r"(speed|rpm|rps|revs)(_\w+)?$|data$", "rps"),
     ("azimuth", r"azimuth|azipod", r"angle(_\w+)?$|data$", "deg"),
-    ("thruster", r"thrust|motor|esc", r"(command|speed|rpm|motor_speed|throttle)(_\w+)?$|data$", "1"),
+    (
+        "thruster",
+        r"thrust|motor|esc",
+        r"(command|speed|rpm|motor_speed|throttle)(_\w+)?$|data$",
+        "1",
+    ),
 )
 
 
@@ -69,15 +75,19 @@ def draft(path: str | Path) -> str:
     found = contents(path)
     leaves = {topic: tuple(columns) for topic, columns in fields(path).items() if columns}
     if not leaves:
-        raise LogUnreadable(f"{found.path.name} has no topic that can be decoded.",
-                            hint="`shiplog check` says why, topic by topic.")  # fmt: skip
+        raise LogUnreadable(
+            f"{found.path.name} has no topic that can be decoded.",
+            hint="`shiplog check` says why, topic by topic.",
+        )
     used: set[str] = set()
     parts = [_ship(found)]
     parts += [_sensor(name, found, leaves, used) for name in GUESSES]
     actuators = list(_actuators(found, leaves, used))
-    parts += actuators or ["# No actuator was recognised. Each needs a section like this one:\n"
-                           '# [[actuators]]\n# name = "rudder"\n# kind = "rudder"\n'
-                           '# topic = "/rudder/main"\n# field = "angle_deg"\n# unit = "deg"\n']  # fmt: skip
+    parts += actuators or [
+        "# No actuator was recognised. Each needs a section like this one:\n"
+        '# [[actuators]]\n# name = "rudder"\n# kind = "rudder"\n'
+        '# topic = "/rudder/main"\n# field = "angle_deg"\n# unit = "deg"\n'
+    ]
     unused = sorted(set(leaves) - used)
     if unused:
         parts.append("# Topics not used: " + listed(unused, most=40) + "\n")
@@ -92,9 +102,7 @@ def _ship(found: Contents) -> str:
     )
 
 
-def _sensor(
-    name: str, found: Contents, leaves: dict[str, tuple[str, ...]], used: set[str]
-) -> str:
+def _sensor(name: str, found: Contents, leaves: dict[str, tuple[str, ...]], used: set[str]) -> str:
     for guess in GUESSES[name]:
         for topic, columns in sorted(leaves.items(), key=lambda item: name not in item[0]):
             if not re.search(guess.topic, topic, re.IGNORECASE):

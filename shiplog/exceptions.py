@@ -1,4 +1,4 @@
-"""What a user can mend: every message says what was found, what was expected and what to do next."""
+"""What a user can mend: what was found, what was expected, what to do next."""
 
 from __future__ import annotations
 

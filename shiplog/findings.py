@@ -23,10 +23,24 @@ class Finding:
 
 
 KINDS = (
-    "gap", "held", "spike", "blank", "jump", "duplicate", "out_of_order", "limits", "crc",
-    "truncated", "clock_offset", "heading_offset", "antenna_offset", "yaw_rate_bias",
-    "yaw_rate_scale", "velocity_scale", "external",
-)  # fmt: skip
+    "gap",
+    "held",
+    "spike",
+    "blank",
+    "jump",
+    "duplicate",
+    "out_of_order",
+    "limits",
+    "crc",
+    "truncated",
+    "clock_offset",
+    "heading_offset",
+    "antenna_offset",
+    "yaw_rate_bias",
+    "yaw_rate_scale",
+    "velocity_scale",
+    "external",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Two honest floors: what anyone gets without a network. A model that loses to one is not worth it."""
+"""Two honest floors: what anyone gets without a network. A model below them is not worth it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from torch import Tensor
 
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.base import kinematics
-from shiplog.models.feedforward import exogenous
 from shiplog.windows import Windows
 
 
@@ -20,44 +19,54 @@ def hold(state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """ν̇ as a full quadratic polynomial of (ν, u, ω), fitted to differentiated velocities.
+    """ν̇ as a quadratic polynomial of (ν, u) with moduli, and the wind's dynamic pressure.
 
-    Quadratic least squares on accelerations is the regression every towing tank starts from
-    (Abkowitz, 1980, with terms of second order). Inputs are standardised, the wind as components;
-    a rollout that leaves the range it was fitted on is held at the edge of it, since a parabola
-    knows nothing there.
+    The regression every towing tank starts from (Abkowitz, 1980; moduli after Fedyaevsky and
+    Sobolev, 1964), fitted to differentiated velocities. A rollout that leaves the range of
+    velocities it was fitted on is held at its edge, since a parabola knows nothing there.
     """
 
-    mean: Tensor  # [inputs]
-    std: Tensor
+    scale: Tensor  # [terms] spread of each term over the training data
     low: Tensor  # [3] range of ν, a tenth wider than seen
     high: Tensor
     coefficients: Tensor  # [terms, 3]
 
     def __call__(self, state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
         velocity = state[..., list(VELOCITY_IN_STATE)].clamp(self.low, self.high)
-        inputs = torch.cat((velocity, exogenous(actuator, wind, "components")), -1)
-        return kinematics(state, _terms((inputs - self.mean) / self.std) @ self.coefficients)
+        return kinematics(state, terms(velocity, actuator, wind) / self.scale @ self.coefficients)
 
 
 def least_squares(training: Windows, ridge: float = 1e-6) -> LeastSquares:
-    """Fit on training windows: central differences of ν, a ridge against collinear terms."""
-    driven = exogenous(training.actuator, training.wind, "components")
-    inputs = torch.cat((training.velocity, driven), -1)[:, 1:-1].flatten(0, 1)
-    span = (training.dt[:, 1:] + training.dt[:, :-1])[..., None]
+    """Fit on training windows: differences of ν over two steps, a ridge against collinear terms."""
+    every = terms(training.velocity, training.actuator, training.wind)
+    step = training.dt[..., None]
+    before, after = every[:, :-2] * step[:, :-1], every[:, 1:-1] * step[:, 1:]
+    span = step[:, :-1] + step[:, 1:]
+    mean = ((before + after) / span).flatten(0, 1)  # Euler's two steps, as a rollout takes them
     rate = ((training.velocity[:, 2:] - training.velocity[:, :-2]) / span).flatten(0, 1)
-    mean, std = inputs.mean(0), inputs.std(0).clamp(min=1e-9)
-    std = torch.where(std <= 1e-9, torch.ones_like(std), std)
-    terms = _terms((inputs - mean) / std)
-    normal = terms.T @ terms + ridge * len(terms) * torch.eye(terms.shape[1], dtype=terms.dtype)
-    coefficients = torch.linalg.solve(normal, terms.T @ rate)
+    scale = mean.std(0)
+    scale = torch.where(scale > 1e-9, scale, torch.ones_like(scale))
+    design = mean / scale
+    normal = design.T @ design
+    normal += ridge * len(design) * torch.eye(len(normal), dtype=normal.dtype)
+    coefficients = torch.linalg.solve(normal, design.T @ rate)
     velocity = training.velocity.flatten(0, 1)
     low, high = velocity.amin(0), velocity.amax(0)
     margin = 0.1 * (high - low)
-    return LeastSquares(mean, std, low - margin, high + margin, coefficients)
+    return LeastSquares(scale, low - margin, high + margin, coefficients)
 
 
-def _terms(z: Tensor) -> Tensor:
-    """1, z_i and z_i z_j (i ≤ j) of [..., n]."""
-    rows, columns = torch.triu_indices(z.shape[-1], z.shape[-1])
-    return torch.cat((torch.ones_like(z[..., :1]), z, z[..., rows] * z[..., columns]), -1)
+def terms(velocity: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
+    """1, z_i, z_i z_j, z_i |z_j| (i ≤ j) of z = (ν, u), and U_A² (1, cos γ, sin γ, sin 2γ)."""
+    z = torch.cat((velocity, actuator), -1)
+    i, j = torch.triu_indices(z.shape[-1], z.shape[-1])
+    parts = [torch.ones_like(z[..., :1]), z, z[..., i] * z[..., j], z[..., i] * z[..., j].abs()]
+    if wind.shape[-1]:
+        pressure, angle = wind[..., :1] ** 2, wind[..., 1:]
+        parts += [
+            pressure,
+            pressure * torch.cos(angle),
+            pressure * torch.sin(angle),
+            pressure * torch.sin(2.0 * angle),
+        ]
+    return torch.cat(parts, -1)

@@ -17,7 +17,7 @@ from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.findings import Finding, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
-from shiplog.profile import Profile, Sensor, Source
+from shiplog.profile import Actuator, Profile, Sensor, Source
 
 # A step starts a new segment where no rollout could shrug it off: worth seconds of the ship's
 # motion and a tenth of its length, or a heading that is another heading.
@@ -61,22 +61,26 @@ def ingest(path, profile: Profile) -> Voyage:
 def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
     _require(reading, profile)
-    sampled = {name: _samples(reading, sensor, profile.sensors.kind(name), name)
-               for name, sensor in profile.sensors.items()}  # fmt: skip
+    sampled = {
+        name: _samples(reading, sensor, profile.sensors.kind(name), name)
+        for name, sensor in profile.sensors.items()
+    }
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} usable heading sample(s) on "
             f"{profile.sensors.heading.topic}.",
-            hint="check the topic and the `clock` in the profile; `shiplog check` lists the topics.",
+            hint="check the topic and the `clock` in the profile; `shiplog check` lists topics.",
         )
-    grid = _Grid(align.grid(int(base[0]), int(base[-1])))
+    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
+    start, end = _span(base, [*sampled.values(), *driven.values()])
+    grid = _Grid(align.grid(start, end))
     grid.marks = np.zeros(len(grid.times), np.int32)
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
     for actuator in profile.actuators:
-        _actuator(grid, reading, actuator)
+        _actuator(grid, actuator, driven[actuator.name])
     _gaps(grid)
     _holds(grid, profile, sampled)
     _jumps(grid, profile)
@@ -100,6 +104,19 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     return Voyage(report.name, profile, reading.contents, table, report, datum)
 
 
+def _span(base: np.ndarray, sampled: list[align.Samples]) -> tuple[int, int]:
+    """First and last grid time: the heading's, less the moment the instruments take to start.
+
+    Instruments that begin within a second of each other are not late; a voyage without its first
+    tenth has no gap. One that begins later than that does have one.
+    """
+    moment = 1_000_000_000
+    started = [int(s.time[0]) for s in sampled if len(s.time) and s.time[0] - base[0] <= moment]
+    stopped = [int(s.time[-1]) for s in sampled if len(s.time) and base[-1] - s.time[-1] <= moment]
+    inside = base[(base >= max(started)) & (base <= min(stopped))]
+    return (int(inside[0]), int(inside[-1])) if len(inside) > 1 else (int(base[0]), int(base[-1]))
+
+
 def _require(reading: Reading, profile: Profile) -> None:
     """Every topic and field that the profile names is there, or say which ones are."""
     log, topics = reading.contents.path.name, reading.contents.topics
@@ -113,8 +130,10 @@ def _require(reading: Reading, profile: Profile) -> None:
             )
         reason = reading.health.undecodable.get(topic)
         if reason:
-            raise ChannelMissing(f"{log}: the topic {topic!r} cannot be decoded: {reason}.",
-                                 hint="record it as protobuf, ROS 2 CDR or JSON.")  # fmt: skip
+            raise ChannelMissing(
+                f"{log}: the topic {topic!r} cannot be decoded: {reason}.",
+                hint="record it as protobuf, ROS 2 CDR or JSON.",
+            )
         frame = reading.frames.get(topic)
         for path in sorted(paths):
             if frame is not None and path not in frame.columns:
@@ -157,9 +176,9 @@ def _samples(reading: Reading, sensor: Sensor, kind: str, name: str) -> align.Sa
     elif kind == "enu":
         value = value[:, ::-1]
     elif kind in ("quaternion_enu", "quaternion_ned"):
-        value = midship.quaternion_heading(
-            value[:, 0], value[:, 1], kind == "quaternion_enu"
-        )[:, None]
+        value = midship.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
+            :, None
+        ]
     samples = align.ordered(times, value, sensor.tolerance_s)
     if name == "heading":
         samples = _with(samples, value=np.unwrap(samples.value, axis=0))
@@ -243,12 +262,17 @@ def _wind(grid: _Grid, sensor: Sensor, samples: align.Samples) -> None:
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator(grid: _Grid, reading: Reading, actuator) -> None:
-    """One actuator's column; beyond the profile's limits it is marked, not clipped."""
+def _actuator_samples(reading: Reading, actuator: Actuator) -> align.Samples:
+    """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
-    placed = _place(grid, actuator.name, align.ordered(times, value, actuator.tolerance_s))
+    return align.ordered(times, value, actuator.tolerance_s)
+
+
+def _actuator(grid: _Grid, actuator: Actuator, samples: align.Samples) -> None:
+    """One actuator's column; beyond the profile's limits it is marked, not clipped."""
+    placed = _place(grid, actuator.name, samples)
     column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]
     grid.columns[actuator.name] = column
     if actuator.limits is None:
@@ -259,8 +283,9 @@ def _actuator(grid: _Grid, reading: Reading, actuator) -> None:
     beyond = (column < low - slack) | (column > high + slack)
     rows = list(quality.stretches(beyond))
     quality.mark(grid.marks, rows, Quality.LIMITS)
-    grid.findings += quality.said("limits", actuator.name, [quality.seconds(i) for i in rows],
-                                  "stands beyond its limits")  # fmt: skip
+    grid.findings += quality.said(
+        "limits", actuator.name, [quality.seconds(i) for i in rows], "stands beyond its limits"
+    )
 
 
 def _place(grid: _Grid, name: str, samples: align.Samples) -> np.ndarray:
@@ -306,16 +331,23 @@ def _holds(grid: _Grid, profile: Profile, sampled: dict[str, align.Samples]) -> 
         quality.mark(grid.marks, long, Quality.FROZEN)
         intervals = [quality.seconds(i) for i in rows]
         grid.findings += quality.said(
-            "held", name, [i for i in intervals if i[1] - i[0] >= quality.SAID_HELD_S],
+            "held",
+            name,
+            [i for i in intervals if i[1] - i[0] >= quality.SAID_HELD_S],
             "repeats the same value while the ship moves,",
-        )  # fmt: skip
+        )
         brief = [i for i in intervals if i[1] - i[0] < quality.SAID_HELD_S]
         if brief:
             grid.findings.append(
-                Finding("held", name, f"{name} repeats itself briefly, {len(brief)} times, "
-                        f"{sum(b - a for a, b in brief):.1f} s in all.",
-                        value=float(len(brief)), unit="times")
-            )  # fmt: skip
+                Finding(
+                    "held",
+                    name,
+                    f"{name} repeats itself briefly, {len(brief)} times, "
+                    f"{sum(b - a for a, b in brief):.1f} s in all.",
+                    value=float(len(brief)),
+                    unit="times",
+                )
+            )
 
 
 def _jumps(grid: _Grid, profile: Profile) -> None:
@@ -330,12 +362,27 @@ def _jumps(grid: _Grid, profile: Profile) -> None:
     )
     sensors = profile.sensors
     cases = (
-        ("position", np.stack((columns["x0"], columns["y0"]), 1), over_ground, "m", 1.0,
-         _noise(sensors.position, sensors.kind("position")),
-         JUMP_LENGTHS * profile.ship.length_m, math.inf),
-        ("heading", heading[:, None], columns["yaw_rate"][:, None], "deg", math.degrees(1.0),
-         _noise(sensors.heading, sensors.kind("heading")), math.inf, JUMP_RAD),
-    )  # fmt: skip
+        (
+            "position",
+            np.stack((columns["x0"], columns["y0"]), 1),
+            over_ground,
+            "m",
+            1.0,
+            _noise(sensors.position, sensors.kind("position")),
+            JUMP_LENGTHS * profile.ship.length_m,
+            math.inf,
+        ),
+        (
+            "heading",
+            heading[:, None],
+            columns["yaw_rate"][:, None],
+            "deg",
+            math.degrees(1.0),
+            _noise(sensors.heading, sensors.kind("heading")),
+            math.inf,
+            JUMP_RAD,
+        ),
+    )
     for name, gone, rate, unit, display, noise, least, most in cases:
         for row, size in quality.jumps(gone, rate, usable, noise):
             speed = float(np.linalg.norm(rate[row]))
@@ -344,8 +391,14 @@ def _jumps(grid: _Grid, profile: Profile) -> None:
                 grid.marks[row] |= int(Quality.JUMP)
             worth = f", as if {lost:.1f} s were missing" if lost < 60.0 else ""
             grid.findings.append(
-                Finding("jump", name, f"{name} steps {size * display:.3g} {unit} beyond what its "
-                        f"rate says at {row * step:.1f} s{worth}.", start_s=round(row * step, 3),
-                        end_s=round(row * step, 3), value=round(size * display, 6), unit=unit)
-            )  # fmt: skip
-
+                Finding(
+                    "jump",
+                    name,
+                    f"{name} steps {size * display:.3g} {unit} beyond what its "
+                    f"rate says at {row * step:.1f} s{worth}.",
+                    start_s=round(row * step, 3),
+                    end_s=round(row * step, 3),
+                    value=round(size * display, 6),
+                    unit=unit,
+                )
+            )

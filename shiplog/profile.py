@@ -105,8 +105,19 @@ KINDS = {  # what each sensor may be, the first being meant where `kind` is left
     "yaw_rate": ("rate",),
     "wind": ("from_bow",),
 }
-WIDTH = {"geodetic": 2, "local": 2, "sog_cog": 2, "body": 2, "ned": 2, "enu": 2, "angle": 1,
-         "quaternion_enu": 2, "quaternion_ned": 2, "rate": 1, "from_bow": 2}  # fmt: skip
+WIDTH = {
+    "geodetic": 2,
+    "local": 2,
+    "sog_cog": 2,
+    "body": 2,
+    "ned": 2,
+    "enu": 2,
+    "angle": 1,
+    "quaternion_enu": 2,
+    "quaternion_ned": 2,
+    "rate": 1,
+    "from_bow": 2,
+}
 
 
 class Sensors(Section):
@@ -242,8 +253,9 @@ class Profile(Section):
 def shipped() -> tuple[str, ...]:
     """Names of the profiles that come with shiplog."""
     folder = resources.files("shiplog") / "profiles"
-    return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir()
-                        if f.name.endswith(".toml")))  # fmt: skip
+    return tuple(
+        sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+    )
 
 
 def load(name_or_path: str | Path) -> Profile:
@@ -275,8 +287,10 @@ def parse(text: str, source: str) -> Profile:
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ProfileError(f"{source} is not valid TOML: {error}.",
-                           hint="mend that line; see the shipped profiles.") from error  # fmt: skip
+        raise ProfileError(
+            f"{source} is not valid TOML: {error}.",
+            hint="mend that line; see the shipped profiles.",
+        ) from error
     table = content.get("table")
     if isinstance(table, dict):  # `"column" = "channel"` is short for SI values
         content["table"] = {
@@ -312,8 +326,13 @@ def advice(error: ValidationError) -> str:
 
 
 def _keys_at(location: tuple) -> list[str]:
-    sections = {"ship": Ship, "sensors": Sensors, "actuators": Actuator, "site": Site,
-                "table": Column}  # fmt: skip
+    sections = {
+        "ship": Ship,
+        "sensors": Sensors,
+        "actuators": Actuator,
+        "site": Site,
+        "table": Column,
+    }
     if not location:
         return list(Profile.model_fields)
     section = sections.get(str(location[0]), Profile)

@@ -60,23 +60,33 @@ def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]
     return [(a, b) for a, b in runs if (b - a + 1) * np.log(share) < np.log(RARE) and b - a >= 2]
 
 
-def said(
-    kind: str, channel: str, intervals: list[tuple[float, float]], what: str
-) -> list[Finding]:
+def said(kind: str, channel: str, intervals: list[tuple[float, float]], what: str) -> list[Finding]:
     """One finding a stretch, longest first kept, in order of time; the rest as one count."""
     longest = sorted(intervals, key=lambda i: i[0] - i[1])[:LISTED]
     findings = [
-        Finding(kind, channel, f"{channel} {what} for {end - start:.1f} s from {start:.1f} s.",
-                start_s=round(start, 3), end_s=round(end, 3), value=round(end - start, 3), unit="s")
+        Finding(
+            kind,
+            channel,
+            f"{channel} {what} for {end - start:.1f} s from {start:.1f} s.",
+            start_s=round(start, 3),
+            end_s=round(end, 3),
+            value=round(end - start, 3),
+            unit="s",
+        )
         for start, end in sorted(longest)
-    ]  # fmt: skip
+    ]
     left = len(intervals) - len(longest)
     if left:
         total = sum(b - a for a, b in intervals) - sum(b - a for a, b in longest)
         findings.append(
-            Finding(kind, channel, f"{channel} {what} in {left} more stretches, {total:.1f} s in "
-                    "all.", value=round(total, 3), unit="s")
-        )  # fmt: skip
+            Finding(
+                kind,
+                channel,
+                f"{channel} {what} in {left} more stretches, {total:.1f} s in all.",
+                value=round(total, 3),
+                unit="s",
+            )
+        )
     return findings
 
 
@@ -87,14 +97,17 @@ def seconds(indices: tuple[int, int]) -> tuple[float, float]:
 
 
 def held_on_grid(
-    times: np.ndarray, sampled: np.ndarray, runs: list[tuple[int, int]], travel: np.ndarray | None,
+    times: np.ndarray,
+    sampled: np.ndarray,
+    runs: list[tuple[int, int]],
+    travel: np.ndarray | None,
     noise: float,
 ) -> list[tuple[int, int]]:
     """Runs of repeats as grid rows, where the ship moved by more than the instrument's noise.
 
     times [m] ns; sampled [n] ns; travel [m]: how far the channel should have gone by each row,
     integrated from its rate (None: no rate is known, and the runs are taken as they are).
-    """  # fmt: skip
+    """
     kept = []
     for first, last in runs:
         a = int(np.searchsorted(times, sampled[max(first - 1, 0)]))

@@ -17,14 +17,18 @@ MOST_FINDINGS = 12
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A Markdown table with aligned columns."""
     text = [[_cell(value) for value in row] for row in rows]
-    widths = [max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
-              for i, h in enumerate(head)]  # fmt: skip
-    numeric = [bool(rows) and all(isinstance(r[i], (int, float)) for r in rows)
-               for i in range(len(head))]  # fmt: skip
+    widths = [
+        max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
+        for i, h in enumerate(head)
+    ]
+    numeric = [
+        bool(rows) and all(isinstance(r[i], (int, float)) for r in rows) for i in range(len(head))
+    ]
 
     def line(cells: Sequence[str]) -> str:
-        padded = [c.rjust(w) if n else c.ljust(w)
-                  for c, w, n in zip(cells, widths, numeric, strict=True)]  # fmt: skip
+        padded = [
+            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)
+        ]
         return f"| {' | '.join(padded)} |"
 
     rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
@@ -48,7 +52,9 @@ def voyage_lines(report: VoyageReport) -> list[str]:
         f"{report.name}: {report.messages_read} messages read, {lost} lost; "
         f"{report.rows} rows, {report.seconds:.1f} s"
     ]
-    lines += [f"  {finding.kind}: {finding.sentence}" for finding in report.findings[:MOST_FINDINGS]]
+    lines += [
+        f"  {finding.kind}: {finding.sentence}" for finding in report.findings[:MOST_FINDINGS]
+    ]
     left = len(report.findings) - MOST_FINDINGS
     if left > 0:
         lines.append(f"  and {left} more findings (all of them with --json).")
@@ -69,14 +75,23 @@ def estimated(profile: Profile) -> list[str]:
     """Which particulars the profile leaves out."""
     missing = [
         name
-        for name in ("breadth_m", "draught_m", "mass_kg", "x_g_m", "block_coefficient",
-                     "frontal_area_m2", "lateral_area_m2")
+        for name in (
+            "breadth_m",
+            "draught_m",
+            "mass_kg",
+            "x_g_m",
+            "block_coefficient",
+            "frontal_area_m2",
+            "lateral_area_m2",
+        )
         if getattr(profile.ship, name) is None
-    ]  # fmt: skip
+    ]
     if not missing:
         return []
-    return [f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}; the learned "
-            "model does without them."]  # fmt: skip
+    return [
+        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}; the learned "
+        "model does without them."
+    ]
 
 
 def summary(errors: pl.DataFrame) -> dict:
@@ -85,11 +100,18 @@ def summary(errors: pl.DataFrame) -> dict:
     errors: one row per window and seed, with seed, voyage, window and `evaluate.ERRORS`. RMSE is
     over all windows of a seed, then the mean over seeds; end errors are means over both.
     """
-    per_seed = errors.group_by("seed").agg(
-        pl.col("loss").mean(),
-        *[pl.col(f"rmse_{name}").pow(2).mean().sqrt() for name in ("surge", "sway", "yaw_rate")],
-        pl.col("end_position_m", "end_heading_deg").mean(),
-    ).sort("seed")  # fmt: skip
+    per_seed = (
+        errors.group_by("seed")
+        .agg(
+            pl.col("loss").mean(),
+            *[
+                pl.col(f"rmse_{name}").pow(2).mean().sqrt()
+                for name in ("surge", "sway", "yaw_rate")
+            ],
+            pl.col("end_position_m", "end_heading_deg").mean(),
+        )
+        .sort("seed")
+    )
     windows = errors.select("voyage", "window").unique().height
     return {
         "loss": float(per_seed["loss"].mean()),  # type: ignore[arg-type]
@@ -104,9 +126,7 @@ def summary(errors: pl.DataFrame) -> dict:
     }
 
 
-def evaluation_json(
-    errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame
-) -> dict:
+def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame) -> dict:
     """The contract's answer of `evaluate`.
 
     coverage: one row per window, with voyage, window and coverage (0 to 1).
@@ -128,15 +148,30 @@ def models_table(summaries: dict[str, dict], floors: dict[str, float]) -> str:
     for label, s in summaries.items():
         spread = f"{min(s['seeds']):.0f} to {max(s['seeds']):.0f}" if len(s["seeds"]) > 1 else "-"
         rows.append(
-            (label, s["loss"], spread, s["rmse"]["surge"], s["rmse"]["sway"],
-             math.degrees(s["rmse"]["yaw_rate"]), s["end_position_m"], s["end_heading_deg"])
-        )  # fmt: skip
-    names = {"hold": "floor: hold the velocity",
-             "least_squares": "floor: quadratic least squares"}  # fmt: skip
+            (
+                label,
+                s["loss"],
+                spread,
+                s["rmse"]["surge"],
+                s["rmse"]["sway"],
+                math.degrees(s["rmse"]["yaw_rate"]),
+                s["end_position_m"],
+                s["end_heading_deg"],
+            )
+        )
+    names = {"hold": "floor: hold the velocity", "least_squares": "floor: quadratic least squares"}
     dash = "-"
     rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
-    head = ("model", "L", "L over seeds", "RMSE u [m/s]", "RMSE v [m/s]", "RMSE r [deg/s]",
-            "end position [m]", "end heading [deg]")  # fmt: skip
+    head = (
+        "model",
+        "L",
+        "L over seeds",
+        "RMSE u [m/s]",
+        "RMSE v [m/s]",
+        "RMSE r [deg/s]",
+        "end position [m]",
+        "end heading [deg]",
+    )
     return table(head, rows)
 
 
@@ -149,17 +184,32 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
         mean.join(coverage, on=["voyage", "window"])
         .sort("loss", descending=True)
         .head(most)
-        .select("voyage", "elapsed", "loss", "end_position_m", "end_heading_deg", "coverage",
-                "reason")
+        .select(
+            "voyage", "elapsed", "loss", "end_position_m", "end_heading_deg", "coverage", "reason"
+        )
         .rows()
-    )  # fmt: skip
-    shown = [(v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows]
-    return table(("voyage", "from [s]", "L", "end position [m]", "end heading [deg]", "covered",
-                  "outside the training data"), shown)  # fmt: skip
+    )
+    shown = [
+        (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
+    ]
+    return table(
+        (
+            "voyage",
+            "from [s]",
+            "L",
+            "end position [m]",
+            "end heading [deg]",
+            "covered",
+            "outside the training data",
+        ),
+        shown,
+    )
 
 
 def voyages_table(answer: dict) -> str:
     """L, windows and coverage of each voyage."""
-    rows = [(name, v["windows"], v["loss"], f"{v['coverage']:.0%}")
-            for name, v in answer["voyages"].items()]  # fmt: skip
+    rows = [
+        (name, v["windows"], v["loss"], f"{v['coverage']:.0%}")
+        for name, v in answer["voyages"].items()
+    ]
     return table(("voyage", "windows", "L", "covered"), rows)

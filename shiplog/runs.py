@@ -49,8 +49,14 @@ class Run:
     @property
     def shape(self) -> Shape:
         net = self.config.network
-        return Shape(len(self.profile.actuators), self.profile.has_wind, net.width, net.depth,
-                     net.wind_input, net.input_tanh)  # fmt: skip
+        return Shape(
+            len(self.profile.actuators),
+            self.profile.has_wind,
+            net.width,
+            net.depth,
+            net.wind_input,
+            net.input_tanh,
+        )
 
     def scaling(self) -> Scaling:
         tensors = _tensors(self.path / "scaling.safetensors")
@@ -157,13 +163,18 @@ class Run:
 
 
 def create(
-    path: Path, config: Config, profile: Profile, scaling: Scaling, windows: pl.DataFrame,
-    training: pl.DataFrame, validation: pl.DataFrame,
+    path: Path,
+    config: Config,
+    profile: Profile,
+    scaling: Scaling,
+    windows: pl.DataFrame,
+    training: pl.DataFrame,
+    validation: pl.DataFrame,
 ) -> Run:
     """Begin a run, or go on with one of the same settings that was interrupted.
 
     Raises RunError where the name is taken by a finished run or by other settings.
-    """  # fmt: skip
+    """
     partial = path.with_name(f"{path.name}.partial")
     if path.exists():
         raise RunError(f"{path} exists already.", hint="choose another --out, or remove it.")
@@ -182,8 +193,10 @@ def create(
     training.write_parquet(partial / "training.parquet")
     validation.write_parquet(partial / "validation.parquet")
     write_json(partial / "profile.json", profile.model_dump(mode="json"))
-    _save(partial / "scaling.safetensors",
-          {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__})  # fmt: skip
+    _save(
+        partial / "scaling.safetensors",
+        {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
+    )
     # Last: a folder with a config is one that can be gone on with.
     (partial / "config.toml").write_text(config.to_toml(), encoding="utf-8")
     return Run(partial, config, profile)
@@ -195,8 +208,10 @@ def load(path: str | Path) -> Run:
     if not (path / "config.toml").is_file():
         begun = path.with_name(f"{path.name}.partial")
         if begun.is_dir():
-            raise RunError(f"The run {path} is not finished.",
-                           hint="give the same `shiplog train` again: it goes on.")  # fmt: skip
+            raise RunError(
+                f"The run {path} is not finished.",
+                hint="give the same `shiplog train` again: it goes on.",
+            )
         raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
     return open_folder(path)
 

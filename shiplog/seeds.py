@@ -8,6 +8,6 @@ import torch
 
 
 def generator(seed: int, purpose: str) -> torch.Generator:
-    """A stream for this seed and purpose ("weights", "batches", "jitter"), independent of others."""
+    """A stream of its own for each seed and purpose ("weights", "batches", "jitter")."""
     digest = hashlib.sha256(f"{purpose}:{seed}".encode()).digest()
     return torch.Generator().manual_seed(int.from_bytes(digest[:8], "little") >> 1)

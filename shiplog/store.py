@@ -65,8 +65,10 @@ class Store:
         """
         names = [entry.name for entry in self.entries()]
         if not names:
-            raise StoreError(f"There is no voyage in the store {self.path}.",
-                             hint="ingest logs first: shiplog ingest LOG... --store DIR.")  # fmt: skip
+            raise StoreError(
+                f"There is no voyage in the store {self.path}.",
+                hint="ingest logs first: shiplog ingest LOG... --store DIR.",
+            )
         chosen: dict[str, None] = {}
         for pattern in patterns or ["*"]:
             matching = [n for n in names if n == pattern] or [
@@ -161,10 +163,18 @@ class Store:
             facts = _facts(folder)
             report = facts["report"]
             entries.append(
-                Entry(report["name"], facts["profile"]["ship"]["name"], facts["start"],
-                      report["rows"], report["seconds"], len(report["findings"]),
-                      facts["sha256"], facts["fingerprint"], facts["source"])
-            )  # fmt: skip
+                Entry(
+                    report["name"],
+                    facts["profile"]["ship"]["name"],
+                    facts["start"],
+                    report["rows"],
+                    report["seconds"],
+                    len(report["findings"]),
+                    facts["sha256"],
+                    facts["fingerprint"],
+                    facts["source"],
+                )
+            )
         return sorted(entries, key=lambda entry: entry.name)
 
     def _write_catalogue(self) -> None:
@@ -185,8 +195,9 @@ def _facts(folder: Path) -> dict:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise StoreError(f"{path} cannot be read: {error}.",
-                         hint="remove that folder and ingest the log again.") from error  # fmt: skip
+        raise StoreError(
+            f"{path} cannot be read: {error}.", hint="remove that folder and ingest the log again."
+        ) from error
 
 
 def _describe(voyage: Voyage, fingerprint: str) -> dict:

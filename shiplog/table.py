@@ -24,14 +24,16 @@ def mean_angle(name: str) -> pl.Expr:
 
 
 def averages(
-    table: pl.LazyFrame, columns: Sequence[str], circular: Iterable[str],
+    table: pl.LazyFrame,
+    columns: Sequence[str],
+    circular: Iterable[str],
     least: int = LEAST_SAMPLES,
 ) -> pl.LazyFrame:
     """10 Hz rows to 1 Hz rows (Sec. 4.1 of the paper), unsorted, in flat memory.
 
     table: voyage, time, `columns` (SI), quality. Bins run from half a second before their stamp
     to half a second after. Truncating streams; `group_by_dynamic` does not stay bounded.
-    """  # fmt: skip
+    """
     circular = set(circular)
     means = [mean_angle(c) if c in circular else pl.col(c).mean() for c in columns]
     good = pl.col("quality") & int(UNUSABLE) == 0
@@ -50,13 +52,15 @@ def averages(
 
 
 def resample(
-    table: pl.LazyFrame, columns: Sequence[str], circular: Iterable[str],
+    table: pl.LazyFrame,
+    columns: Sequence[str],
+    circular: Iterable[str],
     least: int = LEAST_SAMPLES,
 ) -> pl.DataFrame:
     """The 1 Hz table: voyage, time, `columns`, samples, segment; sorted, streaming engine.
 
     `segment` counts from 0 in each voyage; within one, the stamps are exactly 1 s apart.
-    """  # fmt: skip
+    """
     return segments(averages(table, columns, circular, least).collect(engine="streaming"))
 
 

@@ -42,22 +42,30 @@ Checkpoint = Callable[[Progress], None]
 
 
 def paper(
-    model: FeedForward, training: Batch, validation: Batch, settings: Paper, seed: int,
-    checkpoint: Checkpoint | None = None, every: int = 250, resume: Progress | None = None,
+    model: FeedForward,
+    training: Batch,
+    validation: Batch,
+    settings: Paper,
+    seed: int,
+    checkpoint: Checkpoint | None = None,
+    every: int = 250,
+    resume: Progress | None = None,
 ) -> Progress:
     """Adam on three random subsets an epoch until the validation loss has risen, Sec. 4.3.
 
     Stops once more than `least_epochs` are done and L > rise · (L_init - L_min) + L_min on the
     validation windows (Eq. 24). The weights to keep are `best_weights` (smallest L, not smoothed).
     The regulariser λ‖θ‖² of Eq. 7 has the gradient 2λθ, which is Adam's `weight_decay`.
-    """  # fmt: skip
+    """
     weights = [p.detach().clone() for p in model.weights]
     scale = (model.scaling, model.shape)
     parameters = [torch.nn.Parameter(w) for w in weights]
     adam = torch.optim.Adam(
-        parameters, lr=settings.learning_rate, weight_decay=2.0 * settings.regularisation,
+        parameters,
+        lr=settings.learning_rate,
+        weight_decay=2.0 * settings.regularisation,
         foreach=True,
-    )  # fmt: skip
+    )
     stream = seeds.generator(seed, "batches")
     if resume is None:
         start = engine.loss_only(weights, validation, *scale)
@@ -181,11 +189,19 @@ def fast(
             raise StopIteration
 
     minimize(
-        objective, torch.cat([w.flatten() for w in weights]).double().numpy(), jac=True,
-        method="L-BFGS-B", callback=after,
-        options={"maxcor": settings.memory, "maxiter": settings.iterations,
-                 "maxfun": 3 * settings.iterations, "ftol": 1e-9, "gtol": 1e-8},
-    )  # fmt: skip
+        objective,
+        torch.cat([w.flatten() for w in weights]).double().numpy(),
+        jac=True,
+        method="L-BFGS-B",
+        callback=after,
+        options={
+            "maxcor": settings.memory,
+            "maxiter": settings.iterations,
+            "maxfun": 3 * settings.iterations,
+            "ftol": 1e-9,
+            "gtol": 1e-8,
+        },
+    )
     progress.weights = progress.best_weights
     return progress
 
@@ -226,5 +242,6 @@ def shortened(data: Batch, steps: int) -> Batch:
     def pieces(values: Tensor, length: int) -> Tensor:
         return torch.cat([values[s : s + length] for s in starts], dim=1)
 
-    return Batch(pieces(data.velocity, steps + 1), pieces(data.driven, steps + 1),
-                 pieces(data.dt, steps))  # fmt: skip
+    return Batch(
+        pieces(data.velocity, steps + 1), pieces(data.driven, steps + 1), pieces(data.dt, steps)
+    )

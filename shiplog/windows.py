@@ -62,8 +62,13 @@ class Windows:
 
     def pick(self, rows: Tensor) -> Windows:
         """The windows at these row numbers."""
-        return Windows(self.plan[rows.tolist()], self.state[rows], self.actuator[rows],
-                       self.wind[rows], self.dt[rows])  # fmt: skip
+        return Windows(
+            self.plan[rows.tolist()],
+            self.state[rows],
+            self.actuator[rows],
+            self.wind[rows],
+            self.dt[rows],
+        )
 
 
 def plan(table: pl.LazyFrame, size: int, step: int, copies: int = 0) -> pl.LazyFrame:
@@ -84,13 +89,16 @@ def plan(table: pl.LazyFrame, size: int, step: int, copies: int = 0) -> pl.LazyF
 
 
 def cut(
-    seconds: pl.DataFrame, planned: pl.DataFrame, size: int, actuators: tuple[str, ...],
+    seconds: pl.DataFrame,
+    planned: pl.DataFrame,
+    size: int,
+    actuators: tuple[str, ...],
     wind: tuple[str, ...],
 ) -> Windows:
     """Gather planned windows from the sorted 1 Hz table (clean; noise is `jittered`).
 
     Raises WindowError where nothing was planned, saying how long the longest segment is.
-    """  # fmt: skip
+    """
     if planned.height == 0:
         raise WindowError(*_too_long(seconds, size))
     first = (

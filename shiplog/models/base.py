@@ -27,9 +27,12 @@ def kinematics(state: Tensor, acceleration: Tensor) -> Tensor:
     c, s = torch.cos(heading), torch.sin(heading)
     return torch.stack(
         (
-            c * surge - s * sway, acceleration[..., 0],
-            s * surge + c * sway, acceleration[..., 1],
-            yaw_rate, acceleration[..., 2],
+            c * surge - s * sway,
+            acceleration[..., 0],
+            s * surge + c * sway,
+            acceleration[..., 1],
+            yaw_rate,
+            acceleration[..., 2],
         ),
         dim=-1,
-    )  # fmt: skip
+    )

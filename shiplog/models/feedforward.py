@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
@@ -48,7 +49,7 @@ class Scaling:
 
 
 def exogenous(actuator: Tensor, wind: Tensor, wind_input: str) -> Tensor:
-    """What drives the network besides its own state: [..., A + 0|2] from [..., A] and [..., 0|2]."""
+    """What drives the network besides ν: [..., A + 0|2] from [..., A] and [..., 0|2]."""
     if wind.shape[-1] == 0:
         return actuator
     speed, angle = wind[..., :1], wind[..., 1:]
@@ -82,7 +83,9 @@ class FeedForward(nn.Module):
         super().__init__()
         self.shape, self.scaling = shape, scaling
         widths = [shape.inputs, *[shape.width] * shape.depth, 3]
-        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:], strict=False))
+        self.layers = nn.ModuleList(
+            nn.Linear(a, b) for a, b in pairwise(widths)
+        )
 
     @property
     def weights(self) -> list[Tensor]:

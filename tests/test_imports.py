@@ -1,0 +1,60 @@
+"""Imports go one way; only the command line calls pipelines; MCAP and Rerun stay in their rooms."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROWS = (  # each may import its own row (a package its own modules) and the rows above
+    {"exceptions", "channels", "seeds"},
+    {"units", "findings"},
+    {"profile", "config", "logs", "comparison"},
+    {"align", "midship", "quality", "draft"},
+    {"ingest", "table"},
+    {"store", "windows"},
+    {"models"},
+    {"engine", "simulate", "coverage"},
+    {"evaluate", "floors", "train"},
+    {"runs", "report", "viewer"},
+    {"cli"},
+)
+LEVEL = {name: level for level, row in enumerate(ROWS) for name in row}
+SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
+
+
+def imported(path):
+    """(line, full module name) of every import, wherever in the file it stands."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            module = node.module or ""
+            yield node.lineno, module
+            if module == "shiplog":
+                yield from ((node.lineno, f"shiplog.{alias.name}") for alias in node.names)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_go_one_way(path):
+    room = path.relative_to(ROOT / "shiplog").parts[0].removesuffix(".py")
+    if room == "__init__":
+        return
+    for line, module in imported(path):
+        parts = module.split(".")
+        where = f"{path.relative_to(ROOT)}:{line} imports {module}"
+        if parts[0] == "pipelines":
+            assert room == "cli", where
+        if parts[0] == "shiplog" and len(parts) > 1 and parts[1] != room:
+            assert LEVEL[parts[1]] <= LEVEL[room], where
+        if parts[0] in ("mcap", "mcap_protobuf", "mcap_ros2"):
+            assert room == "logs", where
+        if parts[0] == "rerun":
+            assert room in ("logs", "viewer"), where
+        if parts[0] == "pickle":
+            raise AssertionError(where)
+
+
+def test_every_room_has_a_level():
+    rooms = {p.relative_to(ROOT / "shiplog").parts[0].removesuffix(".py") for p in SOURCES}
+    assert rooms - {"__init__"} == set(LEVEL)
