@@ -37,7 +37,8 @@ def spikes(value: np.ndarray, sigma: float) -> np.ndarray:
     off = np.zeros(len(value))
     off[2:-2] = np.linalg.norm(value[2:-2] - np.median(around, axis=-1), axis=1)
     usual = 1.4826 * float(np.median(off[2:-2]))
-    return off > np.maximum(10.0 * max(usual, sigma), 1e-9)
+    step = float(np.median(np.linalg.norm(np.diff(value, axis=0), axis=1)))  # of a free-run motion
+    return off > max(10.0 * usual, 10.0 * sigma, 5.0 * step, 1e-9)
 
 
 def repeats(value: np.ndarray) -> list[tuple[int, int]]:

@@ -1,0 +1,178 @@
+"""A log to a table at midship, against a path known in closed form; faults where they were put."""
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+import sailing
+
+from shiplog.channels import Quality
+from shiplog.exceptions import ChannelMissing, ProfileError
+from shiplog.ingest import ingest
+from shiplog.logs.write import Series
+
+
+def changed(parts, topic, **columns):
+    one = parts[topic]
+    return {**parts, topic: replace(one, columns={**one.columns, **columns})}
+
+
+def kept(parts, topic, mask):
+    one = parts[topic]
+    columns = {name: values[mask] for name, values in one.columns.items()}
+    return {**parts, topic: Series(one.topic, one.schema, one.time[mask], columns)}
+
+
+@pytest.fixture
+def voyage(tmp_path):
+    def build(parts=None, text=sailing.PROFILE):
+        return ingest(sailing.write(tmp_path / "turn.mcap", parts), sailing.profile(text))
+
+    return build
+
+
+def kinds(report):
+    return [(f.kind, f.channel) for f in report.findings]
+
+
+def test_a_turning_ship_is_reduced_to_midship(voyage):
+    table = voyage().table
+    t = (table["time"].to_physical().to_numpy() - sailing.START) * 1e-9
+    heading = 3.0 + sailing.SPEED / sailing.RADIUS * t
+    # Interpolating a circle between samples 0.1 s apart leaves r²·U·dt²/8 = 2e-6 m.
+    assert table["x0"].to_numpy() == pytest.approx(20.0 * np.sin(heading), abs=1e-5)
+    assert table["y0"].to_numpy() == pytest.approx(-20.0 * np.cos(heading), abs=1e-5)
+    assert table["surge"].to_numpy() == pytest.approx(0.8, abs=1e-5)
+    assert table["sway"].to_numpy() == pytest.approx(0.0, abs=1e-5)
+    assert table["yaw_rate"].to_numpy() == pytest.approx(0.04)
+    wrapped = (heading + np.pi) % (2 * np.pi) - np.pi
+    assert table["heading"].to_numpy() == pytest.approx(wrapped, abs=1e-9)
+    assert table["rudder"].to_numpy() == pytest.approx(np.radians(10) * np.sin(0.2 * t), abs=1e-4)
+    assert table["propeller"].to_numpy() == pytest.approx(5.0 + 0.1 * t)
+    angle = np.radians((350.0 + 0.5 * t + 180) % 360 - 180)
+    assert table["wind_angle"].to_numpy() == pytest.approx(angle, abs=1e-6)
+    assert (table["quality"] == 0).all()
+
+
+def test_the_table_is_10_hz_and_whole(voyage):
+    done = voyage()
+    assert done.table["time"].diff().drop_nulls().unique().to_list() == [
+        done.table["time"][1] - done.table["time"][0]
+    ]
+    assert done.table["time"].diff()[1].total_seconds() == 0.1
+    assert done.table.null_count().sum_horizontal()[0] == 0
+    assert done.report.messages_read == sum(len(s.time) for s in sailing.series().values())
+    assert done.report.messages_lost == 0 and done.report.findings == ()
+
+
+def test_arrival_does_not_matter(voyage, tmp_path):
+    late = {
+        topic: replace(one, log_time=one.time + 700_000_000 * (topic == "/velocity"))
+        for topic, one in sailing.series().items()
+    }
+    clean = voyage().table
+    assert voyage(late).table.equals(clean)
+
+
+def test_a_dropout_is_a_gap_of_that_channel_with_its_times(voyage):
+    parts = sailing.series()
+    t = (parts["/velocity"].time - sailing.START) * 1e-9
+    done = voyage(kept(parts, "/velocity", (t < 20.0) | (t > 23.0)))
+    (gap,) = [f for f in done.report.findings if f.kind == "gap"]
+    assert gap.channel == "velocity"
+    first = done.table["time"][0].timestamp() - sailing.START * 1e-9
+    assert gap.start_s + first == pytest.approx(20.0, abs=0.11)
+    assert gap.value == pytest.approx(3.0, abs=0.25)
+    lost = done.table.filter(pl.col("surge").is_null())
+    assert (lost["quality"] & int(Quality.GAP) != 0).all()
+    assert done.table["x0"].null_count() == 0
+
+
+def test_a_spike_is_marked_and_left_as_it_is(voyage):
+    parts = sailing.series()
+    x = parts["/position"].columns["x_m"].copy()
+    x[300] += 5.0
+    done = voyage(changed(parts, "/position", x_m=x))
+    assert ("spike", "position") in kinds(done.report)
+    marked = done.table.filter(pl.col("quality") & int(Quality.SPIKE) != 0)
+    assert 1 <= marked.height <= 2
+    assert (done.table["x0"] - voyage().table["x0"]).abs().max() > 2.0
+
+
+def test_a_lone_nan_is_blank(voyage):
+    parts = sailing.series()
+    wind = parts["/wind"].columns["speed_mps"].copy()
+    wind[100:110] = np.nan
+    done = voyage(changed(parts, "/wind", speed_mps=wind))
+    assert ("blank", "wind") in kinds(done.report)
+    assert done.table.filter(pl.col("quality") & int(Quality.BLANK) != 0).height >= 10
+
+
+def test_a_rudder_beyond_its_limits_is_marked_not_clipped(voyage):
+    parts = sailing.series()
+    angle = parts["/rudder"].columns["angle_deg"].copy()
+    angle[200:205] = 50.0
+    done = voyage(changed(parts, "/rudder", angle_deg=angle))
+    (finding,) = [f for f in done.report.findings if f.kind == "limits"]
+    assert finding.channel == "rudder"
+    assert done.table["rudder"].min() == pytest.approx(-np.radians(50.0))
+    assert done.table.filter(pl.col("quality") & int(Quality.LIMITS) != 0).height >= 4
+
+
+def test_a_frozen_position_is_found_and_its_catching_up_is_no_jump(voyage):
+    parts = sailing.series()
+    x, y = (parts["/position"].columns[n].copy() for n in ("x_m", "y_m"))
+    x[300:340], y[300:340] = x[299], y[299]
+    done = voyage(changed(parts, "/position", x_m=x, y_m=y))
+    assert ("held", "position") in kinds(done.report)
+    assert "jump" not in [f.kind for f in done.report.findings]
+    frozen = done.table.filter(pl.col("quality") & int(Quality.FROZEN) != 0)
+    assert frozen.height == pytest.approx(40, abs=2)
+
+
+def test_a_jump_of_the_position_starts_anew(voyage):
+    parts = sailing.series()
+    x = parts["/position"].columns["x_m"].copy()
+    x[300:] += 6.0
+    done = voyage(changed(parts, "/position", x_m=x))
+    assert ("jump", "position") in kinds(done.report)
+    assert done.table.filter(pl.col("quality") & int(Quality.JUMP) != 0).height >= 1
+
+
+def test_without_a_yaw_rate_sensor_the_heading_is_differentiated(voyage):
+    text = sailing.PROFILE.replace("[sensors.yaw_rate]", "[ignored]")
+    start = text.index("[ignored]")
+    text = text[:start] + text[text.index("[sensors.wind]") :]
+    assert voyage(text=text).table["yaw_rate"].to_numpy() == pytest.approx(0.04, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('topic = "/gyro"', 'topic = "/giro"', "did you mean '/gyro'"),
+        ('field = "heading_deg"', 'field = "headin_deg"', "did you mean 'heading_deg'"),
+        ('fields = ["sog_kn"', 'fields = ["zzz"', "Fields found: cog_deg"),
+    ],
+)
+def test_a_topic_or_field_that_is_not_there_names_those_that_are(voyage, old, new, expected):
+    with pytest.raises(ChannelMissing, match=r"(?s)turn\.mcap.*") as caught:
+        voyage(text=sailing.PROFILE.replace(old, new))
+    assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("length_m = 3.0", "lenght_m = 3.0", "did you mean 'length_m'"),
+        ('unit = "deg/min"', 'unit = "deg/hour"', "unit 'deg/hour' is not known"),
+        ('kind = "sog_cog"', 'kind = "sogcog"', "it can be"),
+        ('name = "propeller"', 'name = "rudder"', "already taken"),
+        ('fields = ["x_m", "y_m"]', 'fields = ["x_m"]', "needs 2 field(s)"),
+        ('sigma = 0.05', 'sigmas = 0.05', "did you mean 'sigma'"),
+    ],
+)
+def test_a_profile_that_cannot_be_is_refused_with_advice(old, new, expected):
+    with pytest.raises(ProfileError) as caught:
+        sailing.profile(sailing.PROFILE.replace(old, new))
+    assert expected in str(caught.value)

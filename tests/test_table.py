@@ -1,0 +1,97 @@
+"""10 Hz to 1 Hz: circular means, centred bins, and gaps that stay gaps."""
+
+import math
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import polars as pl
+import pytest
+
+from shiplog import table
+from shiplog.channels import Quality
+
+START = datetime(2026, 5, 1, 12, 0, 0, tzinfo=UTC)
+
+
+def rows(seconds=20, voyage="a", start=START, **columns):
+    count = seconds * 10
+    time = [start + timedelta(milliseconds=100 * i) for i in range(count)]
+    base = {"heading": np.zeros(count), "surge": np.arange(count) * 0.1, "quality": [0] * count}
+    frame = pl.DataFrame({"voyage": [voyage] * count, "time": time, **(base | columns)})
+    return frame.with_columns(pl.col("time").cast(pl.Datetime("ns", "UTC")))
+
+
+def seconds(frame):
+    return table.resample(frame.lazy(), ("heading", "surge"), ("heading",))
+
+
+def test_the_mean_of_359_and_1_degree_is_north():
+    heading = np.radians(np.tile([359.0, 1.0], 100))
+    result = seconds(rows(heading=heading))["heading"].to_numpy()[1:-1]  # whole seconds
+    assert result == pytest.approx(np.zeros(len(result)), abs=1e-12)
+
+
+def test_a_mean_across_south_stays_south():
+    heading = np.tile(np.radians([179.0, -179.0]), 100)
+    result = np.abs(seconds(rows(heading=heading))["heading"].to_numpy())[1:-1]
+    assert result == pytest.approx(np.full(len(result), math.pi))
+
+
+def test_bins_are_centred_on_their_stamp():
+    result = seconds(rows())
+    assert result["time"][1] == START + timedelta(seconds=1)
+    # Rows 0.5 to 1.4 s of surge = t: their mean is 0.95, centred between, not 1.45 as when truncated.
+    assert result["surge"][1] == pytest.approx(0.95)
+    assert result["samples"][1] == 10
+
+
+def test_a_second_with_fewer_than_five_good_rows_is_missing_and_starts_a_segment():
+    quality = np.zeros(200, int)
+    quality[95:101] = int(Quality.GAP)  # rows 9.5 to 10.0 s of the second stamped 10
+    result = seconds(rows(quality=quality))
+    assert START + timedelta(seconds=10) not in result["time"].to_list()
+    before = result.filter(pl.col("time") < START + timedelta(seconds=10))
+    after = result.filter(pl.col("time") > START + timedelta(seconds=10))
+    assert before["segment"].unique().to_list() == [0]
+    assert after["segment"].unique().to_list() == [1]
+
+
+@pytest.mark.parametrize("mark", [Quality.LIMITS, Quality.SPIKE, Quality.BLANK, Quality.FROZEN])
+def test_unusable_rows_stay_out_of_the_mean(mark):
+    quality = np.zeros(200, int)
+    surge = np.ones(200)
+    surge[52], quality[52] = 1e6, int(mark)
+    result = seconds(rows(surge=surge, quality=quality))
+    assert result["surge"].to_list() == [1.0] * len(result)
+    assert result.filter(pl.col("samples") == 9).height == 1
+
+
+def test_a_held_row_is_used_and_a_jump_starts_a_segment():
+    quality = np.zeros(200, int)
+    quality[30:40] = int(Quality.HELD)
+    quality[100] = int(Quality.JUMP)
+    result = seconds(rows(quality=quality))
+    assert result["segment"].n_unique() == 2
+    assert result.filter(pl.col("segment") == 0).height == 10
+
+
+def test_voyages_are_apart_and_the_order_of_rows_does_not_matter():
+    both = pl.concat([rows(voyage="b"), rows(voyage="a")])
+    result = seconds(both.sample(fraction=1.0, shuffle=True, seed=3))
+    keys = ("voyage", "time", "samples", "segment")
+    assert result.select(keys).equals(seconds(both).select(keys))
+    assert result["surge"].to_numpy() == pytest.approx(seconds(both)["surge"].to_numpy())
+    assert result["segment"].unique().to_list() == [0]
+    assert result["voyage"].unique(maintain_order=True).to_list() == ["a", "b"]
+
+
+def test_the_same_data_under_two_names_is_found():
+    noise = np.random.default_rng(0).normal(size=(4, 300))
+    names = ("surge", "sway", "heading", "yaw_rate")
+    original = pl.DataFrame(dict(zip(names, noise, strict=True)) | {"voyage": ["a"] * 300})
+    copy = original[:50].with_columns(voyage=pl.lit("b"))
+    other = original.select(voyage=pl.lit("c"), surge="sway", sway="surge", heading="heading",
+                            yaw_rate="yaw_rate")  # fmt: skip
+    columns = ["voyage", *names]
+    all_rows = pl.concat([original.select(columns), copy.select(columns), other.select(columns)])
+    assert table.shared_rows(all_rows).rows() == [("a", "b", 50)]
