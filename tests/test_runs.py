@@ -1,0 +1,97 @@
+"""Run folders: resumable after a kill, never half-written, no pickle."""
+
+import polars as pl
+import pytest
+import sailing
+import torch
+from test_engine import network, windows
+
+from shiplog import engine, runs, train
+from shiplog.config import Config, Network, Paper, Split
+from shiplog.exceptions import RunError
+from shiplog.models.feedforward import Shape
+
+PROFILE = sailing.profile()
+SPLIT = Split(training=("a",), validation=("b",))
+CONFIG = Config(recipe="paper", seeds=(0, 1), split=SPLIT, network=Network(
+    width=8, depth=2, wind_input="angle"))  # fmt: skip
+SHAPE = Shape(2, width=8, depth=2)
+ROWS = pl.DataFrame({"voyage": ["a"] * 3, "surge": [0.1, 0.2, 0.3]})
+
+
+@pytest.fixture
+def begun(tmp_path):
+    data = windows(5, 12, actuators=2)
+    model = network(SHAPE, data).float()
+    run = runs.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    batches = [engine.batch(data, model.scaling, SHAPE, torch.float32)] * 2
+    return run, model, batches
+
+
+def test_a_run_comes_back_as_it_was(begun):
+    run, model, batches = begun
+    progress = train.paper(model, *batches, Paper(most_epochs=3), seed=0)
+    for seed in CONFIG.seeds:
+        run.save_seed(seed, progress)
+    done = run.finish({"shiplog": "test"})
+    opened = runs.load(done.path)
+    assert opened.config == CONFIG
+    assert opened.profile.model_dump() == PROFILE.model_dump()
+    for weight, best in zip(opened.model(1).weights, progress.best_weights, strict=True):
+        assert torch.equal(weight, best.double())
+    assert opened.history(0)["validation"].to_list() == [row[2] for row in progress.history]
+    assert not (run.path).exists()
+    suffixes = {p.suffix for p in done.path.rglob("*") if p.is_file()}
+    assert suffixes == {".toml", ".json", ".parquet", ".safetensors"}
+
+
+def test_a_checkpoint_on_disk_resumes_bit_by_bit(begun):
+    run, model, batches = begun
+    settings = Paper(most_epochs=9)
+    whole = train.paper(model, *batches, settings, seed=0)
+    train.paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
+                checkpoint=lambda p: run.save_checkpoint(0, p))  # fmt: skip
+    resumed = train.paper(model, *batches, settings, seed=0, resume=run.load_checkpoint(0))
+    assert resumed.history[1:] == whole.history[1:]
+    assert all(torch.equal(a, b) for a, b in zip(resumed.weights, whole.weights, strict=True))
+    run.save_seed(0, resumed)
+    assert run.load_checkpoint(0) is None and run.finished(0) and not run.finished(1)
+
+
+def test_the_same_command_goes_on_and_another_is_refused(begun):
+    run, model, batches = begun
+    run.save_seed(0, train.paper(model, *batches, Paper(most_epochs=1), seed=0))
+    out = run.path.with_name("run")
+    again = runs.create(out, CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    assert again.finished(0)
+    other = CONFIG.model_copy(update={"window": 50})
+    with pytest.raises(RunError, match="other settings"):
+        runs.create(out, other, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    moved = ROWS.with_columns(surge=pl.col("surge") + 0.1)
+    with pytest.raises(RunError, match="other settings or data"):
+        runs.create(out, CONFIG, PROFILE, model.scaling, ROWS, moved, ROWS)
+
+
+def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path):
+    run, model, _ = begun
+    with pytest.raises(RunError, match="not finished"):
+        runs.load(tmp_path / "run")
+    with pytest.raises(RunError, match="no run"):
+        runs.load(tmp_path / "nothing")
+    run.path.rename(tmp_path / "run")
+    with pytest.raises(RunError, match="exists already"):
+        runs.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+
+
+def test_a_torn_weight_file_is_named(begun):
+    run, model, batches = begun
+    run.save_seed(0, train.paper(model, *batches, Paper(most_epochs=1), seed=0))
+    path = run.path / "seed0" / "model.safetensors"
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
+        run.model(0)
+
+
+def test_json_has_no_infinity(tmp_path):
+    runs.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
+    assert (tmp_path / "a.json").read_text().count("null") == 2
