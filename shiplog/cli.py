@@ -97,7 +97,10 @@ def demo(
     result = run_demo(out, logs)
     _answer(result.text, result.content, json_to)
     if view:
-        _show(result.recording, web=False)
+        try:
+            _show(result.recording, web=False)
+        except ShiplogError as error:  # the job is done; only the window is missing
+            typer.echo(f"not shown: {error.message}", err=True)
 
 
 @app.command()
@@ -297,16 +300,22 @@ def compare(
     result = compare_runs(runs, Store(store), voyages or [], save)
     _answer(result.text, result.content, json_to)
     if save is None:
-        _show(result.recording, web)
+        try:
+            _show(result.recording, web)
+        except ShiplogError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(LOST) from None
 
 
 def _show(recording: Path, web: bool) -> None:
     from shiplog import viewer
 
-    if web:
-        viewer.serve(recording)
-    else:
+    if not web:
         viewer.open_viewer(recording)
+        return
+    with viewer.serve(recording) as served:
+        typer.echo(f"open {served.address} in a browser; Ctrl-C ends it", err=True)
+        served.wait()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,242 @@
+"""The commands as a user types them: answers, exit codes, and messages for what can be mended."""
+
+import csv
+import json
+from datetime import UTC, datetime
+
+import numpy as np
+import polars as pl
+import pytest
+import sailing
+from typer.testing import CliRunner
+
+from pipelines import known_ship
+from shiplog import cli
+from shiplog.exceptions import ShiplogError
+
+FAST = ("--window", "40", "--width", "12", "--epochs", "8")
+
+
+def call(*arguments):
+    """Exit code, stdout and stderr, with a ShiplogError handled as `main` does."""
+    result = CliRunner().invoke(cli.app, [str(a) for a in arguments])
+    if isinstance(result.exception, ShiplogError):
+        return 1, result.stdout, str(result.exception)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Three short voyages of the simulated ship."""
+    folder = tmp_path_factory.mktemp("logs")
+    for number in range(1, 4):
+        voyage = known_ship.sail(150.0, seed=number, wind=known_ship.Wind(2.0, number))
+        start = datetime(2026, 5, number, 12, 0, tzinfo=UTC)
+        known_ship.write_voyage(folder / f"trip_{number}.mcap", voyage, seed=number, start=start)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def store(logs, tmp_path_factory):
+    path = tmp_path_factory.mktemp("work") / "store"
+    code, _, _ = call("ingest", logs, "--store", path)
+    assert code == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(store):
+    out = store.parent / "run"
+    code, said, _ = call("train", "--store", store, "--out", out, "--seeds", 2, *FAST)
+    assert code == 0 and "Split by" in said
+    return out
+
+
+def test_ingest_answers_as_the_contract_says_and_is_idempotent(logs, store, tmp_path):
+    answer = tmp_path / "a.json"
+    code, said, _ = call("ingest", logs, "--store", store, "--json", answer)
+    assert code == 0
+    content = json.loads(answer.read_text())
+    assert content["contract"] == 1
+    assert [v["name"] for v in content["voyages"]] == ["trip_1", "trip_2", "trip_3"]
+    voyage = content["voyages"][0]
+    assert set(voyage) == {"name", "messages", "rows", "seconds", "findings"}
+    assert voyage["messages"]["lost"] == 0 and voyage["rows"] == pytest.approx(1500, abs=5)
+    assert "trip_1" in said
+
+
+def test_voyages_lists_the_store(store):
+    code, said, _ = call("voyages", "--store", store)
+    assert code == 0
+    assert said.count("trip_") == 3 and "known ship" in said
+
+
+def test_json_to_stdout_is_json_alone(store):
+    code, said, _ = call("voyages", "--store", store, "--json", "-")
+    assert code == 0 and len(json.loads(said)["voyages"]) == 3
+
+
+def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
+    answer = tmp_path / "e.json"
+    code, said, _ = call("evaluate", run, "--store", store, "--json", answer)
+    assert code == 0
+    content = json.loads(answer.read_text())
+    assert set(content) == {"contract", "loss", "windows", "seeds", "rmse", "end_position_m",
+                            "end_heading_deg", "floors", "voyages"}  # fmt: skip
+    assert content["loss"] == pytest.approx(np.mean(content["seeds"]))
+    assert len(content["seeds"]) == 2 and content["windows"] == 3
+    assert set(content["floors"]) == {"hold", "least_squares"}
+    (voyage,) = content["voyages"].values()
+    assert set(voyage) == {"loss", "windows", "coverage"}
+    assert "floor: hold the velocity" in said
+
+
+def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
+    """L of one window from errors.parquet, integrated again from rollouts and the 1 Hz rows."""
+    from pipelines.prepare import seconds
+    from shiplog.store import Store
+    from shiplog.table import with_elapsed
+
+    call("evaluate", run, "--store", store)
+    errors = pl.read_parquet(run / "errors.parquet").filter(
+        (pl.col("window") == 1) & (pl.col("seed") == 0)
+    )
+    voyage = errors["voyage"][0]
+    rollout = pl.read_parquet(run / "rollouts.parquet").filter(
+        (pl.col("window") == 1) & (pl.col("seed") == 0)
+    )
+    whole = Store(store)
+    rows = with_elapsed(seconds(whole, [voyage], whole.profile([voyage])))
+    second = pl.col("elapsed").round().cast(pl.Int64).alias("second")
+    both = rollout.with_columns(pl.col("time").round().cast(pl.Int64).alias("second")).join(
+        rows.with_columns(second), on="second", suffix="_measured"
+    )
+    assert both.height == 40
+    d = sum(
+        (w * (both[c] - both[f"{c}_measured"])) ** 2
+        for c, w in (("surge", 100), ("sway", 100), ("yaw_rate", 10 * 180 / np.pi))
+    ).to_numpy()
+    assert errors["loss"][0] == pytest.approx(float(np.trapezoid(d)))
+
+
+def test_compare_saves_a_recording_of_both_sides(run, store, tmp_path):
+    from rerun.chunk import RrdReader
+
+    path = tmp_path / "c.rrd"
+    code, _, _ = call("compare", run, "--store", store, "--save", path)
+    assert code == 0
+    said = str(RrdReader(str(path)).store().summary())
+    assert all(word in said for word in ("measured", "simulated", "hist", "error"))
+
+
+def test_a_finished_run_is_not_trained_over(run, store):
+    code, _, said = call("train", "--store", store, "--out", run, *FAST)
+    assert code == 1 and "exists already" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--model", "feedfoward"), "did you mean 'feedforward'"),
+        (("--data", "sli3"), "--data can be"),
+        (("--recipe", "papr"), "did you mean 'paper'"),
+        (("--voyages", "trp_1"), "did you mean 'trip_1'"),
+        (("--window", "400"), "cannot be split"),
+        (("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"), "longer than every"),
+    ],
+)
+def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, expected):
+    code, _, said = call("train", "--store", store, "--out", tmp_path / "r", *arguments)
+    assert code == 1 and expected in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_usage_errors_exit_with_2():
+    assert call("train")[0] == 2
+    assert call("no-such-command")[0] == 2
+
+
+@pytest.mark.parametrize("command", ["demo", "check", "ingest", "convert", "profile", "voyages",
+                                     "train", "evaluate", "compare"])  # fmt: skip
+def test_every_command_has_help_with_an_example(command):
+    code, said, _ = call(command, "--help")
+    assert code == 0 and f"Example: shiplog {command}" in " ".join(said.split())
+
+
+def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
+    bad = tmp_path / "bad.mcap"
+    bad.write_bytes(b"not an mcap file at all")
+    store = tmp_path / "store"
+    code, _, said = call("ingest", bad, logs / "trip_1.mcap", "--store", store)
+    assert code == 3 and "bad.mcap" in said
+    assert call("voyages", "--store", store)[1].count("trip_1") == 1
+    code, _, said = call("ingest", bad, "--store", tmp_path / "other")
+    assert code == 1 and not (tmp_path / "other").exists()
+
+
+def test_the_same_name_with_other_content_is_refused_by_name(logs, store, tmp_path):
+    clash = tmp_path / "trip_1.mcap"
+    clash.write_bytes((logs / "trip_2.mcap").read_bytes())
+    code, _, said = call("ingest", clash, "--store", store)
+    assert code == 1 and "another log as the voyage 'trip_1'" in said
+
+
+def test_an_unknown_log_without_a_profile_says_how_to_draft_one(tmp_path):
+    path = sailing.write(tmp_path / "turn.mcap")
+    code, _, said = call("ingest", path, "--store", tmp_path / "store")
+    assert code == 1 and "shiplog profile" in said and "/gyro" in said
+    draft = tmp_path / "draft.toml"
+    assert call("profile", path, "--out", draft)[0] == 0
+    text = draft.read_text()
+    assert 'topic = "/position"' in text and "CHECK" in text
+
+
+def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(logs, tmp_path):
+    whole = (logs / "trip_1.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) * 2 // 3])
+    code, said, _ = call("ingest", cut, "--profile", "esso-vectwin", "--store", tmp_path / "s")
+    assert code in (1, 3)
+    code, said, _ = call("check", cut)
+    assert code in (1, 3)
+
+
+def test_tables_become_logs_and_come_back_as_they_were(tmp_path):
+    t = np.arange(0.0, 30.0, 0.1)
+    table = pl.DataFrame(
+        {
+            "run_id": ["z1"] * 300, "t_s": t, "x0_m": 0.5 * t, "y0_m": np.zeros(300),
+            "psi_deg": np.full(300, -3.0), "u_body_mps": np.full(300, 0.5),
+            "v_body_mps": np.full(300, 0.01), "r_degps": np.zeros(300),
+            "delta_deg": np.full(300, 5.0), "n_rps": np.full(300, 10.0),
+        }
+    )  # fmt: skip
+    table.write_csv(tmp_path / "zigzag.csv")
+    code, _, _ = call("convert", tmp_path / "zigzag.csv", "--profile", "kvlcc2", "--out", tmp_path)
+    assert code == 0
+    code, _, _ = call("ingest", tmp_path / "z1.mcap", "--profile", "kvlcc2", "--store",
+                      tmp_path / "store")  # fmt: skip
+    assert code == 0
+    (path,) = (tmp_path / "store").rglob("table.parquet")
+    back = pl.read_parquet(path)
+    assert back["x0"].to_numpy() == pytest.approx(0.5 * t)
+    assert back["heading"].to_numpy() == pytest.approx(np.radians(-3.0))
+    assert back["rudder"].to_numpy() == pytest.approx(np.radians(-5.0))  # port is negative here
+    assert back["propeller"].to_numpy() == pytest.approx(10.0)
+
+
+def test_a_table_without_a_column_names_it(tmp_path):
+    with (tmp_path / "t.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["t_s", "x0_m"], [0.0, 1.0]])
+    code, _, said = call("convert", tmp_path / "t.csv", "--profile", "kvlcc2", "--out", tmp_path)
+    assert code == 1 and "no column for" in said and "heading" in said
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_the_demo_needs_its_logs(tmp_path, monkeypatch):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    code, _, said = call("demo", "--no-view", "--logs", empty, "--out", tmp_path / "demo")
+    assert code == 1 and "No log in" in said
