@@ -84,7 +84,7 @@ def fitting_profile(path: Path) -> Profile:
 
 def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFrame:
     """The sorted 1 Hz table of these voyages."""
-    return table.resample(store.scan(names), profile.columns, profile.circular)
+    return table.resample(store.tables(names), profile.columns, profile.circular)
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:

@@ -147,10 +147,10 @@ class Store:
             raise StoreError("No voyage was chosen.", hint="name some with --voyages.")
         return chosen
 
-    def scan(self, names: Sequence[str]) -> pl.LazyFrame:
-        """The 10 Hz rows of these voyages: voyage, time, the ship's columns, quality."""
+    def tables(self, names: Sequence[str]) -> list[pl.LazyFrame]:
+        """The 10 Hz rows, a lazy table a voyage: voyage, time, the ship's columns, quality."""
         files = [self._folder(name) / "table.parquet" for name in names]
-        return pl.scan_parquet(files, hive_partitioning=False)
+        return [pl.scan_parquet(file, hive_partitioning=False) for file in files]
 
     def _folder(self, name: str) -> Path:
         return self.path / f"voyage={quote(name, safe=' ()+,')}"

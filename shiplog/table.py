@@ -6,7 +6,8 @@ rows is missing, and a missing second starts a new segment that no window crosse
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import timedelta
 from pathlib import Path
 
 import polars as pl
@@ -14,6 +15,7 @@ import polars as pl
 from shiplog.channels import UNUSABLE, Quality
 
 ONE_SECOND = pl.duration(seconds=1)
+ONE_DAY = timedelta(days=1)
 LEAST_SAMPLES = 5  # of ten: fewer is not an average over the second
 
 
@@ -52,23 +54,54 @@ def averages(
 
 
 def resample(
-    table: pl.LazyFrame,
+    tables: Iterable[pl.LazyFrame],
     columns: Sequence[str],
     circular: Iterable[str],
     least: int = LEAST_SAMPLES,
 ) -> pl.DataFrame:
-    """The 1 Hz table: voyage, time, `columns`, samples, segment; sorted, streaming engine.
+    """The 1 Hz table of some voyages: voyage, time, `columns`, samples, segment; sorted.
 
-    `segment` counts from 0 in each voyage; within one, the stamps are exactly 1 s apart.
+    tables: 10 Hz rows, one lazy table a voyage. `segment` counts from 0 in each voyage; within
+    one, the stamps are exactly 1 s apart.
     """
-    return segments(averages(table, columns, circular, least).collect(engine="streaming"))
+    circular = frozenset(circular)
+    parts = [
+        averages(part, columns, circular, least).collect(engine="streaming")
+        for table in tables
+        for part in days(table)
+    ]
+    return segments(pl.concat(parts))
 
 
 def sink_averages(
-    table: pl.LazyFrame, columns: Sequence[str], circular: Iterable[str], path: Path
+    tables: Iterable[pl.LazyFrame], columns: Sequence[str], circular: Iterable[str], folder: Path
 ) -> None:
-    """The same averages straight to Parquet, for tables larger than memory (unsorted)."""
-    averages(table, columns, circular).sink_parquet(path, engine="streaming")
+    """The same averages to Parquet, a file a day and voyage, for tables larger than memory."""
+    folder.mkdir(parents=True, exist_ok=True)
+    circular = frozenset(circular)
+    parts = (part for table in tables for part in days(table))
+    for number, part in enumerate(parts):
+        target = folder / f"{number:06d}.parquet"
+        averages(part, columns, circular).sort("time").sink_parquet(target, engine="streaming")
+
+
+def days(table: pl.LazyFrame) -> Iterator[pl.LazyFrame]:
+    """One voyage's rows in pieces of at most a day, cut where bins are.
+
+    Grouping keeps every second it has met; a day of them is 100 MB whatever the voyage's length.
+    """
+    first, last = (
+        table.select(pl.col("time").min().alias("first"), pl.col("time").max().alias("last"))
+        .collect()
+        .row(0)
+    )
+    if first is None or last - first <= ONE_DAY:
+        yield table
+        return
+    edge = first.replace(microsecond=0) - timedelta(milliseconds=500)
+    while edge <= last:
+        yield table.filter((pl.col("time") >= edge) & (pl.col("time") < edge + ONE_DAY))
+        edge += ONE_DAY
 
 
 def segments(seconds: pl.DataFrame) -> pl.DataFrame:

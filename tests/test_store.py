@@ -90,7 +90,7 @@ def test_names_that_look_like_numbers_or_hold_signs_stay_what_they_are(tmp_path,
     store = Store(tmp_path / "store")
     for name in ("00000216", "06-Aug 16=24%"):
         store.add(voyage(name))
-    rows = store.scan(store.select()).collect()
+    rows = pl.concat(store.tables(store.select())).collect()
     assert set(rows["voyage"]) == {"00000216", "06-Aug 16=24%"}
 
 

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import polars as pl
 import pytest
+from polars.testing import assert_frame_equal
 
 from shiplog import table
 from shiplog.channels import Quality
@@ -22,7 +23,8 @@ def rows(seconds=20, voyage="a", start=START, **columns):
 
 
 def seconds(frame):
-    return table.resample(frame.lazy(), ("heading", "surge"), ("heading",))
+    parts = [part.lazy() for part in frame.partition_by("voyage")]
+    return table.resample(parts, ("heading", "surge"), ("heading",))
 
 
 def test_the_mean_of_359_and_1_degree_is_north():
@@ -83,6 +85,17 @@ def test_voyages_are_apart_and_the_order_of_rows_does_not_matter():
     assert result["surge"].to_numpy() == pytest.approx(seconds(both)["surge"].to_numpy())
     assert result["segment"].unique().to_list() == [0]
     assert result["voyage"].unique(maintain_order=True).to_list() == ["a", "b"]
+
+
+def test_a_voyage_of_days_is_the_same_in_pieces(monkeypatch, tmp_path):
+    frame = rows(60, start=START + timedelta(milliseconds=300))
+    whole = seconds(frame)
+    monkeypatch.setattr(table, "ONE_DAY", timedelta(seconds=7))
+    assert len(list(table.days(frame.lazy()))) > 5
+    assert_frame_equal(seconds(frame), whole)
+    table.sink_averages([frame.lazy()], ("heading", "surge"), ("heading",), tmp_path / "out")
+    sunk = pl.read_parquet(tmp_path / "out" / "*.parquet")
+    assert_frame_equal(table.segments(sunk).select(whole.columns), whole)
 
 
 def test_the_same_data_under_two_names_is_found():
