@@ -139,6 +139,7 @@ def comparison(evaluation: Evaluation, title: str) -> Comparison:
         training=run.training().select(profile.columns),
         summary=evaluation.text(),
         banks=profile.site.banks,
+        trained=run.name if len(evaluation.runs) > 1 else "",
     )
 
 

@@ -35,7 +35,8 @@ class Comparison:
     measured    voyage, time [s from the voyage's start], the six states, one column per
                 actuator, wind_speed and wind_angle if `has_wind`
     simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 6]
-    training    what the models were trained on: the channels of `measured`
+    training    what a model was trained on: the channels of `measured`
+    trained     which model that is, where there are several
     summary     Markdown: errors, floors, coverage, findings
     banks       lines of (x0, y0) points a chart shows
     """
@@ -50,6 +51,7 @@ class Comparison:
     training: pl.DataFrame
     summary: str
     banks: tuple[tuple[tuple[float, float], ...], ...] = ()
+    trained: str = ""
 
     @property
     def voyages(self) -> list[str]:

@@ -169,7 +169,7 @@ def test_a_topic_or_field_that_is_not_there_names_those_that_are(voyage, old, ne
         ('kind = "sog_cog"', 'kind = "sogcog"', "it can be"),
         ('name = "propeller"', 'name = "rudder"', "already taken"),
         ('fields = ["x_m", "y_m"]', 'fields = ["x_m"]', "needs 2 field(s)"),
-        ('sigma = 0.05', 'sigmas = 0.05', "did you mean 'sigma'"),
+        ("sigma = 0.05", "sigmas = 0.05", "did you mean 'sigma'"),
     ],
 )
 def test_a_profile_that_cannot_be_is_refused_with_advice(old, new, expected):

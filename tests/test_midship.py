@@ -43,6 +43,8 @@ def test_a_quaternion_pointing_north_in_both_conventions():
     assert midship.quaternion_heading(z, w, east_north_up=False)[0] == pytest.approx(np.pi / 2)
 
 
-@pytest.mark.parametrize(("angle", "wrapped"), [(np.pi, np.pi), (-np.pi, np.pi), (7.0, 7.0 - 2 * np.pi)])
+@pytest.mark.parametrize(
+    ("angle", "wrapped"), [(np.pi, np.pi), (-np.pi, np.pi), (7.0, 7.0 - 2 * np.pi)]
+)
 def test_wrap_is_half_open(angle, wrapped):
     assert midship.wrap(np.array([angle]))[0] == pytest.approx(wrapped)

@@ -42,7 +42,7 @@ def test_a_mean_across_south_stays_south():
 def test_bins_are_centred_on_their_stamp():
     result = seconds(rows())
     assert result["time"][1] == START + timedelta(seconds=1)
-    # Rows 0.5 to 1.4 s of surge = t: their mean is 0.95, centred between, not 1.45 as when truncated.
+    # Rows 0.5 to 1.4 s of surge = t have the mean 0.95; truncating would have given 1.45.
     assert result["surge"][1] == pytest.approx(0.95)
     assert result["samples"][1] == 10
 

@@ -88,7 +88,12 @@ def test_a_resumed_training_is_the_uninterrupted_one_to_the_last_bit():
     settings = Paper(learning_rate=1e-3, most_epochs=12)
     kept = []
     whole = train.paper(
-        model, *batches, settings, seed=5, every=5, checkpoint=lambda p: kept.append(copy.deepcopy(p))
+        model,
+        *batches,
+        settings,
+        seed=5,
+        every=5,
+        checkpoint=lambda p: kept.append(copy.deepcopy(p)),
     )
     assert [p.epoch for p in kept] == [5, 10]
     resumed = train.paper(model, *batches, settings, seed=99, resume=kept[0])
@@ -112,7 +117,9 @@ def test_the_fast_recipe_learns_repeats_itself_and_depends_on_its_seed():
     trained = engine.loss_only(first.best_weights, batches[1], model.scaling, SHAPE)
     assert trained == pytest.approx(first.best, rel=1e-6)
     learnt = [row[1] for row in first.history[1:]]
-    assert learnt[-1] < 0.5 * engine.loss_only(list(model.weights), batches[0], model.scaling, SHAPE)
+    assert learnt[-1] < 0.5 * engine.loss_only(
+        list(model.weights), batches[0], model.scaling, SHAPE
+    )
 
 
 def test_shortened_windows_are_the_same_rows_cut_up():

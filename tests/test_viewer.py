@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
+import psutil
 import pytest
 from rerun.chunk import RrdReader
 
@@ -275,7 +276,6 @@ def test_a_recording_that_is_not_there_is_named(tmp_path):
 
 @pytest.mark.viewer
 def test_the_web_viewer_listens_on_this_machine_only(saved):
-    psutil = pytest.importorskip("psutil")
     with viewer.serve(saved, port=0) as served:
         listening = psutil.Process(served.process.pid).net_connections("inet")
         hosts = {c.laddr.ip for c in listening if c.status == psutil.CONN_LISTEN}
@@ -286,13 +286,13 @@ def test_the_web_viewer_listens_on_this_machine_only(saved):
 
 
 @pytest.mark.viewer
-def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path):
+def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewer):
     from shiplog.viewer.screenshot import screenshot
 
     try:
         state = screenshot(saved, tmp_path / "seen.png", time_s=100.0)
     except ShiplogError as error:
-        pytest.skip(f"no headless viewer here: {error.message}")
+        no_viewer(f"no headless viewer here: {error.message}")
     names = {view.name for view in state.views}
     for name in (
         "error: log10(1 + d), dots where a window starts", "surge u [m/s]", "sway v_m [m/s]",

@@ -93,7 +93,9 @@ def test_jitter_has_the_papers_size_and_touches_velocities_of_copies_only():
     copies = difference.reshape(18, 10, 100, 6)
     assert not torch.equal(copies[:, 0], copies[:, 1])
     reference = cut(frame, planned(frame, "ref"))
-    assert torch.equal(windows.jittered(reference, seeds.generator(0, "jitter")).state, reference.state)
+    assert torch.equal(
+        windows.jittered(reference, seeds.generator(0, "jitter")).state, reference.state
+    )
 
 
 def test_streams_are_by_seed_and_purpose():

@@ -9,7 +9,7 @@ import polars as pl
 from shiplog.findings import Finding
 
 from .container import Loss
-from .gather import DIGEST, Order
+from .tables import Order
 
 SECOND = 1_000_000_000
 OFFSET = 0.05  # s: closer clocks than this are one clock
@@ -37,44 +37,54 @@ def losses(found: list[Loss], first: int | None, lost: int | None) -> list[Findi
     return findings
 
 
-def disorder(order: Mapping[str, Order]) -> list[Finding]:
-    """Messages written behind a later one of their own topic."""
-    back = {topic: o for topic, o in order.items() if o.back}
+def undecoded(orphans: int, failed: Mapping[str, int]) -> list[Finding]:
+    """Messages whose bytes arrived whole but do not fit their schema."""
+    findings = []
+    if orphans:
+        sentence = f"{orphans} messages belong to channels whose description is lost."
+        findings.append(Finding("crc", "log", sentence, value=float(orphans)))
+    for topic, count in failed.items():
+        sentence = f"{count} messages on {topic} do not fit their schema; left out."
+        findings.append(Finding("crc", topic, sentence, value=float(count)))
+    return findings
+
+
+def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
+    """Messages written behind a later one of their own channel."""
+    back = [(topic, o) for topic, o in order if o.back]
     if not back:
         return []
-    count = sum(o.back for o in back.values())
-    largest = max(o.largest for o in back.values()) / SECOND
+    count = sum(o.back for _, o in back)
+    largest = max(o.largest for _, o in back) / SECOND
     sentence = (
-        f"The log's times step back {count} times on {_topics(back)}, by up to {largest:.3g} s; "
-        "the messages were sorted."
+        f"The log's times step back {count} times on {_topics({topic for topic, _ in back})}, "
+        f"by up to {largest:.3g} s; the messages were sorted."
     )
     return [Finding("out_of_order", "log", sentence, value=largest, unit="s")]
 
 
-def repeats(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
-    """Stamps that step back, and messages that came twice. `frame` is sorted by log time."""
-    stamp = frame["stamp"]
-    if stamp.null_count() == frame.height:
-        return []
-    step = stamp.drop_nulls().diff()
-    if (step.drop_nulls() > 0).all():
-        return []
+def twice(frame: pl.DataFrame) -> set[int]:
+    """Log times of the messages that share their stamp with another, and may be the same one."""
+    stamp = pl.col("stamp")
+    shared = frame.filter(stamp.is_not_null()).filter(stamp.is_duplicated())
+    return set(shared["log_time"].to_list())
+
+
+def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> list[Finding]:
+    """Stamps that step back, and messages that came `again` [ns]. Sorted by log time."""
     findings = []
+    step = frame["stamp"].drop_nulls().diff()
     back = step.filter(step < 0)
     if len(back):
         largest = -float(back.min()) / SECOND  # type: ignore[arg-type]
         sentence = f"The stamps on {topic} step back {len(back)} times, by up to {largest:.3g} s."
         findings.append(Finding("out_of_order", topic, sentence, value=largest, unit="s"))
-    same = frame.select("log_time", "stamp", DIGEST).filter(
-        stamp.is_duplicated() & stamp.is_not_null()
-    )
-    twice = same.filter(~pl.struct("stamp", DIGEST).is_first_distinct())
-    if twice.height:
-        start = seconds(int(twice["log_time"][0]), first)
-        times = "once" if twice.height == 1 else f"{twice.height} times"
+    if again:
+        start = seconds(min(again), first)
+        times = "once" if len(again) == 1 else f"{len(again)} times"
         sentence = f"A message on {topic} came again {times} with the same stamp and content."
         findings.append(
-            Finding("duplicate", topic, sentence, start_s=start, value=float(twice.height))
+            Finding("duplicate", topic, sentence, start_s=start, value=float(len(again)))
         )
     return findings
 

@@ -1,13 +1,12 @@
 """Logs in: an MCAP file to one table a topic, with a report of what was lost on the way.
 
-Rerun's reader is not used here although it is fast: it never returns from a corrupt zstd chunk and
-ends the whole process on a payload it cannot decode, such as an enum number newer than the schema.
+A clean log goes through Rerun's reader (`rerun_route`), what that cannot take through the packages
+of each encoding (`salvage`). Both give the same tables.
 """
 
 from __future__ import annotations
 
 import hashlib
-import logging
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,11 +16,9 @@ import polars as pl
 from shiplog.exceptions import LogUnreadable
 from shiplog.findings import Finding
 
-from . import container, faults
-from .gather import DIGEST, Gatherer
+from . import container, faults, rerun_route, salvage
 from .sample import sample
-
-log = logging.getLogger(__name__)
+from .tables import Tables, Tally
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +71,10 @@ class Reading:
 def contents(path: str | Path) -> Contents:
     """Topics, counts and metadata: from the summary alone when there is a sound one."""
     found = container.survey(Path(path))
-    if found.summary is not None and found.summary.statistics is not None:
-        return _contents(found, found.summary.statistics.channel_message_counts)
-    gatherer = Gatherer(found, {})
-    for block in container.blocks(found):
-        gatherer.take(block, decode=False)
-    return _contents(found, gatherer.counts)
+    if found.statistics is not None:
+        return _contents(found, found.statistics.channel_message_counts)
+    tally = salvage.read_all(Tables(found, {}))
+    return _contents(found, tally.counts)
 
 
 def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) -> Reading:
@@ -88,16 +83,21 @@ def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) 
     wanted  topic -> field paths; None is every topic and every field but bytes. A path may index
             a list (`position_covariance[0]`) and step into JSON inside a text (`value.lon`).
     """
-    found = container.survey(Path(path))
-    gatherer = Gatherer(found, wanted)
-    for block in container.blocks(found):
-        gatherer.take(block)
-    frames = {name: table.finish() for name, table in gatherer.tables.items() if table.parts}
-    count = sum(gatherer.counts.values())
-    _refuse_nothing(found, gatherer, count, frames)
-    health = _health(found, gatherer, frames)
-    frames = {name: frame.drop(DIGEST) for name, frame in frames.items()}
-    return Reading(_contents(found, gatherer.counts), health, frames)
+    path = Path(path)
+    tables = Tables(container.survey(path), wanted)
+    done: set[str] = set()
+    tally = None
+    if rerun_route.worth_it(tables):
+        tally = rerun_route.preflight(tables.found)
+        if tally is not None:
+            done = rerun_route.read_most(tables, tally)
+    if tally is None or (left := tables.topics(tally) - done):
+        tables.found = container.survey(path)
+        tally = salvage.read_all(tables, None if tally is None else left)
+    frames = tables.finish()
+    _refuse_nothing(tables, tally, frames)
+    health = _health(tables, tally, frames)
+    return Reading(_contents(tables.found, tally.counts), health, frames)
 
 
 def fields(
@@ -145,47 +145,32 @@ def _merged(one: Topic, other: Topic) -> Topic:
     )
 
 
-def _health(
-    found: container.Survey, gatherer: Gatherer, frames: Mapping[str, pl.DataFrame]
-) -> Health:
-    count = sum(gatherer.counts.values())
-    statistics = found.summary.statistics if found.summary else None
-    damaged = bool(found.losses or gatherer.orphans or gatherer.broken_blocks)
+def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> Health:
+    found, count = tables.found, sum(tally.counts.values())
+    damaged = bool(found.losses or tally.orphans)
     lost: int | None = None if damaged else 0
-    if statistics is not None:
-        lost = max(statistics.message_count - count, 0)
-    findings = faults.losses(found.losses, gatherer.first, lost)
-    findings += _undecoded(gatherer)
-    findings += faults.disorder(gatherer.order)
+    if found.statistics is not None:
+        lost = max(found.statistics.message_count - count, 0)
+    findings = faults.losses(found.losses, tally.first, lost)
+    findings += faults.undecoded(tally.orphans, tables.failed)
+    findings += faults.disorder([(found.channels[n].topic, o) for n, o in tally.order.items()])
+    suspects = {topic: times for topic, frame in frames.items() if (times := faults.twice(frame))}
+    again = salvage.repeated(found.path, suspects) if suspects else {}
     for topic, frame in frames.items():
-        findings += faults.repeats(topic, frame, gatherer.first or 0)
+        findings += faults.repeats(topic, frame, tally.first or 0, again.get(topic, []))
     findings += faults.clocks(frames)
-    whole = statistics is not None and lost == 0 and not damaged and not found.unvouched
+    whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,
-        tuple(findings), gatherer.undecodable,
+        tuple(findings), tables.undecodable,
     )  # fmt: skip
 
 
-def _undecoded(gatherer: Gatherer) -> list[Finding]:
-    """Messages whose bytes arrived whole but do not fit their schema."""
-    findings = []
-    if gatherer.orphans:
-        sentence = f"{gatherer.orphans} messages belong to channels whose description is lost."
-        findings.append(Finding("crc", "log", sentence, value=float(gatherer.orphans)))
-    for topic, table in gatherer.tables.items():
-        if table.failed:
-            sentence = f"{table.failed} messages on {topic} do not fit their schema; left out."
-            findings.append(Finding("crc", topic, sentence, value=float(table.failed)))
-    return findings
-
-
-def _refuse_nothing(
-    found: container.Survey, gatherer: Gatherer, count: int, frames: Mapping[str, pl.DataFrame]
-) -> None:
+def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> None:
     """Say why when a log gives nothing at all."""
-    if gatherer.undecodable and not frames:
-        reasons = ", ".join(sorted(set(gatherer.undecodable.values())))
+    found, count = tables.found, sum(tally.counts.values())
+    if tables.undecodable and not frames:
+        reasons = ", ".join(sorted(set(tables.undecodable.values())))
         raise LogUnreadable(
             f"{found.path} has {count} messages, but none can be decoded: {reasons}.",
             hint="shiplog reads protobuf, ROS 2 CDR (ros2msg) and JSON; convert or record again.",

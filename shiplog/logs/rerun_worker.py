@@ -8,6 +8,7 @@ columns then stand in the folder as `<number>.arrow`. The end of stdin ends the 
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import json
 import os
@@ -21,7 +22,7 @@ import pyarrow.compute as pc
 from rerun.chunk import McapReader
 
 DECODERS = ["protobuf", "ros2_reflection"]  # the lossless ones: the others reshape what they know
-TIMES = {"log_time": "message_log_time", "publish_time": "message_publish_time"}
+TIMES = ("log_time", "publish_time")
 
 
 def entity(topic: str) -> str:
@@ -39,20 +40,19 @@ def extract(path: str, folder: Path, topics: Mapping[str, Sequence[str]]) -> lis
     rows = [0] * len(fields)
     writers: dict[int, pa.RecordBatchFileWriter] = {}
     exactly = [f"^{re.escape(topic)}$" for topic in topics]
-    for chunk in McapReader(path, decoders=DECODERS, include_topic_regex=exactly).stream():
-        number = numbers.get(entity(chunk.entity_path))
-        if number is None or chunk.is_static:
-            continue
-        batch = columns(chunk.to_record_batch(), fields[number])
-        if batch is None:
-            continue
-        if number not in writers:
-            target = str(folder / f"{number}.arrow")
-            writers[number] = pa.ipc.new_file(target, batch.schema)
-        writers[number].write_batch(batch)
-        rows[number] += batch.num_rows
-    for writer in writers.values():
-        writer.close()
+    with contextlib.ExitStack() as files:
+        for chunk in McapReader(path, decoders=DECODERS, include_topic_regex=exactly).stream():
+            number = numbers.get(entity(chunk.entity_path))
+            if number is None or chunk.is_static:
+                continue
+            batch = columns(chunk.to_record_batch(), fields[number])
+            if batch is None:
+                continue
+            if number not in writers:
+                target = str(folder / f"{number}.arrow")
+                writers[number] = files.enter_context(pa.ipc.new_file(target, batch.schema))
+            writers[number].write_batch(batch)
+            rows[number] += batch.num_rows
     return rows
 
 
@@ -64,8 +64,9 @@ def columns(batch: pa.RecordBatch, fields: Sequence[str]) -> pa.RecordBatch | No
     messages = batch.column(found[0]).flatten()
     if len(messages) != batch.num_rows or messages.null_count:
         return None
-    made = {name: batch.column(index).cast(pa.int64()) for name, index in TIMES.items()}
-    made |= {field: pc.struct_field(messages, field.split(".")) for field in fields}
+    made = {f":{name}": batch.column(f"message_{name}").cast(pa.int64()) for name in TIMES}
+    for field in fields:
+        made[field] = pc.struct_field(messages, field.split("."))  # type: ignore[attr-defined]
     return pa.RecordBatch.from_pydict(made)
 
 

@@ -83,9 +83,7 @@ class FeedForward(nn.Module):
         super().__init__()
         self.shape, self.scaling = shape, scaling
         widths = [shape.inputs, *[shape.width] * shape.depth, 3]
-        self.layers = nn.ModuleList(
-            nn.Linear(a, b) for a, b in pairwise(widths)
-        )
+        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(widths))
 
     @property
     def weights(self) -> list[Tensor]:

@@ -31,7 +31,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     winds = [
         rrb.Spatial2DView(
             origin=entity("hist", "wind", of),
-            name=f"Apparent wind, {of} [rows, log scale]",
+            name=f"Apparent wind, {_whose(drawn, of)} [rows, log scale]",
             background=list(style.PAPER),
             visual_bounds=_wind_bounds(drawn),
         )
@@ -49,6 +49,11 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     if voyage is not None:
         return rrb.Horizontal(*(winds or singles[:2]))
     return rrb.Grid(*singles, *winds, grid_columns=3, name="Histograms")
+
+
+def _whose(drawn: Drawn, of: str) -> str:
+    """Training of which model, where a picture shows several."""
+    return f"{of} of {drawn.trained}" if of == "training" and drawn.trained else of
 
 
 def send(recording: rr.RecordingStream, drawn: Drawn) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
@@ -28,36 +26,31 @@ MOST_TABS = 6  # voyages beyond are in the entity tree: more tabs than fit are n
 
 
 def write(comparison: Comparison, path: Path) -> None:
-    """Write the recording whole or not at all."""
+    """Write the recording whole or not at all.
+
+    It is made in memory: Rerun's own file sink waits for ever on a disk that is full.
+    """
     rr.set_strict_mode(True)  # else what Rerun cannot draw is left out with a warning
     recording = rr.RecordingStream("shiplog")
+    made = recording.binary_stream()
     picture = display.drawn(comparison)
+    recording.send_recording_name(comparison.title)
+    recording.send_blueprint(layout(picture))
+    for view in VIEWS.values():
+        view.send(recording, picture)
+    content = made.read() or b""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with _saying_what_failed(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            recording.save(partial, default_blueprint=layout(picture))
-        recording.send_recording_name(comparison.title)
-        for view in VIEWS.values():
-            view.send(recording, picture)
-        with _saying_what_failed(path):
-            recording.flush()
-            recording.disconnect()
-            partial.replace(path)
-    finally:
-        recording.disconnect()
-        partial.unlink(missing_ok=True)
-
-
-@contextmanager
-def _saying_what_failed(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, RuntimeError) as error:  # RuntimeError: Rerun's own, such as a full disk
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_bytes(content)
+        partial.replace(path)
+    except OSError as error:
         raise ShiplogError(
             f"The recording {path} could not be written: {error}.",
-            hint="is the disk full, the folder writable, the variable RERUN unset?",
+            hint="is the disk full, is the folder writable?",
         ) from error
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def layout(picture: Drawn) -> rrb.Blueprint:

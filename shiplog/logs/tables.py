@@ -1,0 +1,164 @@
+"""One table a topic, of the columns that were asked for, whichever route its rows came by."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import polars as pl
+from mcap.records import Channel
+
+from .container import Survey
+from .decoders import Decoder, Undecodable, decoder
+from .fields import is_text, locate, settled, stamp_leaves, stamps, value
+
+log = logging.getLogger(__name__)
+
+TIMES = ("log_time", "publish_time", "stamp")
+
+
+@dataclass(slots=True)
+class Table:
+    """One topic's rows so far."""
+
+    parts: list[pl.DataFrame] = field(default_factory=list)
+    texts: set[str] = field(default_factory=set)  # columns taken out of JSON, typed at the end
+
+    def finish(self) -> pl.DataFrame:
+        parts, self.parts = self.parts, []
+        frame = parts[0] if len(parts) == 1 else _joined(parts)
+        parts.clear()
+        for name in self.texts & set(frame.columns):
+            frame = frame.with_columns(settled(frame[name]))
+        times = frame["log_time"]
+        return frame if times.is_sorted() else frame.sort("log_time", maintain_order=True)
+
+
+@dataclass(slots=True)
+class Order:
+    """Whether a channel's messages were written in the order of their log time."""
+
+    last: int
+    back: int = 0  # how many steps back in time
+    largest: int = 0  # ns
+
+
+@dataclass(slots=True)
+class Tally:
+    """The messages of a log, counted by channel."""
+
+    counts: dict[int, int] = field(default_factory=dict)
+    order: dict[int, Order] = field(default_factory=dict)
+    first: int | None = None
+    orphans: int = 0  # messages of channels that nothing defines
+
+    def note(self, channel: int, times: np.ndarray, known: bool) -> None:
+        """Count messages by their log times [n], in file order."""
+        if not known:
+            self.orphans += len(times)
+        if not known or not len(times):
+            return
+        self.counts[channel] = self.counts.get(channel, 0) + len(times)
+        earliest = int(times.min())
+        self.first = earliest if self.first is None else min(self.first, earliest)
+        order = self.order.setdefault(channel, Order(int(times[0])))
+        steps = np.diff(times, prepend=order.last)
+        order.back += int((steps < 0).sum())
+        order.largest = max(order.largest, -int(steps.min()))
+        order.last = int(times[-1])
+
+
+class Tables:
+    """What is wanted of a log, how its topics are decoded, and the rows that there are."""
+
+    def __init__(self, found: Survey, wanted: Mapping[str, Collection[str]] | None) -> None:
+        self.found, self.wanted = found, wanted
+        self.failed: dict[str, int] = {}  # messages by topic whose payload did not decode
+        self.undecodable: dict[str, str] = {}
+        self._tables: dict[str, Table] = {}
+        self._decoders: dict[int, Decoder | None] = {}
+        self._shared: dict[tuple, Decoder | Undecodable] = {}
+
+    def finish(self) -> dict[str, pl.DataFrame]:
+        return {topic: t.finish() for topic, t in self._tables.items() if t.parts}
+
+    def decoder(self, channel: Channel) -> Decoder | None:
+        """The decoder of a wanted topic; None for what is not wanted or cannot be decoded."""
+        if self.wanted is not None and channel.topic not in self.wanted:
+            return None
+        if channel.id not in self._decoders:
+            schema = self.found.schemas.get(channel.schema_id)
+            key = (channel.message_encoding, schema and (schema.name, schema.encoding, schema.data))
+            if key not in self._shared:
+                try:
+                    self._shared[key] = decoder(channel, schema)
+                except Undecodable as reason:
+                    self._shared[key] = reason
+            made = self._shared[key]
+            if isinstance(made, Undecodable):
+                self.undecodable[channel.topic] = str(made)
+            self._decoders[channel.id] = None if isinstance(made, Undecodable) else made
+        return self._decoders[channel.id]
+
+    def topics(self, tally: Tally) -> set[str]:
+        """The wanted topics that have messages and can be decoded."""
+        channels = [self.found.channels[number] for number in tally.counts]
+        return {c.topic for c in channels if self.decoder(c) is not None}
+
+    def leaves(self, topic: str, reader: Decoder) -> list[str] | None:
+        """The leaves to decode; None where only the messages know them (JSON)."""
+        if not reader.layout:
+            return None
+        if self.wanted is None:
+            return [leaf for leaf in reader.layout if leaf not in reader.bulk]
+        asked = (*self.wanted[topic], *stamp_leaves(reader.layout))
+        found = [locate(path, reader.layout) for path in asked]
+        return list(dict.fromkeys(at[0] for at in found if at))
+
+    def add(self, topic: str, frame: pl.DataFrame, logged: pl.Series, published: pl.Series) -> None:
+        """Rows of one topic: its leaves, and the two times that are not in the messages."""
+        table = self._tables.setdefault(topic, Table())
+        if not len(logged):
+            return
+        nothing = pl.Series("stamp", [None] * len(logged), pl.Int64)
+        stamp = stamps(frame, stamp_leaves(frame.schema)) if frame.width else nothing
+        columns = [s.rename(n) for n, s in zip(TIMES, (logged, published, stamp), strict=True)]
+        if self.wanted is None:
+            columns += [s for s in frame.get_columns() if s.name not in TIMES]
+            table.parts.append(pl.DataFrame(columns))
+            return
+        expressions = []
+        for path in self.wanted[topic]:
+            at = locate(path, frame.schema)
+            if at is not None and path not in TIMES:
+                expressions.append(value(*at, frame.schema[at[0]]).alias(path))
+                if is_text(*at, frame.schema):
+                    table.texts.add(path)
+        table.parts.append(pl.DataFrame(columns + frame.select(expressions).get_columns()))
+
+
+def _joined(parts: list[pl.DataFrame]) -> pl.DataFrame:
+    try:
+        return pl.concat(parts, how="diagonal_relaxed", rechunk=False)
+    except Exception as error:  # one name, two kinds of value
+        log.debug("columns of two types become text: %s", error)
+    kinds: dict[str, set] = {}
+    for part in parts:
+        for name, dtype in part.schema.items():
+            kinds.setdefault(name, set()).add(dtype)
+    mixed = [n for n, types in kinds.items() if len(types - {pl.Null}) > 1]
+    mixed = [n for n in mixed if not all(t.is_numeric() or t == pl.Null for t in kinds[n])]
+    texts = [
+        part.with_columns(_as_text(part[name]) for name in mixed if name in part.columns)
+        for part in parts
+    ]
+    return pl.concat(texts, how="diagonal_relaxed", rechunk=False)
+
+
+def _as_text(column: pl.Series) -> pl.Series:
+    if column.dtype.is_nested():
+        texts = [None if item is None else str(item) for item in column.to_list()]
+        return pl.Series(column.name, texts, pl.String)
+    return column.cast(pl.String, strict=False)
