@@ -31,7 +31,6 @@ FAMILIES = {
 
 def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path], dict[str, str]]:
     """Each table, or each voyage in it, to one log. Returns the logs and what was refused."""
-    out.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     refused: dict[str, str] = {}
     for path in tables:
@@ -41,6 +40,7 @@ def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path]
                 continue
             for name, table in voyages(read_table(path), profile, path):
                 target = out / f"{name}.mcap"
+                out.mkdir(parents=True, exist_ok=True)
                 write_log(
                     target,
                     series(table, profile),
@@ -52,7 +52,6 @@ def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path]
                 written.append(target)
         except ShiplogError as error:
             refused[str(path)] = str(error)
-            log.warning("%s refused: %s", path, error)
     return written, refused
 
 
@@ -188,6 +187,7 @@ def convert_topics(folder: Path, profile: Profile, out: Path) -> Path:
             hint="give one .parquet a topic, or a single table.",
         )
     target = out / f"{folder.name}.mcap"
+    out.mkdir(parents=True, exist_ok=True)
     write_log(target, parts, ship=profile.ship.name, datum=profile.site.datum)
     log.info("%s: %d topics", target.name, len(parts))
     return target

@@ -30,8 +30,12 @@ class Ingested:
 
     @property
     def complete(self) -> bool:
-        """Every log was taken and no message of it was lost."""
-        return not self.refused and all(r.messages_lost == 0 for r in self.reports)
+        """Every log was taken, and every message of it could be read."""
+        damaged = {"crc", "truncated"}
+        return not self.refused and not any(
+            report.messages_lost != 0 or any(f.kind in damaged for f in report.findings)
+            for report in self.reports
+        )
 
 
 def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ingested:
@@ -45,7 +49,6 @@ def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ing
             state = store.add(voyage)
         except ShiplogError as error:
             refused[str(path)] = error
-            log.warning("%s refused: %s", path, error.message)
             continue
         reports.append(voyage.report)
         log.info(

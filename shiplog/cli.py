@@ -142,7 +142,7 @@ def _reports(reports) -> str:
 def _leave(done) -> None:
     """Exit 1 where nothing could be taken, 3 where something was lost or refused."""
     for path, error in done.refused.items():
-        typer.echo(f"{path}: {error}", err=True)
+        typer.echo(f"{Path(path).name} refused: {error}", err=True)
     if done.refused and not done.reports:
         raise typer.Exit(1)
     if not done.complete:
@@ -171,7 +171,7 @@ def convert(
     content = {"contract": 1, "logs": [str(path) for path in written], "refused": refused}
     _answer(f"{len(written)} logs in {out}", content, json_to)
     for path, why in refused.items():
-        typer.echo(f"{path}: {why}", err=True)
+        typer.echo(f"{Path(path).name} refused: {why}", err=True)
     if refused:
         raise typer.Exit(LOST if written else 1)
 

@@ -43,9 +43,9 @@ class RunError(ShiplogError):
 
 
 def nearest(name: str, available: Iterable[str]) -> str:
-    """A half sentence naming the closest spelling, or nothing: ``; did you mean '/gyro'?``"""
+    """The closest spelling, to follow a name: `` (did you mean '/gyro'?)``; or nothing."""
     close = difflib.get_close_matches(name, list(available), n=1, cutoff=0.5)
-    return f"; did you mean {close[0]!r}?" if close else ""
+    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:

@@ -195,7 +195,7 @@ def test_an_unknown_log_without_a_profile_says_how_to_draft_one(tmp_path):
 
 
 def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(tmp_path):
-    whole = Path("sample_logs/voyage_5.mcap").read_bytes()
+    whole = (Path(__file__).parents[1] / "sample_logs" / "voyage_5.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
     code, _, _ = call("ingest", cut, "--store", tmp_path / "s", "--json", tmp_path / "a.json")
