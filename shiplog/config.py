@@ -39,7 +39,7 @@ class Fast(Section):
     warm_learning_rate: float = Field(default=1e-3, gt=0)
     regularisation: float = Field(default=1e-2, ge=0)
     memory: int = Field(default=30, gt=0)
-    iterations: int = Field(default=200, gt=0)
+    iterations: int = Field(default=300, gt=0)
     patience: int = Field(default=40, gt=0)  # iterations without a better validation loss
     smoothing: float = Field(default=0.1, gt=0, le=1)
 
