@@ -50,7 +50,7 @@ class Evaluation:
 
     def text(self) -> str:
         """Markdown: models against floors, voyages, the worst windows of the first run."""
-        answers = {f"{run.name}: {run.config.label}": self.answer(run) for run in self.runs}
+        answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
         first = next(iter(answers.values()))
         errors = self.errors.filter(pl.col("run") == self.runs[0].name)
         count = first["windows"]

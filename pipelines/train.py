@@ -56,7 +56,7 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     run = runs.create(
         out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
     )
-    log.info("training %s on %d windows of %s", config.label, chosen.height, listed(split.training))
+    log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
 
     began = time.time()
     todo = [seed for seed in config.seeds if not run.finished(seed)]
@@ -324,13 +324,13 @@ def train_command(
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     said = ", ".join(f"{loss:.0f}" for loss in best.values())
     text = (
-        f"{config.label} in {run.path}: best validation L {said} (seeds 0 to {seeds - 1}).\n"
+        f"{run.label} in {run.path}: best validation L {said} (seeds 0 to {seeds - 1}).\n"
         f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
     content = {
         "contract": CONTRACT,
         "run": str(run.path),
-        "label": config.label,
+        "label": run.label,
         "windows": run.windows().height,
         "validation_loss": list(best.values()),
         "split": split.model_dump(mode="json"),

@@ -83,12 +83,6 @@ class Config(Section):
         )
         return {**values, "network": network}
 
-    @property
-    def label(self) -> str:
-        """How results are headed, the recipe always among it."""
-        wind = {"angle": "wind angle", "components": "wind components"}[self.network.wind_input]
-        return f"{self.model} {self.data} ({self.recipe} recipe, {wind})"
-
     def to_toml(self) -> str:
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
 

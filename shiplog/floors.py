@@ -23,7 +23,7 @@ class LeastSquares:
 
     The regression every towing tank starts from (Abkowitz, 1980; moduli after Fedyaevsky and
     Sobolev, 1964), fitted to differentiated velocities. A rollout that leaves the range of
-    velocities it was fitted on is held at its edge, since a parabola knows nothing there.
+    what it was fitted on goes no further, since a parabola knows nothing there.
     """
 
     scale: Tensor  # [terms] spread of each term over the training data
@@ -32,8 +32,11 @@ class LeastSquares:
     coefficients: Tensor  # [terms, 3]
 
     def __call__(self, state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
-        velocity = state[..., list(VELOCITY_IN_STATE)].clamp(self.low, self.high)
-        return kinematics(state, terms(velocity, actuator, wind) / self.scale @ self.coefficients)
+        velocity = state[..., list(VELOCITY_IN_STATE)]
+        inside = velocity.clamp(self.low, self.high)
+        rate = terms(inside, actuator, wind) / self.scale @ self.coefficients
+        outward = ((velocity > self.high) & (rate > 0)) | ((velocity < self.low) & (rate < 0))
+        return kinematics(state, torch.where(outward, 0.0, rate))
 
 
 def least_squares(training: Windows, ridge: float = 1e-6) -> LeastSquares:

@@ -48,6 +48,12 @@ class Run:
         return self.path.name.removesuffix(".partial")
 
     @property
+    def label(self) -> str:
+        """How results are headed: model, data, recipe, and how the wind enters if it does."""
+        wind = f", wind {self.config.network.wind_input}" if self.profile.has_wind else ""
+        return f"{self.config.model} {self.config.data} ({self.config.recipe} recipe{wind})"
+
+    @property
     def shape(self) -> Shape:
         net = self.config.network
         return Shape(

@@ -36,6 +36,7 @@ def test_a_run_comes_back_as_it_was(begun):
     done = run.finish({"shiplog": "test"})
     opened = runs.load(done.path)
     assert opened.config == CONFIG
+    assert opened.label == "feedforward ref (paper recipe, wind angle)"
     assert opened.profile.model_dump() == PROFILE.model_dump()
     for weight, best in zip(opened.model(1).weights, progress.best_weights, strict=True):
         assert torch.equal(weight, best.double())

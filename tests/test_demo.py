@@ -1,0 +1,37 @@
+"""The main job on the sample logs, with a training of a few iterations."""
+
+import json
+
+from rerun.chunk import RrdReader
+
+from pipelines import demo
+from shiplog.config import Fast
+from shiplog.store import Store
+
+
+def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monkeypatch):
+    monkeypatch.setattr(demo, "SEEDS", (0,))
+    monkeypatch.setattr(demo, "RECIPE", Fast(iterations=4, warm_epochs=2))
+    first = demo.run_demo(tmp_path / "demo", None)
+    said = str(RrdReader(str(first.recording)).store().summary())
+    for word in ("/track/voyage_6/measured", "/track/voyage_6/simulated", "/hist/wind/training",
+                 "/error/voyage_6", "/state/voyage_6/surge/measured", "/report"):  # fmt: skip
+        assert word in said, word
+    names = {e.name: e.findings for e in Store(tmp_path / "demo" / "store").entries()}
+    assert sorted(names) == ["season2_1", "season2_2", *(f"voyage_{i}" for i in range(1, 7))]
+    # What its README says is wrong with voyage_4: two spikes, and no GNSS for three seconds,
+    # which position and velocity both lack.
+    assert names["voyage_4"] == 4 and sum(names.values()) == 4
+    ref, doubled = first.content["runs"]["ref"], first.content["runs"]["d-ref"]
+    assert ref["windows"] == doubled["windows"] == 12
+    assert ref["voyages"]["voyage_6"]["coverage"] < 0.5
+    assert "never seen: wind" in first.text
+    json.dumps(first.content)
+
+    trained = (
+        (tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors").stat().st_mtime_ns
+    )
+    again = demo.run_demo(tmp_path / "demo", None)
+    assert again.content["runs"] == first.content["runs"]
+    path = tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors"
+    assert path.stat().st_mtime_ns == trained
