@@ -13,7 +13,7 @@ import numpy as np
 
 RATE_HZ = 10.0
 STEP_NS = 100_000_000
-EXACT_NS = 1_000_000  # a sample this close to a grid time is that grid time's own
+EXACT_NS = 1_000  # a sample this close to a grid time is that grid time's own
 LEAST_TOLERANCE_S = 0.15
 
 

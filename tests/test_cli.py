@@ -231,6 +231,25 @@ def test_tables_become_logs_and_come_back_as_they_were(tmp_path):
     assert back["propeller"].to_numpy() == pytest.approx(10.0)
 
 
+def test_servo_pulses_become_commands_about_their_neutral(tmp_path):
+    count = 200
+    columns = {
+        name: [0.0] * count for name in ("x_ned", "y_ned", "yaw", "surge", "sway", "yaw_rate")
+    }
+    pulses = {"thr_left": [1711.0] * count, "thr_right": [1311.0] * count}
+    stamps = {"original_timestamp": [100.0 * i for i in range(count)], "run_id": ["7"] * count}
+    pl.DataFrame(stamps | columns | pulses).write_parquet(tmp_path / "b.parquet")
+    assert (
+        call("convert", tmp_path / "b.parquet", "--profile", "blueboat", "--out", tmp_path)[0] == 0
+    )
+    assert call("ingest", tmp_path / "7.mcap", "--store", tmp_path / "store")[0] == 0
+    (path,) = (tmp_path / "store").rglob("table.parquet")
+    back = pl.read_parquet(path)
+    assert back["thruster_port"].to_numpy() == pytest.approx(0.5)
+    assert back["thruster_starboard"].to_numpy() == pytest.approx(-0.5)
+    assert (back["quality"] == 0).all()
+
+
 def test_a_table_without_a_column_names_it(tmp_path):
     with (tmp_path / "t.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["t_s", "x0_m"], [0.0, 1.0]])

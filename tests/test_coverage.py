@@ -52,6 +52,14 @@ def test_a_speed_never_sailed_is_named_and_the_wind_is_not(seen):
     assert "surge" in coverage.reason(row, test) and "wind" not in coverage.reason(row, test)
 
 
+def test_a_hole_in_the_middle_of_the_training_speeds_is_outside():
+    slow, fast = seconds(1500, 0.0, 0, surge=0.0), seconds(1500, 0.0, 1, surge=1.2)
+    seen = coverage.of(pl.concat([slow, fast]), ("rudder",), has_wind=True)
+    between = seconds(200, 0.0, 2, surge=0.6)
+    assert seen.outside(between)["surge"].mean() > 0.95
+    assert seen.outside(fast)["surge"].mean() == 0.0
+
+
 def test_the_paper_s_wind_bins_do_not_jump_at_the_bow():
     training = seconds(3000, 0.0, 0)
     turned = training.with_columns(wind_angle=pl.col("wind_angle") + 2 * np.pi)

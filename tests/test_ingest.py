@@ -55,6 +55,20 @@ def test_a_turning_ship_is_reduced_to_midship(voyage):
     assert (table["quality"] == 0).all()
 
 
+def test_a_compass_at_its_own_rate_is_interpolated_through_south(voyage):
+    parts = sailing.series()
+    t = np.arange(0.011, 59.5, 0.103)
+    gyro = {
+        "heading_deg": np.degrees(3.0 + 0.04 * t) % 360.0,
+        "rate_degpmin": np.full(len(t), np.degrees(0.04) * 60),
+    }
+    own = Series("/gyro", "test.Gyro", sailing.stamps(t), gyro)
+    table = voyage({**parts, "/gyro": own}).table
+    t = (table["time"].to_physical().to_numpy() - sailing.START) * 1e-9
+    wrapped = (3.0 + 0.04 * t + np.pi) % (2 * np.pi) - np.pi
+    assert table["heading"].to_numpy() == pytest.approx(wrapped, abs=1e-9)
+
+
 def test_the_table_is_10_hz_and_whole(voyage):
     done = voyage()
     assert done.table["time"].diff().drop_nulls().unique().to_list() == [

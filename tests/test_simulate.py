@@ -44,6 +44,15 @@ def test_heading_counts_on_and_a_held_velocity_sails_a_circle():
     assert path[-1, 2].item() == pytest.approx(-20 * (math.cos(heading) - math.cos(3.0)), abs=0.01)
 
 
+def test_a_drifting_ship_moves_over_ground_by_its_turned_velocity():
+    state = torch.tensor([[1.0, 0.3, 2.0, 0.2, 0.7, 0.0]], dtype=torch.float64)
+    none = torch.zeros(1, 11, 0, dtype=torch.float64)
+    path = rollout(floors.hold, state, none, none, torch.ones(1, 10, dtype=torch.float64))[0, -1]
+    c, s = math.cos(0.7), math.sin(0.7)
+    assert path[0].item() == pytest.approx(1.0 + 10 * (0.3 * c - 0.2 * s))
+    assert path[2].item() == pytest.approx(2.0 + 10 * (0.3 * s + 0.2 * c))
+
+
 def one_window(simulated_offset):
     """Measured at rest at the origin; a model that stands still but starts elsewhere."""
     size = 11

@@ -75,6 +75,13 @@ def test_training_stops_once_the_validation_loss_has_risen_and_not_before():
     assert not any(risen(epoch) for epoch in range(31, last))
 
 
+def test_training_goes_on_while_the_least_epochs_are_not_exceeded():
+    _, _, model, batches = setting()
+    settings = Paper(learning_rate=3e-2, regularisation=0.0, least_epochs=200, rise=0.02)
+    progress = train.paper(model, *batches, settings, seed=0)
+    assert progress.epoch == 201  # risen long before, as the test above shows
+
+
 def test_the_defaults_are_table_5_and_section_4_3():
     assert Paper().model_dump() == {
         "learning_rate": 1e-4, "regularisation": 1e-2, "subsets": 3, "smoothing": 0.1,

@@ -65,6 +65,15 @@ def test_every_sample_can_be_traced_to_its_row():
         assert made.plan["elapsed"][i] == row["start"]
 
 
+@pytest.mark.parametrize(("length", "count"), [(99, 0), (100, 1), (199, 1), (200, 2)])
+def test_the_last_window_ends_with_the_last_row(length, count):
+    frame = seconds((length,))
+    plan = planned(frame, "ref")
+    assert plan.height == count
+    if count:
+        assert cut(frame, plan).state[-1, -1, 1] == 100 * count - 1
+
+
 def test_no_window_crosses_a_gap():
     frame = seconds((250,), gap_after=130)
     made = cut(frame, planned(frame, "sli10"))
