@@ -10,11 +10,12 @@ from pathlib import Path
 import polars as pl
 
 from shiplog import profile as profiles
-from shiplog import table
+from shiplog import report, table
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.findings import VoyageReport
 from shiplog.ingest import ingest
-from shiplog.logs.read import contents
+from shiplog.logs.check import check
+from shiplog.logs.read import Contents, contents
 from shiplog.profile import Profile
 from shiplog.store import Store
 
@@ -43,9 +44,20 @@ def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ing
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
+    said: set[str] = set()
     for path in paths:
         try:
-            voyage = ingest(path, chosen or fitting_profile(path))
+            found = contents(path)
+            profile_of = chosen or fitting_profile(found)
+            if profile_of.source not in said:
+                said.add(profile_of.source)
+                for line in report.estimated(profile_of):
+                    log.info(line)
+            if store.holds(path.stem, found.sha256, profile_of):
+                reports.append(store.report(path.stem))
+                log.info("%s: unchanged", path.stem)
+                continue
+            voyage = ingest(path, profile_of)
             state = store.add(voyage)
         except ShiplogError as error:
             refused[str(path)] = error
@@ -61,9 +73,9 @@ def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ing
     return Ingested(reports, refused)
 
 
-def fitting_profile(path: Path) -> Profile:
-    """The shipped profile that the log names, or whose topics it carries. Raises ProfileError."""
-    found = contents(path)
+def fitting_profile(found: Contents) -> Profile:
+    """The shipped profile that a log names, or whose topics it carries. Raises ProfileError."""
+    path = found.path
     ship = found.metadata.get("voyage", {}).get("ship")
     fitting = [
         candidate
@@ -100,8 +112,6 @@ def expand(paths: Iterable[Path]) -> list[Path]:
 
 def check_logs(paths: Sequence[Path]) -> Ingested:
     """The health of each log by itself; nothing is stored."""
-    from shiplog.logs.check import check
-
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
     for path in expand(paths):

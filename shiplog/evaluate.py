@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from shiplog import channels
+from shiplog.models.base import Dynamics
 from shiplog.simulate import simulate
 from shiplog.windows import Windows
 
@@ -39,7 +40,7 @@ class Scores:
     errors: pl.DataFrame
 
 
-def score(dynamics, windows: Windows) -> Scores:
+def score(dynamics: Dynamics, windows: Windows) -> Scores:
     """Roll a model out over the windows and compare. A rollout that diverges scores infinity."""
     simulated = simulate(dynamics, windows)
     d = prediction_error(simulated, windows.state)

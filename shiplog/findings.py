@@ -54,6 +54,15 @@ class VoyageReport:
     seconds: float
     findings: tuple[Finding, ...] = field(default=())
 
+    @classmethod
+    def from_json(cls, content: dict) -> VoyageReport:
+        """What `as_json` made."""
+        counts = content["messages"]
+        return cls(
+            content["name"], counts["read"], counts["lost"], content["rows"], content["seconds"],
+            tuple(Finding(**finding) for finding in content["findings"]),
+        )  # fmt: skip
+
     def as_json(self) -> dict:
         return {
             "name": self.name,

@@ -72,7 +72,7 @@ def catalogue(entries: Sequence[Entry]) -> str:
 
 
 def estimated(profile: Profile) -> list[str]:
-    """Which particulars the profile leaves out."""
+    """Which particulars the profile leaves out, and what stands in for them."""
     missing = [
         name
         for name in (
@@ -88,9 +88,10 @@ def estimated(profile: Profile) -> list[str]:
     ]
     if not missing:
         return []
+    breadth = "; the hull is drawn a sixth as broad as long" if "breadth_m" in missing else ""
     return [
-        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}; the learned "
-        "model does without them."
+        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}: a learned model "
+        f"does without{breadth}."
     ]
 
 

@@ -23,7 +23,7 @@ from urllib.parse import quote
 import polars as pl
 
 from shiplog.exceptions import StoreError, listed, nearest
-from shiplog.findings import CONTRACT
+from shiplog.findings import CONTRACT, VoyageReport
 from shiplog.ingest import Voyage
 from shiplog.profile import Profile
 
@@ -124,9 +124,9 @@ class Store:
         folder = self._folder(name)
         return folder.is_dir() and _facts(folder)["fingerprint"] == fingerprint_of(sha256, profile)
 
-    def report(self, name: str) -> dict:
-        """The ingest report of one voyage, as the contract's JSON has it."""
-        return _facts(self._folder(name))["report"]
+    def report(self, name: str) -> VoyageReport:
+        """What was found when this voyage was ingested."""
+        return VoyageReport.from_json(_facts(self._folder(name))["report"])
 
     def profile(self, names: Iterable[str]) -> Profile:
         """The profile the voyages were read through. Raises StoreError for two ships."""

@@ -105,3 +105,13 @@ def test_two_ships_are_not_mixed(tmp_path, voyage):
 def test_an_empty_store_says_what_to_do(tmp_path):
     with pytest.raises(StoreError, match="shiplog ingest"):
         Store(tmp_path / "nothing").select()
+
+
+def test_what_was_found_comes_back_with_the_voyage(tmp_path, voyage):
+    store = Store(tmp_path / "store")
+    taken = voyage()
+    store.add(taken)
+    assert store.report("one") == taken.report
+    assert store.holds("one", taken.contents.sha256, taken.profile)
+    assert not store.holds("one", "0" * 64, taken.profile)
+    assert not store.holds("two", taken.contents.sha256, taken.profile)

@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import torch
 from torch import Tensor
 
-# (state [N, 6], actuator [N, A], wind [N, 0|2]) -> d(state)/dt [N, 6]
+# A model, called: (state [N, 6], actuator [N, A], wind [N, 0|2]) -> ẋ = f(x, u, ω) of Eq. 2 [N, 6]
 Dynamics = Callable[[Tensor, Tensor, Tensor], Tensor]
-
-
-class DynamicModel(Protocol):
-    """A model of the ship: called, it gives ẋ = f(x, u, ω) of Eq. 2."""
-
-    def __call__(self, state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor: ...
 
 
 def kinematics(state: Tensor, acceleration: Tensor) -> Tensor:
