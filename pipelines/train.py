@@ -64,11 +64,8 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
     workers = max(1, min(cores, len(todo)))
-    with (
-        _threads(max(1, cores // workers)),
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
-    ):
-        futures = {pool.submit(train_seed, run.path, s, max(1, cores // workers)): s for s in todo}
+    with _one_thread(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(train_seed, run.path, seed): seed for seed in todo}
         try:
             for future in as_completed(futures):
                 best, epochs, took = future.result()
@@ -88,11 +85,15 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
 
 
 @contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """Numerical libraries of child processes read these once, at import: one core, one training."""
+def _one_thread() -> Iterator[None]:
+    """One core, one training: numerical libraries of child processes read this at import.
+
+    Two threads on products this small wait for each other more than they work, and on a busy
+    machine for each other alone.
+    """
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, str(count)))
+    os.environ.update(dict.fromkeys(names, "1"))
     try:
         yield
     finally:
@@ -103,9 +104,9 @@ def _threads(count: int) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def train_seed(path: Path, seed: int, threads: int) -> tuple[float, int, float]:
+def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
-    torch.set_num_threads(threads)
+    torch.set_num_threads(1)
     began = time.time()
     run = runs.open_folder(path)
     config = run.config

@@ -16,7 +16,6 @@ import typer
 
 from shiplog import report
 from shiplog.exceptions import ShiplogError
-from shiplog.runs import finite
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -66,12 +65,12 @@ def _answer(text: str, content: dict, json_to: str | None) -> None:
     """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
     if json_to == "-":
         typer.echo(text, err=True)
-        typer.echo(json.dumps(finite(content), indent=1))
+        typer.echo(json.dumps(report.finite(content), indent=1))
         return
     typer.echo(text)
     if json_to:
         try:
-            Path(json_to).write_text(json.dumps(finite(content), indent=1), encoding="utf-8")
+            Path(json_to).write_text(json.dumps(report.finite(content), indent=1), encoding="utf-8")
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",

@@ -15,7 +15,6 @@ Killed, it goes on from the finished seeds and, in the paper's recipe, from the 
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 from dataclasses import dataclass
@@ -32,6 +31,7 @@ from shiplog.config import Config
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.profile import Profile
+from shiplog.report import finite
 from shiplog.train import HISTORY, Progress
 
 
@@ -234,17 +234,6 @@ def write_json(path: Path, content: dict) -> None:
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
     partial.replace(path)
-
-
-def finite(value):
-    """JSON has no infinity: null it, at any depth."""
-    if isinstance(value, dict):
-        return {k: finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _same_rows(partial: Path, training: pl.DataFrame) -> bool:

@@ -1,6 +1,8 @@
 """Imports go one way; only the command line calls pipelines; MCAP and Rerun stay in their rooms."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -58,3 +60,12 @@ def test_imports_go_one_way(path):
 def test_every_room_has_a_level():
     rooms = {p.relative_to(ROOT / "shiplog").parts[0].removesuffix(".py") for p in SOURCES}
     assert rooms - {"__init__"} == set(LEVEL)
+
+
+def test_commands_that_need_no_network_do_not_load_torch():
+    """It costs seconds and 200 MB: ingest, check and voyages do without."""
+    program = (
+        "import sys, shiplog.cli, pipelines.prepare, pipelines.convert; "
+        "sys.exit('torch' in sys.modules or 'rerun' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
