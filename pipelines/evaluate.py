@@ -128,6 +128,7 @@ def comparison(evaluation: Evaluation, title: str) -> Comparison:
         title=title,
         ship_length=profile.ship.length_m,
         ship_breadth=profile.ship.breadth,
+        ship_outline=profile.ship.outline or (),
         actuators=tuple(Actuator(a.name, a.kind, a.si_unit) for a in profile.actuators),
         has_wind=profile.has_wind,
         measured=evaluation.rows.select(

@@ -39,6 +39,7 @@ class Comparison:
     trained     which model that is, where there are several
     summary     Markdown: errors, floors, coverage, findings
     banks       lines of (x0, y0) points a chart shows
+    ship_outline  (ahead, starboard) of midship, m; a pointed box of length and breadth if empty
     """
 
     title: str
@@ -52,6 +53,7 @@ class Comparison:
     summary: str
     banks: tuple[tuple[tuple[float, float], ...], ...] = ()
     trained: str = ""
+    ship_outline: tuple[tuple[float, float], ...] = ()
 
     @property
     def voyages(self) -> list[str]:

@@ -158,10 +158,20 @@ def test_the_error_is_logarithmic_and_of_the_median_seed(saved, compared):
 
 def test_a_turn_to_starboard_turns_clockwise_on_the_chart():
     at = pl.DataFrame({"x0": [0.0, 0.0], "y0": [0.0, 100.0], "heading": [0.0, 90.0]})
-    north, east = trajectory.hulls(at, length=4.0, breadth=1.0)
+    north, east = trajectory.hulls(at, trajectory.HULL * (4.0, 1.0))
     assert north[0] == pytest.approx((0.0, -2.0))  # bow up: Rerun's y points down
     assert east[0] == pytest.approx((102.0, 0.0))  # bow to the right
     assert north[1][0] == pytest.approx(0.5)  # starboard side to the right
+
+
+def test_a_ship_with_an_outline_of_its_own_is_drawn_with_it(compared):
+    ferry = ((2.0, 0.0), (0.0, 1.0), (-2.0, 0.0), (0.0, -1.0))
+    drawn = display.drawn(replace(compared, ship_outline=ferry))
+    at = pl.DataFrame({"x0": [10.0], "y0": [0.0], "heading": [90.0]})
+    (hull,) = trajectory.hulls(at, trajectory.outline(drawn))
+    assert hull[0] == pytest.approx((2.0, -10.0))  # bow to the east
+    assert hull[-1] == pytest.approx(hull[0])  # closed
+    assert hull[1] == pytest.approx((0.0, -9.0))  # starboard is south
 
 
 def test_a_chart_of_the_sea_is_in_kilometres(compared):

@@ -80,6 +80,7 @@ def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
         drawn,
         ship_length=drawn.ship_length / 1000.0,
         ship_breadth=drawn.ship_breadth / 1000.0,
+        ship_outline=tuple((x / 1000.0, y / 1000.0) for x, y in drawn.ship_outline),
         measured=drawn.measured.with_columns(km),
         simulated=drawn.simulated.with_columns(km),
         banks=tuple(tuple((x / 1000.0, y / 1000.0) for x, y in bank) for bank in drawn.banks),
@@ -92,9 +93,16 @@ def positions(table: pl.DataFrame) -> NDArray[np.float64]:
     return np.column_stack((display.column(table, "y0"), -display.column(table, "x0")))
 
 
-def hulls(table: pl.DataFrame, length: float, breadth: float) -> NDArray[np.float64]:
-    """[N, 8, 2] the outline of the ship at every row, to scale."""
-    ahead, starboard = (HULL * (length, breadth)).T  # [8] each
+def outline(drawn: Drawn) -> NDArray[np.float64]:
+    """[K, 2] (ahead, starboard) of midship: the ship's own outline, closed, or one like it."""
+    if not drawn.ship_outline:
+        return HULL * (drawn.ship_length, drawn.ship_breadth)
+    return np.array([*drawn.ship_outline, drawn.ship_outline[0]], dtype=float)
+
+
+def hulls(table: pl.DataFrame, outline: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[N, K, 2] the outline [K, 2] of the ship at every row, to scale."""
+    ahead, starboard = outline.T
     heading = np.radians(display.column(table, "heading"))[:, None]
     east = ahead * np.sin(heading) + starboard * np.cos(heading)
     north = ahead * np.cos(heading) - starboard * np.sin(heading)
@@ -118,7 +126,6 @@ def grid_step(extent: float) -> float:
 def _send_measured(
     recording: rr.RecordingStream, drawn: Drawn, voyage: str, rows: pl.DataFrame
 ) -> None:
-    size = (drawn.ship_length, drawn.ship_breadth)
     recording.log(
         entity("track", voyage, "measured"),
         rr.LineStrips2D(
@@ -134,7 +141,7 @@ def _send_measured(
     recording.log(
         entity("track", voyage, "measured", "hulls"),
         rr.LineStrips2D(
-            _whole(hulls(marks, *size)),
+            _whole(hulls(marks, outline(drawn))),
             colors=style.faded(style.MEASURED, 0.8),
             radii=rr.Radius.ui_points(0.5),
             draw_order=11.0,
@@ -201,7 +208,7 @@ def _send_moving_hull(
     recording.log(
         path,
         rr.LineStrips2D(
-            list(hulls(NORTHWARD, drawn.ship_length, drawn.ship_breadth)),
+            list(hulls(NORTHWARD, outline(drawn))),
             colors=colour,
             radii=rr.Radius.ui_points(1.5),
             draw_order=30.0,
