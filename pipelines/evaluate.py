@@ -58,7 +58,7 @@ class Evaluation:
             f"L is the paper's evaluation function (Eq. 8), mean over {count} windows of "
             f"{self.runs[0].config.window} s and over seeds; yaw rate in deg/s.",
             "",
-            report.models_table(answers, self.floors),
+            report.models_table(answers, self.floors, self.runs[0].name),
             "",
             f"Per voyage, {self.runs[0].name}:",
             "",

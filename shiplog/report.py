@@ -143,8 +143,11 @@ def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl
     return {"contract": CONTRACT, **summary(errors), "floors": floors, "voyages": voyages}
 
 
-def models_table(summaries: dict[str, dict], floors: dict[str, float]) -> str:
-    """One line a model and a floor: what a reader looks at first."""
+def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on: str) -> str:
+    """One line a model and a floor: what a reader looks at first.
+
+    fitted_on: the run whose training data the fitted floor had.
+    """
     rows = []
     for label, s in summaries.items():
         spread = f"{min(s['seeds']):.0f} to {max(s['seeds']):.0f}" if len(s["seeds"]) > 1 else "-"
@@ -160,7 +163,10 @@ def models_table(summaries: dict[str, dict], floors: dict[str, float]) -> str:
                 s["end_heading_deg"],
             )
         )
-    names = {"hold": "floor: hold the velocity", "least_squares": "floor: quadratic least squares"}
+    names = {
+        "hold": "floor: hold the velocity",
+        "least_squares": f"floor: quadratic least squares on the data of {fitted_on}",
+    }
     dash = "-"
     rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
     head = (
