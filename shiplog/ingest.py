@@ -7,7 +7,7 @@ Value columns are SI, angles in (-π, π]; a value that was not measured is null
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import polars as pl
@@ -15,15 +15,10 @@ import polars as pl
 from shiplog import align, channels, midship, quality
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
-from shiplog.findings import Finding, VoyageReport
+from shiplog.findings import VoyageReport
+from shiplog.grid import Grid, mark_gaps, mark_holds, mark_jumps
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-
-# A step starts a new segment where no rollout could shrug it off: worth seconds of the ship's
-# motion and a tenth of its length, or a heading that is another heading.
-JUMP_S = 3.0
-JUMP_LENGTHS = 0.1
-JUMP_RAD = math.radians(30.0)
 
 
 @dataclass(frozen=True)
@@ -38,20 +33,6 @@ class Voyage:
     datum: tuple[float, float] | None  # latitude, longitude [deg] of x0 = y0 = 0
 
 
-@dataclass
-class _Grid:
-    """What is being filled: times [m] ns, columns [m], marks [m], and what was found."""
-
-    times: np.ndarray
-    columns: dict[str, np.ndarray] = field(default_factory=dict)
-    marks: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
-    findings: list[Finding] = field(default_factory=list)
-
-    @property
-    def time_s(self) -> np.ndarray:
-        return (self.times - self.times[0]) * 1e-9
-
-
 def ingest(path, profile: Profile) -> Voyage:
     """Read one log through a profile. Raises LogUnreadable, ChannelMissing, ProfileError."""
     reading = read(path, profile.wanted())
@@ -61,10 +42,7 @@ def ingest(path, profile: Profile) -> Voyage:
 def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
     _require(reading, profile)
-    sampled = {
-        name: _samples(reading, sensor, profile.sensors.kind(name), name)
-        for name, sensor in profile.sensors.items()
-    }
+    sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
@@ -74,16 +52,15 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         )
     driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
     start, end = _span(base, [*sampled.values(), *driven.values()])
-    grid = _Grid(align.grid(start, end))
-    grid.marks = np.zeros(len(grid.times), np.int32)
+    grid = Grid(align.grid(start, end))
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
     for actuator in profile.actuators:
         _actuator(grid, actuator, driven[actuator.name])
-    _gaps(grid)
-    _holds(grid, profile, sampled)
-    _jumps(grid, profile)
+    mark_gaps(grid)
+    mark_holds(grid, profile, sampled)
+    mark_jumps(grid, profile)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}
@@ -98,7 +75,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_read=reading.health.messages_read,
         messages_lost=reading.health.messages_lost,
         rows=table.height,
-        seconds=round(float(grid.time_s[-1]), 3),
+        seconds=round(grid.seconds, 3),
         findings=(*reading.health.findings, *grid.findings),
     )
     return Voyage(report.name, profile, reading.contents, table, report, datum)
@@ -162,12 +139,13 @@ def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     return times.fill_null(0).to_numpy()[known], np.stack(values, axis=1)[known]
 
 
-def _samples(reading: Reading, sensor: Sensor, kind: str, name: str) -> align.Samples:
+def _samples(reading: Reading, profile: Profile, name: str) -> align.Samples:
     """A sensor's samples in a form that can be interpolated, spikes marked.
 
     Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
     components, since halfway between 359° and 1° is 0°.
     """
+    sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
     times, value = _raw(reading, sensor)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
@@ -181,12 +159,10 @@ def _samples(reading: Reading, sensor: Sensor, kind: str, name: str) -> align.Sa
         ]
     samples = align.ordered(times, value, sensor.tolerance_s)
     if name == "heading":
-        samples = _with(samples, value=np.unwrap(samples.value, axis=0))
-    return _with(samples, spike=quality.spikes(_metric(samples.value, kind), _noise(sensor, kind)))
-
-
-def _with(samples: align.Samples, **changes: np.ndarray) -> align.Samples:
-    return replace(samples, **changes)
+        samples = replace(samples, value=np.unwrap(samples.value, axis=0))
+    return _with(
+        samples, spike=quality.spikes(_metric(samples.value, kind), profile.sensors.noise(name))
+    )
 
 
 def _metric(value: np.ndarray, kind: str) -> np.ndarray:
@@ -198,31 +174,23 @@ def _metric(value: np.ndarray, kind: str) -> np.ndarray:
     return (value - value[0]) * np.array([metre, east])
 
 
-def _noise(sensor: Sensor, kind: str) -> float:
-    """Stated accuracy in SI (position in m), 0 where none is stated."""
-    if sensor.sigma is None:
-        return 0.0
-    first = sensor.sigma[0] if isinstance(sensor.sigma, tuple) else sensor.sigma
-    return first if kind == "geodetic" else first * abs(sensor.scale()[0][1])
-
-
 def _motion(
-    grid: _Grid, reading: Reading, profile: Profile, sampled: dict[str, align.Samples]
+    grid: Grid, reading: Reading, profile: Profile, sampled: dict[str, align.Samples]
 ) -> tuple[float, float] | None:
     """Position, heading, velocity and yaw rate at midship. Returns the datum, if geodetic."""
     sensors, kind = profile.sensors, profile.sensors.kind
-    heading = _place(grid, "heading", sampled["heading"])[:, 0]
+    heading = grid.place("heading", sampled["heading"])[:, 0]
     if sensors.yaw_rate is not None:
-        yaw_rate = _place(grid, "yaw_rate", sampled["yaw_rate"])[:, 0]
+        yaw_rate = grid.place("yaw_rate", sampled["yaw_rate"])[:, 0]
     else:
         yaw_rate = np.gradient(heading, align.STEP_NS * 1e-9)
-    position = _place(grid, "position", sampled["position"])
+    position = grid.place("position", sampled["position"])
     datum = None
     if kind("position") == "geodetic":
         datum = _datum(reading, profile, sampled["position"])
         position = midship.local_plane(position[:, 0], position[:, 1], datum)
     position = midship.position_at_midship(position, heading, sensors.position.lever_arm_m)
-    velocity = _place(grid, "velocity", sampled["velocity"])
+    velocity = grid.place("velocity", sampled["velocity"])
     if kind("velocity") != "body":
         velocity = midship.to_body(velocity, heading)
     velocity = midship.velocity_at_midship(velocity, yaw_rate, sensors.velocity.lever_arm_m)
@@ -252,9 +220,9 @@ def _datum(reading: Reading, profile: Profile, position: align.Samples) -> tuple
     return float(position.value[0, 0]), float(position.value[0, 1])
 
 
-def _wind(grid: _Grid, sensor: Sensor, samples: align.Samples) -> None:
+def _wind(grid: Grid, sensor: Sensor, samples: align.Samples) -> None:
     """Apparent wind at midship: the anemometer's own motion about midship taken out."""
-    components = _place(grid, "wind", samples)  # ahead and starboard part of "where from"
+    components = grid.place("wind", samples)  # ahead and starboard part of "where from"
     ahead, starboard = sensor.lever_arm_m
     r = grid.columns["yaw_rate"]
     moved = components + np.stack((r * starboard, -r * ahead), axis=-1)
@@ -270,9 +238,9 @@ def _actuator_samples(reading: Reading, actuator: Actuator) -> align.Samples:
     return align.ordered(times, value, actuator.tolerance_s)
 
 
-def _actuator(grid: _Grid, actuator: Actuator, samples: align.Samples) -> None:
+def _actuator(grid: Grid, actuator: Actuator, samples: align.Samples) -> None:
     """One actuator's column; beyond the profile's limits it is marked, not clipped."""
-    placed = _place(grid, actuator.name, samples)
+    placed = grid.place(actuator.name, samples)
     column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]
     grid.columns[actuator.name] = column
     if actuator.limits is None:
@@ -281,124 +249,4 @@ def _actuator(grid: _Grid, actuator: Actuator, samples: align.Samples) -> None:
     low, high = sorted((limit - offset) * factor for limit in actuator.limits)
     slack = 1e-3 * (high - low)
     beyond = (column < low - slack) | (column > high + slack)
-    rows = list(quality.stretches(beyond))
-    quality.mark(grid.marks, rows, Quality.LIMITS)
-    grid.findings += quality.said(
-        "limits", actuator.name, [quality.seconds(i) for i in rows], "stands beyond its limits"
-    )
-
-
-def _place(grid: _Grid, name: str, samples: align.Samples) -> np.ndarray:
-    """A source on the grid [m, k]; its gaps, blanks and spikes marked and said."""
-    placed = align.onto(grid.times, samples)
-    for mask, flag, kind, what in (
-        (placed.blank, Quality.BLANK, "blank", "is blank"),
-        (placed.spike, Quality.SPIKE, "spike", "spikes"),
-    ):
-        rows = list(quality.stretches(mask))
-        quality.mark(grid.marks, rows, flag)
-        grid.findings += quality.said(kind, name, [quality.seconds(i) for i in rows], what)
-    grid.marks[placed.gap] |= int(Quality.GAP)
-    rows = list(quality.stretches(placed.gap))
-    grid.findings += quality.said("gap", name, [quality.seconds(i) for i in rows], "has no sample")
-    return placed.value
-
-
-def _gaps(grid: _Grid) -> None:
-    """A row that lacks any value is a gap, whichever instrument is silent."""
-    missing = np.zeros(len(grid.times), bool)
-    for column in grid.columns.values():
-        missing |= np.isnan(column)
-    known = (grid.marks & int(Quality.GAP | Quality.BLANK)) != 0
-    grid.marks[missing & ~known] |= int(Quality.GAP)
-
-
-def _holds(grid: _Grid, profile: Profile, sampled: dict[str, align.Samples]) -> None:
-    """Values that repeat although the ship moves; frozen ones, too long to be data."""
-    step = align.STEP_NS * 1e-9
-    speed = np.nan_to_num(np.hypot(grid.columns["surge"], grid.columns["sway"]))
-    turning = np.abs(np.nan_to_num(grid.columns["yaw_rate"]))
-    travel = {"position": np.cumsum(speed) * step, "heading": np.cumsum(turning) * step}
-    for name, samples in sampled.items():
-        runs = quality.repeats(samples.value)
-        sensor = getattr(profile.sensors, name)
-        noise = _noise(sensor, profile.sensors.kind(name))
-        if name not in travel:
-            runs = quality.improbable(runs, len(samples.time))
-        rows = quality.held_on_grid(grid.times, samples.time, runs, travel.get(name), noise)
-        quality.mark(grid.marks, rows, Quality.HELD)
-        long = [i for i in rows if quality.seconds(i)[1] - quality.seconds(i)[0] > quality.FROZEN_S]
-        quality.mark(grid.marks, long, Quality.FROZEN)
-        intervals = [quality.seconds(i) for i in rows]
-        grid.findings += quality.said(
-            "held",
-            name,
-            [i for i in intervals if i[1] - i[0] >= quality.SAID_HELD_S],
-            "repeats the same value while the ship moves,",
-        )
-        brief = [i for i in intervals if i[1] - i[0] < quality.SAID_HELD_S]
-        if brief:
-            grid.findings.append(
-                Finding(
-                    "held",
-                    name,
-                    f"{name} repeats itself briefly, {len(brief)} times, "
-                    f"{sum(b - a for a, b in brief):.1f} s in all.",
-                    value=float(len(brief)),
-                    unit="times",
-                )
-            )
-
-
-def _jumps(grid: _Grid, profile: Profile) -> None:
-    """Steps of the position or heading that the velocity and the yaw rate do not explain."""
-    step = align.STEP_NS * 1e-9
-    usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
-    columns = {name: np.nan_to_num(column) for name, column in grid.columns.items()}
-    heading = np.unwrap(columns["heading"])
-    c, s = np.cos(heading), np.sin(heading)
-    over_ground = np.stack(
-        (c * columns["surge"] - s * columns["sway"], s * columns["surge"] + c * columns["sway"]), 1
-    )
-    sensors = profile.sensors
-    cases = (
-        (
-            "position",
-            np.stack((columns["x0"], columns["y0"]), 1),
-            over_ground,
-            "m",
-            1.0,
-            _noise(sensors.position, sensors.kind("position")),
-            JUMP_LENGTHS * profile.ship.length_m,
-            math.inf,
-        ),
-        (
-            "heading",
-            heading[:, None],
-            columns["yaw_rate"][:, None],
-            "deg",
-            math.degrees(1.0),
-            _noise(sensors.heading, sensors.kind("heading")),
-            math.inf,
-            JUMP_RAD,
-        ),
-    )
-    for name, gone, rate, unit, display, noise, least, most in cases:
-        for row, size in quality.jumps(gone, rate, usable, noise):
-            speed = float(np.linalg.norm(rate[row]))
-            lost = size / speed if speed > 0 else math.inf
-            if (lost > JUMP_S and size > least) or size > most:
-                grid.marks[row] |= int(Quality.JUMP)
-            worth = f", as if {lost:.1f} s were missing" if lost < 60.0 else ""
-            grid.findings.append(
-                Finding(
-                    "jump",
-                    name,
-                    f"{name} steps {size * display:.3g} {unit} beyond what its "
-                    f"rate says at {row * step:.1f} s{worth}.",
-                    start_s=round(row * step, 3),
-                    end_s=round(row * step, 3),
-                    value=round(size * display, 6),
-                    unit=unit,
-                )
-            )
+    grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")

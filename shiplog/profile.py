@@ -146,6 +146,14 @@ class Sensors(Section):
     def kind(self, name: str) -> str:
         return getattr(self, name).kind or KINDS[name][0]
 
+    def noise(self, name: str) -> float:
+        """Stated accuracy of a sensor in SI (position in m), 0 where none is stated."""
+        sensor = getattr(self, name)
+        if sensor is None or sensor.sigma is None:
+            return 0.0
+        first = sensor.sigma[0] if isinstance(sensor.sigma, tuple) else sensor.sigma
+        return first if name == "position" else first * abs(sensor.scale()[0][1])
+
     def items(self) -> list[tuple[str, Sensor]]:
         return [(name, getattr(self, name)) for name in KINDS if getattr(self, name) is not None]
 

@@ -10,7 +10,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from .decoders import Messages, leaves_of
+from .messages import Messages, leaves_of
 
 F = FieldDescriptor
 DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read

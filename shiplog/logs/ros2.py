@@ -10,7 +10,7 @@ from mcap.records import Schema
 from mcap_ros2._dynamic import TimeDefinition, _for_each_msgdef
 from mcap_ros2.decoder import DecoderFactory
 
-from .decoders import Messages
+from .messages import Messages
 
 KINDS: dict[str, pl.DataType] = {
     "bool": pl.Boolean(), "byte": pl.UInt8(), "char": pl.UInt8(),  # `char` is unsigned in ROS 2

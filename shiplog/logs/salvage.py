@@ -14,7 +14,7 @@ import polars as pl
 from mcap.records import Channel, Message
 
 from . import container
-from .decoders import Decoder
+from .messages import Decoder
 from .tables import Tables, Tally
 
 BATCH = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap

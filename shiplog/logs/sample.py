@@ -8,8 +8,8 @@ import polars as pl
 
 from . import salvage
 from .container import Survey
-from .decoders import Decoder
 from .json_text import Json
+from .messages import Decoder
 from .tables import Tables
 
 SAMPLE = 200  # messages of a topic that are decoded

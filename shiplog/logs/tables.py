@@ -11,8 +11,9 @@ import polars as pl
 from mcap.records import Channel
 
 from .container import Survey
-from .decoders import Decoder, Undecodable, decoder
+from .decoders import decoder
 from .fields import is_text, locate, settled, stamp_leaves, stamps, value
+from .messages import Decoder, Undecodable
 
 log = logging.getLogger(__name__)
 
