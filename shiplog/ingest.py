@@ -160,9 +160,8 @@ def _samples(reading: Reading, profile: Profile, name: str) -> align.Samples:
     samples = align.ordered(times, value, sensor.tolerance_s)
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
-    return _with(
-        samples, spike=quality.spikes(_metric(samples.value, kind), profile.sensors.noise(name))
-    )
+    metric = _metric(samples.value, kind)
+    return replace(samples, spike=quality.spikes(metric, profile.sensors.noise(name)))
 
 
 def _metric(value: np.ndarray, kind: str) -> np.ndarray:
