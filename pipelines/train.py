@@ -46,7 +46,7 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     rows = seconds(store, [*split.training, *split.validation], profile)
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))
-    warn_of_shared_rows(rows, split)
+    refuse_shared_rows(rows, split)
 
     names = (profile.actuator_names, profile.wind_names)
     size = config.window
@@ -215,7 +215,7 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     )
 
 
-def warn_of_shared_rows(rows: pl.DataFrame, split: Split) -> None:
+def refuse_shared_rows(rows: pl.DataFrame, split: Split) -> None:
     """The same seconds in training and validation make the validation worthless: refuse."""
     for left, right, count in table.shared_rows(rows).iter_rows():
         if (left in split.training) != (right in split.training):
@@ -250,10 +250,16 @@ def _utc(stamp: float) -> str:
 
 
 def _commit() -> str | None:
-    """The source's commit, where shiplog runs from a checkout."""
+    """The source's commit, where shiplog runs from its own checkout.
+
+    Installed into an environment inside somebody's repository, git would name their commit.
+    """
+    checkout = Path(__file__).parents[1]
+    if not (checkout / ".git").exists():
+        return None
     try:
         done = subprocess.run(
-            ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"],
+            ["git", "-C", str(checkout), "rev-parse", "HEAD"],
             capture_output=True,
             text=True,
             timeout=5,

@@ -67,8 +67,3 @@ class Quality(IntFlag):
 
 
 UNUSABLE = Quality.GAP | Quality.BLANK | Quality.LIMITS | Quality.SPIKE | Quality.FROZEN
-
-
-def wrap(angle: float) -> float:
-    """An angle in (-π, π]."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -111,9 +111,13 @@ class Store:
             (partial / "voyage.json").write_text(
                 json.dumps(_describe(voyage, fingerprint), indent=1), encoding="utf-8"
             )
-            if folder.is_dir():
-                shutil.rmtree(folder)
-            partial.rename(folder)
+            if state == "replaced":  # the old table stands until the new one is whole
+                old = folder.with_name(f"{folder.name}.old.partial")
+                folder.rename(old)
+                partial.rename(folder)
+                shutil.rmtree(old)
+            else:
+                partial.rename(folder)
         finally:
             shutil.rmtree(partial, ignore_errors=True)
         self._write_catalogue()

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
+from shiplog.channels import DEGREE
 from shiplog.exceptions import ProfileError, listed, nearest
-
-DEGREE = math.pi / 180.0
 
 TO_SI = {
     "1": 1.0, "%": 0.01, "permille": 0.001,
