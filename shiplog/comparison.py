@@ -12,6 +12,8 @@ import polars as pl
 from shiplog import channels
 from shiplog.channels import Channel
 
+BAND = ("_low", "_high")  # of a simulated state: the ends of its 90 % band
+
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
@@ -34,12 +36,15 @@ class Comparison:
 
     measured    voyage, time [s from the voyage's start], the six states, one column per
                 actuator, wind_speed and wind_angle if `has_wind`
-    simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 6]
+    simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 6]; of a model
+                that knows its doubt also each state with _low and _high, the 90 % band
     training    what a model was trained on: the channels of `measured`
     trained     which model that is, where there are several
     summary     Markdown: errors, floors, coverage, findings
     banks       lines of (x0, y0) points a chart shows
     ship_outline  (ahead, starboard) of midship, m; a pointed box of length and breadth if empty
+    forces      model, voyage, time, part (hull, propeller, ... total), surge [N], sway [N],
+                yaw [N m] about midship: who pushes when, along the measured voyage
     """
 
     title: str
@@ -54,6 +59,7 @@ class Comparison:
     banks: tuple[tuple[tuple[float, float], ...], ...] = ()
     trained: str = ""
     ship_outline: tuple[tuple[float, float], ...] = ()
+    forces: pl.DataFrame | None = None
 
     @property
     def voyages(self) -> list[str]:

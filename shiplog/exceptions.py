@@ -42,6 +42,10 @@ class RunError(ShiplogError):
     """A run folder is missing, unfinished, or belongs to other settings."""
 
 
+class ModelError(ShiplogError):
+    """A dynamic model cannot be built, rolled out or identified from what is given."""
+
+
 def nearest(name: str, available: Iterable[str]) -> str:
     """The closest spelling, to follow a name: `` (did you mean '/gyro'?)``; or nothing."""
     close = difflib.get_close_matches(name, list(available), n=1, cutoff=0.5)

@@ -165,6 +165,7 @@ class Actuator(Source):
     kind: Literal["rudder", "propeller", "azimuth", "thruster"]
     limits: tuple[float, float] | None = None  # in `unit`
     position_m: tuple[float, float] = (0.0, 0.0)
+    direction_deg: float = 0.0  # where a fixed thruster pushes, from ahead towards starboard
     diameter_m: float | None = Field(default=None, gt=0)
     area_m2: float | None = Field(default=None, gt=0)
     span_m: float | None = Field(default=None, gt=0)
@@ -262,7 +263,11 @@ def shipped() -> tuple[str, ...]:
     """Names of the profiles that come with shiplog."""
     folder = resources.files("shiplog") / "profiles"
     return tuple(
-        sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+        sorted(
+            f.name.removesuffix(".toml")
+            for f in folder.iterdir()
+            if f.name.endswith(".toml") and not f.name.endswith(".mmg.toml")
+        )
     )
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
 from shiplog import channels
-from shiplog.comparison import Comparison
+from shiplog.comparison import BAND, Comparison
 
 TURN = 2.0 * math.pi
 ROLLOUT = ("model", "seed", "voyage", "window")  # what one rollout is known by
+MOST_TABS = 6  # voyages beyond are in the entity tree: more tabs than fit are not found either
 
 
 def unwrapped(angle: str, over: tuple[str, ...]) -> pl.Expr:
@@ -33,6 +34,7 @@ def drawn(comparison: Comparison) -> Drawn:
         "measured": _measured(comparison),
         "simulated": _simulated(comparison),
         "training": _in_display_units(comparison.training, comparison.channels),
+        "forces": _forces(comparison.forces),
     }
     rest = {f.name: getattr(comparison, f.name) for f in fields(comparison)}
     return Drawn(**{**rest, **tables})
@@ -62,7 +64,39 @@ def _simulated(comparison: Comparison) -> pl.DataFrame:
         .with_columns(heading=pl.col("heading") + TURN * turns.fill_null(0.0))
         .drop("there")
     )
+    for end in BAND:
+        if f"heading{end}" in table.columns:
+            table = _with_band_of_heading(table, f"heading{end}")
+        ends = (replace(c, name=c.name + end) for c in channels.STATE)
+        table = _in_display_units(table, tuple(c for c in ends if c.name in table.columns))
     return _in_display_units(table, channels.STATE)
+
+
+def _with_band_of_heading(table: pl.DataFrame, name: str) -> pl.DataFrame:
+    """An end of the band counted on, from the turn that the rollout's own heading starts in."""
+    given = pl.col(name).is_not_null()
+    turns = ((pl.col("heading") - pl.col("free")) / TURN).round()
+    return (
+        table.with_columns(free=unwrapped(name, ROLLOUT))
+        .with_columns(turns=pl.when(given).then(turns).drop_nulls().first().over(ROLLOUT))
+        .with_columns(pl.when(given).then(pl.col("free") + TURN * pl.col("turns")).alias(name))
+        .drop("free", "turns")
+    )
+
+
+def has_band(rollouts: pl.DataFrame, name: str) -> bool:
+    """Whether these rollouts of one model carry a band of that state."""
+    ends = [name + end for end in BAND]
+    return all(e in rollouts.columns and np.isfinite(column(rollouts, e)).any() for e in ends)
+
+
+def _forces(forces: pl.DataFrame | None) -> pl.DataFrame | None:
+    """In order of time, still in N and N m: whether an axis needs kilo, its view decides."""
+    if forces is None:
+        return None
+    return forces.with_columns(pl.col("time", "surge", "sway", "yaw").cast(pl.Float64)).sort(
+        "time", maintain_order=True
+    )
 
 
 def shown_seeds(comparison: Comparison) -> dict[str, int]:

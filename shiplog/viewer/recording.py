@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from shiplog.comparison import Comparison
 from shiplog.exceptions import ShiplogError
-from shiplog.viewer import display, histogram, report, style, timeline, trajectory
+from shiplog.viewer import display, forces, histogram, report, style, timeline, trajectory
 from shiplog.viewer.display import Drawn
 
 # A view sends entities and says where it stands: beside the others of a voyage, or, asked without
@@ -18,11 +18,11 @@ from shiplog.viewer.display import Drawn
 VIEWS = {
     "trajectory": trajectory,
     "timeline": timeline,
+    "forces": forces,
     "histogram": histogram,
     "report": report,
 }
 LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
-MOST_TABS = 6  # voyages beyond are in the entity tree: more tabs than fit are not found either
 
 
 def write(comparison: Comparison, path: Path) -> None:
@@ -56,7 +56,7 @@ def write(comparison: Comparison, path: Path) -> None:
 def layout(picture: Drawn) -> rrb.Blueprint:
     """A tab a voyage, the track left and time right, then what belongs to no voyage alone."""
     tabs: list[rrb.View | rrb.Container] = []
-    for voyage in picture.voyages[:MOST_TABS]:
+    for voyage in picture.voyages[: display.MOST_TABS]:
         parts = {name: view.blueprint(picture, voyage) for name, view in VIEWS.items()}
         left = [part for name in LEFT if (part := parts.pop(name)) is not None]
         right = [part for part in parts.values() if part is not None]

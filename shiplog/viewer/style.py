@@ -14,6 +14,11 @@ MODELS: tuple[Colour, ...] = (  # Okabe and Ito: told apart by colour-blind read
     (230, 159, 0, 255), (86, 180, 233, 255), (120, 80, 40, 255), (150, 150, 0, 255),
 )  # fmt: skip
 ACTUATORS = MODELS  # never in one view with a model
+PARTS: dict[str, Colour] = {  # of the force on the ship; total dark, as what is measured
+    "hull": MODELS[0], "propeller": MODELS[1], "rudder": MODELS[2], "wind": MODELS[5],
+    "thruster": MODELS[4], "network": MODELS[3], "total": MEASURED,
+}  # fmt: skip
+OTHER_PARTS = (MODELS[6], MODELS[7])
 TRAINING: Colour = (150, 160, 175, 255)
 TEST: Colour = (213, 94, 0, 255)
 GRID: Colour = (222, 226, 230, 255)
@@ -25,6 +30,13 @@ PAPER: Colour = (250, 250, 250, 255)
 def colours(models: list[str]) -> dict[str, Colour]:
     """A fixed colour for every model, in the order they were given."""
     return {model: MODELS[i % len(MODELS)] for i, model in enumerate(models)}
+
+
+def part_colours(parts: list[str]) -> dict[str, Colour]:
+    """A part's own colour wherever it is drawn; parts without one share what is left."""
+    others = [part for part in parts if part not in PARTS]
+    spare = {part: OTHER_PARTS[i % len(OTHER_PARTS)] for i, part in enumerate(others)}
+    return {part: PARTS.get(part) or spare[part] for part in parts}
 
 
 def faded(colour: Colour, share: float = 0.35) -> Colour:
@@ -40,5 +52,5 @@ def entity(*parts: str) -> str:
     return rr.new_entity_path(list(parts))
 
 
-def plot_background() -> rrb.archetypes.PlotBackground:
-    return rrb.archetypes.PlotBackground(color=PAPER, show_grid=False)
+def plot_background(grid: bool = False) -> rrb.archetypes.PlotBackground:
+    return rrb.archetypes.PlotBackground(color=PAPER, show_grid=grid)

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from shiplog import channels
+from shiplog.comparison import BAND
 from shiplog.viewer import display, style
 from shiplog.viewer.display import Drawn
 from shiplog.viewer.style import entity
@@ -24,12 +25,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     if voyage is None:
         return None
     rows = drawn.measured.filter(pl.col("voyage") == voyage)
-    time = display.column(rows, "time")
-    margin = 0.04 * float(np.ptp(time))
-    whole = rrb.TimeRange(
-        start=rrb.TimeRangeBoundary.absolute(seconds=float(np.min(time)) - margin),
-        end=rrb.TimeRangeBoundary.absolute(seconds=float(np.max(time)) + margin),
-    )
+    whole = whole_voyage(rows)
     simulated = drawn.simulated.filter(pl.col("voyage") == voyage)
 
     def plot(
@@ -39,7 +35,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
         return rrb.TimeSeriesView(
             origin=entity(*origin),
             name=name,
-            axis_x=rrb.TimeAxis(link="Independent", view_range=whole),
+            axis_x=whole,
             axis_y=None if reach is None else rrb.ScalarAxis(range=reach),
             plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=legend),
             background=style.plot_background(),
@@ -66,6 +62,17 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     )
 
 
+def whole_voyage(rows: pl.DataFrame) -> rrb.TimeAxis:
+    """A time axis over all of these rows, which stays when another is zoomed."""
+    time = display.column(rows, "time")
+    margin = 0.04 * float(np.ptp(time))
+    whole = rrb.TimeRange(
+        start=rrb.TimeRangeBoundary.absolute(seconds=float(np.min(time)) - margin),
+        end=rrb.TimeRangeBoundary.absolute(seconds=float(np.max(time)) + margin),
+    )
+    return rrb.TimeAxis(link="Independent", view_range=whole)
+
+
 def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     """Every channel of every voyage, whole columns at a time."""
     measured = drawn.measured
@@ -84,7 +91,8 @@ def readable_range(
         return None
     low, high = float(np.nanmin(real)), float(np.nanmax(real))
     room = 0.6 * max(high - low, 1e-3)
-    models = [display.column(simulated, n) for n in names if n in simulated.columns]
+    drawn = [name + end for name in names for end in ("", *BAND)]
+    models = [display.column(simulated, n) for n in drawn if n in simulated.columns]
     seen = np.concatenate([real, *models])
     low, high = max(low - room, float(np.nanmin(seen))), min(high + room, float(np.nanmax(seen)))
     low, high = with_two_labels(low, max(high, low + 1e-3))
@@ -131,7 +139,7 @@ def _send_measured(
         if channel.circular and channel.name != "heading":  # a bearing passing north is no jump
             jumps = np.flatnonzero(np.abs(np.diff(values)) > 180.0) + 1
             breaks = np.union1d(begins, jumps)
-        _send_lines(recording, path, time, values[:, None], breaks, [name], colour, width)
+        send_lines(recording, path, time, values[:, None], breaks, [name], colour, width)
 
     for channel in channels.STATE:
         path = entity("state", voyage, channel.name, "measured")
@@ -164,20 +172,23 @@ def _send_simulated(
         for name, parent in curves:
             values = display.column(bold, name)[:, None]
             path = entity(*parent, "simulated", model)
-            _send_lines(recording, path, time, values, begins, [model], colour, 1.25)
-            if spread is not None:
-                both = np.column_stack([display.column(spread, name + s) for s in SPREAD])
-                names = ["lowest, highest seed"] * 2  # of one name: one line in the legend
-                _send_lines(
-                    recording,
-                    entity(*parent, "seeds", model),  # drawn in order of names: before simulated
-                    display.column(spread, "time"),
-                    both,
-                    display.pieces(spread),
-                    names,
-                    style.faded(colour),
-                    0.7,
-                )
+            send_lines(recording, path, time, values, begins, [model], colour, 1.25)
+            if display.has_band(bold, name):  # its own doubt says more than another seed's start
+                rows, ends, kind, thin = bold, BAND, "band", "90 % band"
+            elif spread is not None:
+                rows, ends, kind, thin = spread, SPREAD, "seeds", "lowest, highest seed"
+            else:
+                continue
+            send_lines(
+                recording,
+                entity(*parent, kind, model),  # drawn in order of names: before simulated
+                display.column(rows, "time"),
+                np.column_stack([display.column(rows, name + end) for end in ends]),
+                display.pieces(rows),
+                [thin] * 2,  # of one name: one line in the legend
+                style.faded(colour),
+                0.7,
+            )
     _send_window_starts(recording, voyage, simulated)
 
 
@@ -219,7 +230,7 @@ def _send_window_starts(
     )
 
 
-def _send_lines(
+def send_lines(
     recording: rr.RecordingStream,
     path: str,
     time: NDArray[np.float64],

@@ -1,0 +1,204 @@
+"""Output error: the parameters whose rollouts come nearest to what was measured.
+
+Gauss-Newton in a trust region (scipy's `least_squares`, within physical bounds), with a ridge that
+holds each parameter to its starting value in units of its plausible spread: what the data say
+nothing about stays where it was. Standard errors are those of correlated errors: a rollout's
+error at one second is its error a second later.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from shiplog.exceptions import ModelError, listed
+from shiplog.sensitivity import Physical, Series, losses, normal, rollout
+
+log = logging.getLogger(__name__)
+
+CORRELATION = 30.0  # s over which rollout errors are one observation, not many
+ROUNDS = 3  # of weighing the ridge by the noise that the fit before it left
+TOLERANCE = 1e-6
+MOST_EVALUATIONS = 60
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Parameters with what is known of them.
+
+    values       [P]
+    covariance   [P, P]  zero for those that were held
+    free         [P]     which were fitted
+    noise        weighted variance that one independent observation of the error has
+    loss         mean L of the training windows at the start and at the end
+    evaluations  of the whole sum with its derivatives
+    converged    False where the last good values were kept; `message` says why
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    free: np.ndarray
+    noise: float
+    loss: tuple[float, float]
+    evaluations: int
+    converged: bool
+    message: str
+
+    @property
+    def standard_error(self) -> np.ndarray:
+        return np.sqrt(np.diag(self.covariance))
+
+
+def identify(
+    model: Physical,
+    start: np.ndarray,
+    spread: np.ndarray,
+    data: Series,
+    *,
+    bounds: tuple[np.ndarray, np.ndarray] | None = None,
+    free: np.ndarray | None = None,
+    begin: np.ndarray | None = None,
+) -> Identified:
+    """Fit θ by rollout error over all windows with weight.
+
+    start, spread   [P]  where the ridge holds each parameter, and how firmly
+    bounds          [P], [P]  physical range
+    free            [P]  which may move; all
+    begin           [P]  where to begin, if not at `start`
+
+    Raises ModelError where not even the start can be rolled out.
+    """
+    free = np.ones(len(start), dtype=bool) if free is None else free
+    values = np.array(start if begin is None else begin, dtype=float)
+    low, high = bounds if bounds is not None else (np.full_like(start, -np.inf),) * 2
+    if bounds is None:
+        high = np.full_like(start, np.inf)
+    weight = data.weight
+    before = losses(model, values, data)
+    if not np.isfinite(before[weight > 0]).all():
+        raise ModelError(
+            f"The starting values let {int((~np.isfinite(before)).sum())} of {len(before)} windows "
+            "run away.",
+            hint="check the profile's signs and units, or give better --parameters.",
+        )
+    samples = 3.0 * float((weight * data.dt.sum(1)).sum())
+    noise = CORRELATION * float(weight @ before) / samples
+    evaluations, converged, message = 0, True, "converged"
+    for _ in range(ROUNDS):
+        problem = _Problem(model, start, spread, data, free, noise)
+        guess = (values - start)[free] / spread[free]
+        side = [(b - start)[free] / spread[free] for b in (low, high)]
+        inside = np.clip(guess, side[0] + 1e-9, side[1] - 1e-9)
+        done = least_squares(
+            problem.residual,
+            inside,
+            problem.jacobian,
+            bounds=(side[0], side[1]),
+            method="trf",
+            xtol=1e-4,
+            ftol=TOLERANCE,
+            gtol=1e-10,
+            max_nfev=MOST_EVALUATIONS,
+        )
+        evaluations += problem.evaluations
+        values = problem.whole(done.x)
+        converged = done.status > 0
+        message = "converged" if converged else "the limit of evaluations was reached"
+        after = losses(model, values, data)
+        now = CORRELATION * float(weight @ after) / samples
+        settled = abs(now / noise - 1.0) < 0.05
+        noise = now
+        if settled:
+            break
+    total = weight.sum()
+    return Identified(
+        values=values,
+        covariance=covariance(model, values, spread, data, free, noise),
+        free=free,
+        noise=noise,
+        loss=(float(weight @ before / total), float(weight @ after / total)),
+        evaluations=evaluations,
+        converged=converged,
+        message=message,
+    )
+
+
+class _Problem:
+    """The sum of squares for scipy, in as few rows as there are parameters.
+
+    JᵀJ, Jᵀr and rᵀr say all that a Gauss-Newton step needs to know; a triangular root of them
+    stands in for the J and r of ten thousands of rows, which never exist as a whole.
+    """
+
+    def __init__(self, model, start, spread, data, free, noise) -> None:
+        self.model, self.start, self.spread, self.data = model, start, spread, data
+        self.free, self.noise = free, noise
+        self.evaluations = 0
+        self._at: np.ndarray | None = None
+
+    def whole(self, x: np.ndarray) -> np.ndarray:
+        values = self.start.copy()
+        values[self.free] += x * self.spread[self.free]
+        return values
+
+    def _evaluate(self, x: np.ndarray) -> None:
+        if self._at is not None and np.array_equal(self._at, x):
+            return
+        self.evaluations += 1
+        self._at = x.copy()
+        found = normal(self.model, self.whole(x), self.data)
+        scale = self.spread[self.free]
+        gram = found.gram[np.ix_(self.free, self.free)] * np.outer(scale, scale) / self.noise
+        pull = (self.data.weight @ found.pull)[self.free] * scale / self.noise
+        cost = float(self.data.weight @ found.loss) / self.noise
+        count = len(x)
+        if not (np.isfinite(cost) and np.isfinite(gram).all()):
+            self._residual = np.full(2 * count + 1, np.nan)
+            self._jacobian = np.zeros((2 * count + 1, count))
+            return
+        # Eigenvalues rather than Cholesky: parameters that the data do not touch make it singular.
+        values, vectors = np.linalg.eigh(gram)
+        keep = values > 1e-14 * max(values[-1], 1e-300)
+        root = np.where(keep, np.sqrt(np.maximum(values, 0.0)), 0.0)
+        inverse = np.where(keep, 1.0 / np.where(keep, root, 1.0), 0.0)
+        seen = inverse * (vectors.T @ pull)
+        rest = np.sqrt(max(cost - float(seen @ seen), 0.0))
+        self._jacobian = np.vstack((root[:, None] * vectors.T, np.eye(count), np.zeros(count)))
+        self._residual = np.concatenate((seen, x, [rest]))
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        self._evaluate(x)
+        return self._residual
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        self._evaluate(x)
+        return self._jacobian
+
+
+def covariance(
+    model: Physical,
+    values: np.ndarray,
+    spread: np.ndarray,
+    data: Series,
+    free: np.ndarray,
+    noise: float,
+) -> np.ndarray:
+    """[P, P] of the estimate: the ridge's and the data's information, with each window one
+    observation of its own gradient (the sandwich of Huber 1967 and White 1980)."""
+    found = normal(model, values, data)
+    scale = spread[free]
+    information = found.gram[np.ix_(free, free)] * np.outer(scale, scale) / noise + np.eye(
+        int(free.sum())
+    )
+    pulls = found.pull[:, free] * scale / noise * np.sqrt(data.weight)[:, None]
+    inverse = np.linalg.inv(information)
+    meat = pulls.T @ pulls + np.eye(len(scale))
+    sandwich = inverse @ meat @ inverse
+    whole = np.zeros((len(values), len(values)))
+    whole[np.ix_(free, free)] = sandwich * np.outer(scale, scale)
+    return whole

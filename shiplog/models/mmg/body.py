@@ -1,0 +1,36 @@
+"""The rigid body with added mass: forces to accelerations (Yasukawa & Yoshimura 2015)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+from jax import Array
+
+from shiplog.models.mmg.geometry import Geometry
+
+
+def masses(p: Mapping[str, Array], g: Geometry) -> tuple[Array, Array, Array]:
+    """m_x, m_y [kg] and I + J [kg m²] about the centre of gravity."""
+    unit = 0.5 * g.density * g.length**2 * g.draught
+    return p["body.m_x"] * unit, p["body.m_y"] * unit, p["body.i_j"] * unit * g.length**2
+
+
+def accelerations(
+    p: Mapping[str, Array], g: Geometry, u: Array, v: Array, r: Array, force: Array
+) -> Array:
+    """u̇, v̇_m, ṙ [..., 3] of the force X, Y, N [..., 3] at midship.
+
+    (m + m_x) u̇ - (m + m_y) v r - x_G m r² = X
+    (m + m_y) v̇ + (m + m_x) u r + x_G m ṙ = Y
+    (I + J + x_G² m) ṙ + x_G m (v̇ + u r) = N
+    """
+    m, x_g = g.mass, g.x_g
+    m_x, m_y, yaw = masses(p, g)
+    surge = (force[..., 0] + (m + m_y) * v * r + x_g * m * r * r) / (m + m_x)
+    a, b, c = m + m_y, x_g * m, yaw + x_g**2 * m
+    across = force[..., 1] - (m + m_x) * u * r
+    turning = force[..., 2] - b * u * r
+    determinant = a * c - b * b
+    sway = (c * across - b * turning) / determinant
+    return jnp.stack((surge, sway, (a * turning - b * across) / determinant), axis=-1)

@@ -1,0 +1,187 @@
+"""What of a ship does not change: sizes, places, and which actuator drives what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.models.mmg.estimate import Particulars, particulars
+from shiplog.profile import Actuator, Profile
+
+AIR = 1.225  # kg/m³
+PARTS = ("hull", "propeller", "rudder", "thruster", "wind")  # forces that can be asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Propeller:
+    """A screw on a fixed shaft: its column among the actuators [rev/s], place and diameter."""
+
+    column: int
+    name: str
+    ahead: float  # m of midship
+    starboard: float  # m
+    diameter: float  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Rudder:
+    """A blade: its column [rad], place, size, and the screw whose slipstream it stands in."""
+
+    column: int
+    name: str
+    ahead: float  # m of midship
+    starboard: float  # m
+    area: float  # m²
+    span: float  # m
+    behind: int | None  # index into Geometry.propellers
+
+
+@dataclass(frozen=True, slots=True)
+class Thruster:
+    """A unit that is known by its command alone: fixed, or turned by an azimuth's column."""
+
+    column: int
+    name: str
+    ahead: float  # m of midship
+    starboard: float  # m
+    full: float  # command at full thrust, in the actuator's SI unit
+    direction: float  # rad from ahead to starboard, where nothing turns it
+    turned_by: int | None  # column of the azimuth angle [rad]
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """Everything SI; hashable, so that a compiled rollout is made once for each ship."""
+
+    length: float
+    draught: float
+    mass: float
+    x_g: float  # m ahead of midship
+    density: float
+    frontal_area: float
+    lateral_area: float
+    actuators: int
+    propellers: tuple[Propeller, ...]
+    rudders: tuple[Rudder, ...]
+    thrusters: tuple[Thruster, ...]
+    wind: bool
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The forces this ship has."""
+        has = {
+            "hull": True,
+            "propeller": self.propellers,
+            "rudder": self.rudders,
+            "thruster": self.thrusters,
+            "wind": self.wind,
+        }
+        return tuple(name for name in PARTS if has[name])
+
+
+def geometry(
+    profile: Profile, without: Iterable[str] = ()
+) -> tuple[Geometry, Particulars, tuple[str, ...]]:
+    """A profile's geometry, its particulars, and a sentence for each that had to be estimated.
+
+    without   parts of PARTS that are switched off; the hull stays.
+    Raises ProfileError where a term lacks what it needs, naming it.
+    """
+    off = set(without)
+    for name in off:
+        if name not in PARTS[1:]:
+            raise ProfileError(
+                f"There is no force {name!r} to leave out{nearest(name, PARTS[1:])}.",
+                hint=f"--without can be {listed(PARTS[1:])}.",
+            )
+    main, said = particulars(profile)
+    column = {actuator.name: i for i, actuator in enumerate(profile.actuators)}
+    propellers = tuple(
+        Propeller(
+            column[a.name], a.name, *a.position_m, _needed(a, "diameter_m", "propeller")
+        )
+        for a in profile.actuators
+        if a.kind == "propeller" and "propeller" not in off
+    )  # fmt: skip
+    rudders = tuple(
+        Rudder(
+            column[a.name],
+            a.name,
+            *a.position_m,
+            _needed(a, "area_m2", "rudder"),
+            _needed(a, "span_m", "rudder"),
+            _slipstream(a, propellers),
+        )
+        for a in profile.actuators
+        if a.kind == "rudder" and "rudder" not in off
+    )
+    thrusters = tuple(
+        Thruster(
+            column[a.name],
+            a.name,
+            *a.position_m,
+            _full(a),
+            math.radians(a.direction_deg),
+            _turning(a, profile),
+        )
+        for a in profile.actuators
+        if a.kind == "thruster" and "thruster" not in off
+    )
+    has_wind = profile.has_wind and "wind" not in off
+    return (
+        Geometry(
+            length=main.length,
+            draught=main.draught,
+            mass=main.mass,
+            x_g=main.x_g,
+            density=main.density,
+            frontal_area=main.frontal_area,
+            lateral_area=main.lateral_area,
+            actuators=len(profile.actuators),
+            propellers=propellers,
+            rudders=rudders,
+            thrusters=thrusters,
+            wind=has_wind,
+        ),
+        main,
+        said,
+    )
+
+
+def _needed(actuator: Actuator, key: str, part: str) -> float:
+    value = getattr(actuator, key)
+    if value is None:
+        raise ProfileError(
+            f"The profile gives no {key} for the {part} {actuator.name!r}, "
+            "which its force is computed from.",
+            hint=f"add {key} to that actuator, or leave the force out with --without {part}.",
+        )
+    return value
+
+
+def _slipstream(rudder: Actuator, propellers: tuple[Propeller, ...]) -> int | None:
+    """The screw ahead of a rudder that is nearest across; None where none stands before it."""
+    before = [
+        (abs(p.starboard - rudder.position_m[1]), i)
+        for i, p in enumerate(propellers)
+        if abs(p.starboard - rudder.position_m[1]) <= p.diameter
+    ]
+    return min(before)[1] if before else None
+
+
+def _full(thruster: Actuator) -> float:
+    """The command at full thrust, in SI: the larger limit, or 1 where no limits are given."""
+    if thruster.limits is None:
+        return 1.0
+    offset, factor = thruster.scale()[0]
+    return max(abs((limit - offset) * factor) for limit in thruster.limits)
+
+
+def _turning(thruster: Actuator, profile: Profile) -> int | None:
+    """The column of the azimuth at the same place, if there is one."""
+    for i, other in enumerate(profile.actuators):
+        if other.kind == "azimuth" and other.position_m == thruster.position_m:
+            return i
+    return None

@@ -1,0 +1,85 @@
+"""The low-speed MMG model: hull, screws, rudders, thrusters and wind on a rigid body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+from jax import Array
+
+from shiplog.models.mmg import body, hull, parameters, propeller, rudder, thruster, wind
+from shiplog.models.mmg.geometry import Geometry
+
+
+@dataclass(frozen=True, slots=True)
+class MMG:
+    """A ship's equations of motion; hashable, its numbers come as a vector θ in order of `names`.
+
+    The assembly is Miyauchi et al. 2022; each force names its own authors.
+    """
+
+    geometry: Geometry
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return parameters.names(self.geometry)
+
+    def forces(
+        self, theta: Array, state: Array, actuator: Array, true_wind: Array
+    ) -> dict[str, Array]:
+        """Part → X, Y, N [..., 3] at midship, N and N m.
+
+        theta      [P]        in order of `names`
+        state      [..., 6]   channels.STATE
+        actuator   [..., A]   the profile's order [rad, rev/s or 1]
+        true_wind  [..., 2]   where it comes from, along x₀ and y₀ [m/s]
+        """
+        g, p = self.geometry, dict(zip(self.names, theta, strict=True))
+        u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
+        found = {"hull": hull.hull(p, g, u, v, r)}
+        screws = [_screw(p, g, s, u, v, r, actuator) for s in g.propellers]
+        if screws:
+            found["propeller"] = sum(s[0] for s in screws)
+        if g.rudders:
+            found["rudder"] = sum(
+                _blade(p, g, b, screws, u, v, r, actuator) for b in g.rudders
+            )
+        if g.thrusters:
+            found["thruster"] = sum(
+                thruster.thruster(p, g, t, u, v, r, actuator) for t in g.thrusters
+            )
+        if g.wind:
+            found["wind"] = wind.wind(p, g, *wind.apparent(true_wind, heading, u, v))
+        return found
+
+    def acceleration(
+        self, theta: Array, state: Array, actuator: Array, true_wind: Array
+    ) -> Array:
+        """ν̇ [..., 3] in m/s² and rad/s²; arguments as for `forces`."""
+        total = sum(self.forces(theta, state, actuator, true_wind).values())
+        p = dict(zip(self.names, theta, strict=True))
+        u, v, r = state[..., 1], state[..., 3], state[..., 5]
+        return body.accelerations(p, self.geometry, u, v, r, total)
+
+
+def _screw(
+    p: Mapping[str, Array], g: Geometry, screw, u: Array, v: Array, r: Array, actuator: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Force, 1 - w_P, K_T and n of one screw."""
+    n = actuator[..., screw.column]
+    arriving = propeller.inflow(p, g, screw, u, v, r)
+    k_t, effective = propeller.thrust_coefficient(p, screw, u, arriving, n)
+    return propeller.propeller(p, g, screw, u, n, effective), arriving, k_t, n
+
+
+def _blade(
+    p: Mapping[str, Array], g: Geometry, blade, screws, u: Array, v: Array, r: Array, actuator
+) -> Array:
+    if blade.behind is None:
+        screw, arriving, k_t, n = None, jnp.ones_like(u), jnp.zeros_like(u), jnp.zeros_like(u)
+    else:
+        screw = g.propellers[blade.behind]
+        _, arriving, k_t, n = screws[blade.behind]
+    u_r = rudder.ahead_inflow(p, blade, screw, u, arriving, k_t, n)
+    return rudder.rudder(p, g, blade, u_r, v, r, actuator[..., blade.column])

@@ -1,0 +1,246 @@
+"""The coefficients of the MMG model: symbol, plausible spread and physical range of each.
+
+One table; a force function looks its numbers up by these names. A file of published values is a
+TOML of the same sections and keys, beside the ship's profile: `<profile>.mmg.toml`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.models.mmg import estimate
+from shiplog.models.mmg.estimate import Particulars
+from shiplog.models.mmg.geometry import Geometry
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One coefficient. Its plausible spread is `share` of its value, or `least` where that is more.
+
+    low, high   outside, it is no ship's: refused when read, and a fit stops there
+    neutral     the value that leaves its term out, where a ship's file does not name it
+    """
+
+    symbol: str
+    share: float
+    least: float
+    low: float
+    high: float
+    neutral: float | None = None
+    unit: str = "1"
+
+
+_E = Entry
+TABLE: dict[str, dict[str, Entry]] = {
+    "body": {  # added masses are known best: every force and mass share one scale, this fixes it
+        "m_x": _E("m'_x", 0.08, 0.005, 0.0, 1.0), "m_y": _E("m'_y", 0.08, 0.0, 0.01, 2.0),
+        "i_j": _E("I'+J'", 0.08, 0.0, 0.001, 0.2),
+    },
+    "hull": {
+        "x_0f": _E("X'₀F", 0.3, 0.003, -0.5, 0.0), "x_0a": _E("X'₀A", 0.3, 0.003, -0.5, 0.0),
+        "x_vr": _E("X'_vr", 0.3, 0.08, -3.0, 3.0),
+        "y_v": _E("Y'_v", 0.3, 0.05, -3.0, 0.0), "y_r": _E("Y'_r", 0.3, 0.04, -1.0, 1.0),
+        "n_v": _E("N'_v", 0.3, 0.03, -1.0, 0.3), "n_r": _E("N'_r", 0.3, 0.015, -0.5, 0.0),
+        "c_d": _E("C_D", 0.3, 0.1, 0.0, 4.0),
+        "c_ry": _E("C_rY", 0.3, 0.3, 0.0, 6.0), "c_rn": _E("C_rN", 0.3, 0.2, 0.0, 6.0),
+    },
+    "propeller": {
+        "k0": _E("k₀", 0.15, 0.0, 0.02, 1.0), "k1": _E("k₁", 0.3, 0.0, -1.0, 0.2),
+        "k2": _E("k₂", 0.3, 0.05, -1.0, 0.5), "t": _E("t", 0.3, 0.03, -0.1, 0.7),
+        "w_p0": _E("w_P0", 0.3, 0.05, 0.0, 0.9), "tau": _E("τ", 0.3, 0.1, -1.0, 3.0),
+        "c_p": _E("C_P", 0.3, 0.1, -3.0, 3.0),
+        "c3": _E("C₃", 0.3, 0.03, -1.0, 0.0), "c6": _E("C₆", 0.3, 0.03, -1.0, 0.0),
+        "c7": _E("C₇", 0.3, 0.05, -1.0, 2.0), "c10": _E("C₁₀", 0.1, 0.0, -1.0, 0.0),
+        "a1": _E("A₁", 0.3, 1e-3, -0.05, 0.05), "a2": _E("A₂", 0.3, 1e-3, -0.1, 0.1),
+        "a3": _E("A₃", 0.3, 1e-3, -0.05, 0.05), "a4": _E("A₄", 0.3, 1e-3, -0.1, 0.1),
+        "a5": _E("A₅", 0.3, 1e-3, -0.05, 0.05), "a6": _E("A₆", 0.3, 1e-3, -0.1, 0.1),
+        "a7": _E("A₇", 0.3, 1e-3, -0.1, 0.1), "a8": _E("A₈", 0.3, 1e-3, -0.05, 0.05),
+        "b1": _E("B₁", 0.3, 3e-4, -0.02, 0.02), "b2": _E("B₂", 0.3, 3e-4, -0.05, 0.05),
+        "b3": _E("B₃", 0.3, 3e-4, -0.02, 0.02), "b4": _E("B₄", 0.3, 3e-4, -0.05, 0.05),
+        "b5": _E("B₅", 0.3, 3e-4, -0.02, 0.02), "b6": _E("B₆", 0.3, 3e-4, -0.05, 0.05),
+        "b7": _E("B₇", 0.3, 3e-4, -0.05, 0.05), "b8": _E("B₈", 0.3, 3e-4, -0.02, 0.02),
+    },
+    "rudder": {
+        "t_r": _E("t_R", 0.3, 0.05, -0.5, 0.9), "a_h": _E("a_H", 0.3, 0.05, -0.2, 1.5),
+        "x_h": _E("x'_H", 0.3, 0.05, -1.0, 0.5), "l_r": _E("ℓ'_R", 0.3, 0.1, -3.0, 0.5),
+        "k_x": _E("k_x", 0.3, 0.05, 0.0, 2.0), "k_xr": _E("k_xr", 0.3, 0.05, 0.0, 2.0),
+        "eps": _E("ε", 0.3, 0.1, 0.2, 3.0), "c_pr": _E("C_PR", 0.3, 0.05, -2.0, 2.0),
+        "gamma_n": _E("γ_N", 0.3, 0.05, 0.0, 2.0), "gamma_p": _E("γ_P", 0.3, 0.05, 0.0, 2.0),
+        "f_alpha": _E("f_α", 0.15, 0.0, 0.3, 6.0),
+        "f_3": _E("f₃", 0.0, 0.3, -0.95, 3.0, neutral=0.0),
+    },
+    "thruster": {
+        "ahead": _E("T₊", 0.5, 0.0, 0.0, 1e7, unit="N"),
+        "astern": _E("T₋", 0.5, 0.0, 0.0, 1e7, unit="N"),
+        "loss": _E("ℓ_T", 0.0, 0.5, -1.0, 5.0, neutral=0.0, unit="s/m"),
+    },
+    "wind": {
+        "x0": _E("X_A0", 0.3, 0.05, -0.5, 0.5), "x1": _E("X_A1", 0.3, 0.1, -2.5, 0.0),
+        "x3": _E("X_A3", 0.3, 0.05, -0.6, 0.6), "x5": _E("X_A5", 0.3, 0.05, -0.6, 0.6),
+        "y1": _E("Y_A1", 0.3, 0.1, 0.0, 2.5), "y3": _E("Y_A3", 0.3, 0.05, -0.6, 0.6),
+        "y5": _E("Y_A5", 0.3, 0.05, -0.6, 0.6), "n1": _E("N_A1", 0.3, 0.03, -0.5, 0.5),
+        "n2": _E("N_A2", 0.3, 0.03, -0.5, 0.5), "n3": _E("N_A3", 0.3, 0.03, -0.5, 0.5),
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Names `part.key` in the order of every parameter vector, with start and plausible spread.
+
+    source   where the values are from, for reports
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray  # [P]
+    spread: np.ndarray  # [P]
+    low: np.ndarray  # [P]
+    high: np.ndarray  # [P]
+    source: str
+
+    def entry(self, name: str) -> Entry:
+        return _entry(name)
+
+    def with_values(self, values: np.ndarray, source: str | None = None) -> Parameters:
+        return Parameters(
+            self.names, np.asarray(values), self.spread, self.low, self.high, source or self.source
+        )
+
+    def sections(self) -> dict[str, dict[str, float]]:
+        """As a TOML has them."""
+        out: dict[str, dict[str, float]] = {}
+        for name, value in zip(self.names, self.values, strict=True):
+            part, key = name.split(".", 1)
+            out.setdefault(part, {})[key] = float(value)
+        return out
+
+    def to_toml(self) -> str:
+        return tomli_w.dumps({"source": self.source, **self.sections()})
+
+
+def names(geometry: Geometry) -> tuple[str, ...]:
+    """The parameters a ship of this geometry has, in order."""
+    found = [f"body.{key}" for key in TABLE["body"]]
+    for part in geometry.parts:
+        if part == "thruster":
+            found += [f"thruster.{t.name}_{k}" for t in geometry.thrusters for k in TABLE[part]]
+        else:
+            found += [f"{part}.{key}" for key in TABLE[part]]
+    return tuple(found)
+
+
+def estimated(geometry: Geometry, main: Particulars) -> Parameters:
+    """Starting values by empirical formulas, with twice the spread of published ones."""
+    guess: dict[str, dict[str, float]] = {
+        "body": estimate.inertia(main),
+        "hull": estimate.hull(main),
+        "propeller": estimate.propeller(main),
+        "wind": estimate.wind(main),
+    }
+    if geometry.rudders:
+        blade = geometry.rudders[0]
+        guess["rudder"] = estimate.rudder(main, blade.area, blade.span)
+    if geometry.thrusters:
+        # Bollard pull that holds the ship at 0.15 √(gL) against her resistance, shared out.
+        speed2 = 0.15**2 * 9.81 * main.length
+        resistance = -0.5 * main.density * main.length * main.draught * guess["hull"]["x_0f"]
+        share = max(resistance * speed2, 1e-3 * main.mass) / len(geometry.thrusters)
+        guess["thruster"] = {
+            f"{t.name}_{k}": share for t in geometry.thrusters for k in ("ahead", "astern")
+        }
+    return _from(geometry, guess, "empirical formulas from the particulars", widen=2.0)
+
+
+def load(path: Path | str, geometry: Geometry) -> Parameters:
+    """Published or identified values. Raises ProfileError naming what is missing or impossible."""
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ProfileError(
+            f"{path} cannot be read: {error.strerror}.",
+            hint="give --parameters the path of a TOML of MMG coefficients.",
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(
+            f"{path} is not valid TOML: {error}.", hint="mend that line."
+        ) from error
+    source = str(content.pop("source", path.name))
+    return _from(geometry, content, source, widen=1.0, path=path)
+
+
+def beside(profile_source: str) -> Path | None:
+    """The parameter file that lies beside a profile, shipped or the user's own."""
+    if not profile_source:
+        return None
+    if profile_source.endswith(".toml"):
+        path = Path(profile_source).with_suffix(".mmg.toml")
+    else:
+        path = Path(str(resources.files("shiplog") / "profiles" / f"{profile_source}.mmg.toml"))
+    return path if path.is_file() else None
+
+
+def _from(
+    geometry: Geometry,
+    content: Mapping[str, Mapping[str, float]],
+    source: str,
+    widen: float,
+    path: Path | None = None,
+) -> Parameters:
+    wanted = names(geometry)
+    where = str(path) if path else source
+    known = {part: [*keys] for part, keys in TABLE.items()}
+    for part, values in content.items():
+        if part not in TABLE:
+            raise ProfileError(
+                f"{where} has a section [{part}] that no force reads{nearest(part, TABLE)}.",
+                hint=f"sections are {listed(TABLE)}.",
+            )
+        for key in values:
+            if part != "thruster" and key not in known[part]:
+                raise ProfileError(
+                    f"{where}: {part}.{key} is not a coefficient{nearest(key, known[part])}.",
+                    hint=f"[{part}] can hold {listed(known[part], most=40)}.",
+                )
+    values, missing = [], []
+    for name in wanted:
+        part, key = name.split(".", 1)
+        value = content.get(part, {}).get(key, _entry(name).neutral)
+        if value is None:
+            missing.append(name)
+        values.append(value)
+    if missing:
+        parts = sorted({name.split(".")[0] for name in missing})
+        raise ProfileError(
+            f"{where} lacks {listed(missing, most=8)}.",
+            hint=f"add them, or leave the force out with --without {' --without '.join(parts)}.",
+        )
+    entries = [_entry(name) for name in wanted]
+    array = np.array(values, dtype=float)
+    for name, value, entry in zip(wanted, array, entries, strict=True):
+        if not entry.low <= value <= entry.high:
+            raise ProfileError(
+                f"{where}: {name} ({entry.symbol}) is {value:g}, outside the physical range "
+                f"{entry.low:g} to {entry.high:g}.",
+                hint="correct its value or sign; coefficients are non-dimensional by ½ρL²d.",
+            )
+    spread = widen * np.array(
+        [max(e.share * abs(v), e.least) for e, v in zip(entries, array, strict=True)]
+    )
+    low, high = (np.array([getattr(e, side) for e in entries]) for side in ("low", "high"))
+    return Parameters(wanted, array, spread, low, high, source)
+
+
+def _entry(name: str) -> Entry:
+    part, key = name.split(".", 1)
+    if part == "thruster":
+        key = key.rsplit("_", 1)[1]
+    return TABLE[part][key]
