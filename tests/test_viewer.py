@@ -13,7 +13,7 @@ from rerun.chunk import RrdReader
 from shiplog import viewer
 from shiplog.comparison import Actuator, Comparison
 from shiplog.exceptions import ShiplogError
-from shiplog.viewer import display, histogram, native, timeline, trajectory
+from shiplog.viewer import display, forces, histogram, native, recording, timeline, trajectory
 
 SECONDS = 201
 TURNING = math.radians(6.0)  # rad/s: passes north every minute
@@ -162,6 +162,190 @@ def test_a_turn_to_starboard_turns_clockwise_on_the_chart():
     assert north[0] == pytest.approx((0.0, -2.0))  # bow up: Rerun's y points down
     assert east[0] == pytest.approx((102.0, 0.0))  # bow to the right
     assert north[1][0] == pytest.approx(0.5)  # starboard side to the right
+
+
+def with_band(simulated, model, **half):
+    """The rollouts with a band of that half width about each channel, of one model only."""
+    of = pl.when(pl.col("model") == model)
+    ends = {
+        name + end: of.then(pl.col(name) + sign * width)
+        for name, width in half.items()
+        for end, sign in (("_low", -1), ("_high", 1))
+    }
+    return simulated.with_columns(**ends)
+
+
+def paths(path):
+    return RrdReader(path).store().summary()
+
+
+def test_a_model_that_knows_its_doubt_is_drawn_with_its_band(compared, tmp_path):
+    half = {"surge": 0.1, "yaw_rate": math.radians(2.0), "x0": 3.0}
+    simulated = with_band(compared.simulated, "mmg", **half)
+    # the shown seed is 0: what the other one carries must not be drawn
+    simulated = simulated.with_columns(
+        surge_high=pl.when(pl.col("seed") == 0).then(pl.col("surge_high")).otherwise(9.0)
+    )
+    rrd = tmp_path / "band.rrd"
+    viewer.save(replace(compared, simulated=simulated), rrd)
+    surge = column(rrd, "/state/harbour/surge/band/mmg", "Scalars:scalars")["Scalars:scalars"]
+    assert len(surge) == 201 and np.isnan(surge[100].to_numpy()).all()  # between the windows
+    assert surge[50].to_list() == pytest.approx([0.405, 0.605])  # 0.5 + 0.01/2, give or take 0.1
+    turn = column(rrd, "/state/harbour/yaw_rate/band/mmg", "Scalars:scalars")["Scalars:scalars"]
+    assert turn[7].to_list() == pytest.approx([4.0, 8.0])  # deg/s
+    north = column(rrd, "/state/harbour/x0/band/mmg", "Scalars:scalars")["Scalars:scalars"]
+    assert north[0].to_list() == pytest.approx([-3.0, 3.0])
+    said = column(rrd, "/state/harbour/surge/band/mmg", "SeriesLines:names")
+    assert said["SeriesLines:names"][0].to_list() == ["90 % band"] * 2
+    text = paths(rrd)
+    assert "/state/harbour/surge/seeds/mmg" not in text
+    for without in (
+        r"surge/seeds/network\ fast", "sway/seeds/mmg",  # no columns: as without bands
+    ):  # fmt: skip
+        assert f"/state/harbour/{without}" in text, without
+    assert r"band/network" not in text and "/error/harbour/seeds/mmg" in text
+
+
+def test_without_bands_none_is_drawn(saved, compared):
+    assert "/band/" not in paths(saved)
+    titles = {view["name"] for view in views(recording.layout(display.drawn(compared)))}
+    assert "surge u [m/s]" in titles
+    banded = replace(compared, simulated=with_band(compared.simulated, "mmg", surge=0.1))
+    titles = {view["name"] for view in views(recording.layout(display.drawn(banded)))}
+    assert "surge u [m/s], pale lines: 90 % band of mmg" in titles and "surge u [m/s]" not in titles
+
+
+@pytest.mark.parametrize("wrapped", [True, False], ids=["wrapped", "free-running"])
+def test_a_band_of_headings_stays_about_its_heading(compared, wrapped):
+    """Ten degrees on either side, although -180 is passed by each line at another time."""
+    free = compared.simulated.with_columns(heading=TURNING * (pl.col("time") % 100))
+    banded = with_band(free, "mmg", heading=math.radians(10.0))
+    if wrapped:
+        names = ("heading", "heading_low", "heading_high")
+        banded = banded.with_columns(
+            pl.arctan2(pl.col(name).sin(), pl.col(name).cos()).alias(name) for name in names
+        )
+    drawn = display.drawn(replace(compared, simulated=banded)).simulated
+    mmg = drawn.filter(pl.col("model") == "mmg")
+    assert (mmg["heading_high"] - mmg["heading"]).to_numpy() == pytest.approx(10.0)
+    assert (mmg["heading"] - mmg["heading_low"]).to_numpy() == pytest.approx(10.0)
+    assert drawn.filter(pl.col("model") != "mmg")["heading_low"].null_count() == 800
+
+
+def views(blueprint):
+    """Every view of a blueprint, container by container: its class, name, origin and parents."""
+
+    def within(part, parents):
+        if hasattr(part, "contents") and not hasattr(part, "class_identifier"):
+            for child in part.contents:
+                yield from within(child, (*parents, part.name))
+        else:
+            yield {"name": part.name, "origin": part.origin, "in": parents, "view": part}
+
+    return list(within(blueprint.root_container, ()))
+
+
+def pushed(model, voyage, part, surge, sway=0.0, yaw=0.0):
+    """A part that pushes steadily for 100 s, except that nothing is known of 40 s to 49 s."""
+    time = np.array([t for t in range(100) if not 40 <= t < 50], dtype=float)
+    return pl.DataFrame({"time": time}).select(
+        model=pl.lit(model), voyage=pl.lit(voyage), time="time", part=pl.lit(part),
+        surge=pl.lit(surge), sway=pl.lit(sway), yaw=pl.lit(yaw),
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pushing(compared):
+    rows = [
+        pushed("mmg", "open sea", "hull", -8.0, sway=1.5, yaw=-2.0),
+        pushed("mmg", "open sea", "propeller", 10.0),
+        pushed("mmg", "open sea", "total", 2.0, sway=1.5, yaw=-2.0),
+        pushed("a model of no rollouts", "open sea", "network", 77.0),
+    ]
+    shuffled = pl.concat(rows).sample(fraction=1.0, shuffle=True, seed=0)
+    return replace(compared, forces=shuffled)
+
+
+def test_each_part_is_a_line_with_its_force(pushing, tmp_path):
+    rrd = tmp_path / "forces.rrd"
+    viewer.save(pushing, rrd)
+    for path, value in (
+        ("surge/terms/hull", -8.0), ("sway/terms/hull", 1.5), ("yaw/terms/hull", -2.0),
+        ("surge/terms/propeller", 10.0), ("surge/sum/total", 2.0), ("yaw/sum/total", -2.0),
+    ):  # fmt: skip
+        values = scalars(rrd, rf"/force/open\ sea/{path}")
+        assert len(values) == 90 + 1 and np.isnan(values[40])  # the gap is not bridged
+        assert np.delete(values, 40) == pytest.approx(value)
+    text = paths(rrd)
+    assert "network" not in text.replace(r"network\ fast", "") and "/force/harbour" not in text
+    for part, colour in (("terms/hull", 0x0072B2FF), ("sum/total", 0x191919FF)):  # blue, dark
+        table = column(rrd, rf"/force/open\ sea/yaw/{part}", "SeriesLines:colors")
+        assert table["SeriesLines:colors"][0].to_list() == [colour]
+
+
+def test_forces_stand_on_a_tab_of_their_own(pushing):
+    shown = views(recording.layout(display.drawn(pushing)))
+    plots = [view for view in shown if view["origin"].startswith("/force/")]
+    assert [view["name"] for view in plots] == [
+        "surge force [N], positive ahead", "sway force [N], positive to starboard",
+        "yaw moment [N m], positive bow to starboard",
+    ]  # fmt: skip
+    assert {view["in"][1:] for view in plots} == {("Forces, mmg", "open sea")}
+    tabs = list(dict.fromkeys(view["in"][1] for view in shown if len(view["in"]) > 1))
+    assert tabs == ["harbour", "open sea", "Forces, mmg", "Histograms"]
+    legends = [view["view"].properties["PlotLegend"].visible for view in plots]
+    assert [legend.as_arrow_array().to_pylist() for legend in legends] == [[True], [False], [False]]
+
+
+def test_without_forces_there_is_no_tab_of_them(saved, compared):
+    assert "/force" not in paths(saved)
+    drawn = display.drawn(compared)
+    assert forces.blueprint(drawn, None) is None
+    assert not [v for v in views(recording.layout(drawn)) if v["origin"].startswith("/force")]
+    none = pushed("mmg", "harbour", "hull", 1.0).clear()
+    assert forces.blueprint(display.drawn(replace(compared, forces=none)), None) is None
+
+
+def test_more_voyages_than_tabs_fit_are_sent_but_have_no_tab(compared):
+    names = [f"voyage {i}" for i in range(display.MOST_TABS + 2)]
+    many = replace(
+        compared,
+        measured=pl.concat([circle(name) for name in names]),
+        forces=pl.concat([pushed("mmg", name, "hull", 1.0) for name in names]),
+    )
+    tabs = forces.blueprint(display.drawn(many), None)
+    assert [tab.name for tab in tabs.contents] == names[: display.MOST_TABS]
+
+
+def test_a_spike_does_not_flatten_the_forces():
+    steady = pushed("mmg", "harbour", "hull", -8.0)
+    spiked = steady.with_columns(
+        surge=pl.when(pl.col("time") == 7).then(1e6).otherwise(pl.col("surge"))
+    )
+    low, high = forces.readable_range(spiked, "surge")
+    assert (low, high) == pytest.approx((-10 - 0.8, 0 + 0.8))  # to the next label; zero is in
+    # a rudder among thirty times as many rows of hull is no spike
+    kick = pl.concat([*[steady] * 30, pushed("mmg", "harbour", "rudder", 4.0)])
+    assert forces.readable_range(kick, "surge")[1] > 4.0
+    calm = forces.readable_range(pushed("mmg", "harbour", "hull", math.nan), "surge")
+    assert calm[0] < 0.0 < calm[1]
+
+
+@pytest.mark.parametrize(
+    ("newton", "named", "drawn"), [(9e3, "N", 9e3), (2e6, "kN", 2e3), (3e7, "MN", 30.0)]
+)
+def test_a_large_ship_is_pushed_in_kilonewtons(compared, tmp_path, newton, named, drawn):
+    rows = pushed("mmg", "harbour", "hull", newton)
+    large = replace(compared, forces=rows)
+    (surge, *_) = [
+        view["name"]
+        for view in views(recording.layout(display.drawn(large)))
+        if view["origin"].startswith("/force")
+    ]
+    assert surge == f"surge force [{named}], positive ahead"
+    viewer.save(large, tmp_path / "large.rrd")
+    sent = scalars(tmp_path / "large.rrd", "/force/harbour/surge/terms/hull")
+    assert np.delete(sent, 40) == pytest.approx(drawn)
 
 
 def test_a_ship_with_an_outline_of_its_own_is_drawn_with_it(compared):

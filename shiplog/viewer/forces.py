@@ -40,6 +40,8 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     """One line per part, of one colour in every plot of every voyage."""
     rows = of_first_model(drawn)
     colours = style.part_colours(rows["part"].unique(maintain_order=True).to_list())
+    for voyage in rows["voyage"].unique(maintain_order=True):
+        _send_zero(recording, voyage, rows.filter(pl.col("voyage") == voyage))
     factors = {axis: unit(rows, axis)[1] for axis in AXES}
     for (voyage, part), lines in rows.group_by("voyage", "part", maintain_order=True):
         whole = part == "total"  # behind, and wide: seen under a part that acts alone
@@ -53,7 +55,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
                 display.pieces(lines),
                 [part],
                 colours[part],
-                2.5 if whole else 1.25,
+                2.5 if whole else 1.5,
             )
 
 
@@ -62,7 +64,7 @@ def of_first_model(drawn: Drawn) -> pl.DataFrame:
     if drawn.forces is None:
         return pl.DataFrame(schema=dict.fromkeys(("model", "voyage", "part"), pl.String))
     having = drawn.forces["model"].unique(maintain_order=True).to_list()
-    first = next((model for model in (*drawn.models, *having) if model in having), None)
+    first = next((model for model in (*drawn.models, *having) if model in having), "")
     return drawn.forces.filter(pl.col("model") == first)
 
 
@@ -81,9 +83,7 @@ def readable_range(rows: pl.DataFrame, axis: str, factor: float = 1.0) -> tuple[
     return low - margin, high + margin
 
 
-def _plots(
-    drawn: Drawn, voyage: str, all_rows: pl.DataFrame, rows: pl.DataFrame
-) -> rrb.Container:
+def _plots(drawn: Drawn, voyage: str, all_rows: pl.DataFrame, rows: pl.DataFrame) -> rrb.Container:
     measured = drawn.measured.filter(pl.col("voyage") == voyage)
     plots = []
     for axis, (what, _, positive) in AXES.items():
@@ -92,13 +92,24 @@ def _plots(
             rrb.TimeSeriesView(
                 origin=entity("force", voyage, axis),
                 name=f"{what} [{name}], positive {positive}",
-                axis_x=timeline.whole_voyage(measured),
+                axis_x=timeline.whole_voyage(measured, after=0.07),
                 axis_y=rrb.ScalarAxis(range=readable_range(rows, axis, factor)),
                 plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=axis == "surge"),
-                background=style.plot_background(grid=True),
+                background=style.plot_background(),
             )
         )
     return rrb.Vertical(*plots, name=voyage)
+
+
+def _send_zero(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame) -> None:
+    """A line at zero, behind all: Rerun's own grid is black, and heavier than what is drawn."""
+    ends = display.column(rows, "time")[[0, -1]]
+    for axis in AXES:
+        path = entity("force", voyage, axis, "nothing")
+        none = np.empty(0, dtype=np.intp)
+        timeline.send_lines(
+            recording, path, ends, np.zeros((2, 1)), none, ["zero"], style.ZERO, 1.0
+        )
 
 
 def _reach(rows: pl.DataFrame, axis: str) -> tuple[float, float]:

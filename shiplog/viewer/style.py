@@ -22,6 +22,7 @@ OTHER_PARTS = (MODELS[6], MODELS[7])
 TRAINING: Colour = (150, 160, 175, 255)
 TEST: Colour = (213, 94, 0, 255)
 GRID: Colour = (222, 226, 230, 255)
+ZERO: Colour = (190, 196, 202, 255)
 BANK: Colour = (140, 110, 70, 255)
 TICK: Colour = (30, 30, 30, 255)
 PAPER: Colour = (250, 250, 250, 255)
@@ -34,7 +35,7 @@ def colours(models: list[str]) -> dict[str, Colour]:
 
 def part_colours(parts: list[str]) -> dict[str, Colour]:
     """A part's own colour wherever it is drawn; parts without one share what is left."""
-    others = [part for part in parts if part not in PARTS]
+    others = sorted(part for part in parts if part not in PARTS)
     spare = {part: OTHER_PARTS[i % len(OTHER_PARTS)] for i, part in enumerate(others)}
     return {part: PARTS.get(part) or spare[part] for part in parts}
 
@@ -52,5 +53,5 @@ def entity(*parts: str) -> str:
     return rr.new_entity_path(list(parts))
 
 
-def plot_background(grid: bool = False) -> rrb.archetypes.PlotBackground:
-    return rrb.archetypes.PlotBackground(color=PAPER, show_grid=grid)
+def plot_background() -> rrb.archetypes.PlotBackground:
+    return rrb.archetypes.PlotBackground(color=PAPER, show_grid=False)

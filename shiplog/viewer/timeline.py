@@ -41,9 +41,13 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
             background=style.plot_background(),
         )
 
+    shown = display.shown_seeds(drawn)
+    banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, shown[m]), "surge")]
+    titles = {c.name: AXES.get(c.name, c.label) for c in channels.STATE}
+    if banded:  # said once: a legend would hide a third of so flat a plot
+        titles["surge"] += f", pale lines: 90 % band of {', '.join(banded)}"
     states = {
-        c.name: plot(AXES.get(c.name, c.label), "state", voyage, c.name, shows=[c.name])
-        for c in channels.STATE
+        name: plot(title, "state", voyage, name, shows=[name]) for name, title in titles.items()
     }
     first = [plot("error: log10(1 + d), dots where a window starts", "error", voyage, legend=True)]
     first += [states.pop(name) for name in BESIDE_THE_ERROR]
@@ -62,13 +66,16 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     )
 
 
-def whole_voyage(rows: pl.DataFrame) -> rrb.TimeAxis:
-    """A time axis over all of these rows, which stays when another is zoomed."""
+def whole_voyage(rows: pl.DataFrame, after: float = 0.04) -> rrb.TimeAxis:
+    """A time axis over all of these rows, which stays when another is zoomed.
+
+    after    share of the voyage that is left free at its end, where the legend stands
+    """
     time = display.column(rows, "time")
-    margin = 0.04 * float(np.ptp(time))
+    before = 0.04 * float(np.ptp(time))
     whole = rrb.TimeRange(
-        start=rrb.TimeRangeBoundary.absolute(seconds=float(np.min(time)) - margin),
-        end=rrb.TimeRangeBoundary.absolute(seconds=float(np.max(time)) + margin),
+        start=rrb.TimeRangeBoundary.absolute(seconds=float(np.min(time)) - before),
+        end=rrb.TimeRangeBoundary.absolute(seconds=float(np.max(time) + after * np.ptp(time))),
     )
     return rrb.TimeAxis(link="Independent", view_range=whole)
 
@@ -166,14 +173,14 @@ def _send_simulated(
     curves.append(("d", ("error", voyage)))
     for model, colour in style.colours(drawn.models).items():
         rollouts = simulated.filter(pl.col("model") == model)
-        bold = rollouts.filter(pl.col("seed") == shown[model])
+        bold = _bold(simulated, model, shown[model])
         time, begins = display.column(bold, "time"), display.pieces(bold)
         spread = _spread(rollouts) if rollouts["seed"].n_unique() > 1 else None
         for name, parent in curves:
             values = display.column(bold, name)[:, None]
             path = entity(*parent, "simulated", model)
             send_lines(recording, path, time, values, begins, [model], colour, 1.25)
-            if display.has_band(bold, name):  # its own doubt says more than another seed's start
+            if display.has_band(bold, name):  # what the model itself doubts, not how training went
                 rows, ends, kind, thin = bold, BAND, "band", "90 % band"
             elif spread is not None:
                 rows, ends, kind, thin = spread, SPREAD, "seeds", "lowest, highest seed"
@@ -190,6 +197,10 @@ def _send_simulated(
                 0.7,
             )
     _send_window_starts(recording, voyage, simulated)
+
+
+def _bold(simulated: pl.DataFrame, model: str, seed: int) -> pl.DataFrame:
+    return simulated.filter(pl.col("model") == model, pl.col("seed") == seed)
 
 
 SPREAD = ("_lowest", "_highest")

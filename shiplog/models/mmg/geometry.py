@@ -11,6 +11,7 @@ from shiplog.models.mmg.estimate import Particulars, particulars
 from shiplog.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
+WIDE = math.radians(45.0)
 PARTS = ("hull", "propeller", "rudder", "thruster", "wind")  # forces that can be asked for
 
 
@@ -35,6 +36,7 @@ class Rudder:
     starboard: float  # m
     area: float  # m²
     span: float  # m
+    wide: bool  # made to be turned beyond 45 deg: Schilling, VecTwin
     behind: int | None  # index into Geometry.propellers
 
 
@@ -112,6 +114,7 @@ def geometry(
             *a.position_m,
             _needed(a, "area_m2", "rudder"),
             _needed(a, "span_m", "rudder"),
+            a.limits is not None and max(map(abs, a.limits)) * a.scale()[0][1] > WIDE,
             _slipstream(a, propellers),
         )
         for a in profile.actuators

@@ -76,6 +76,7 @@ TABLE: dict[str, dict[str, Entry]] = {
         "gamma_n": _E("γ_N", 0.3, 0.05, 0.0, 2.0), "gamma_p": _E("γ_P", 0.3, 0.05, 0.0, 2.0),
         "f_alpha": _E("f_α", 0.15, 0.0, 0.3, 6.0),
         "f_3": _E("f₃", 0.0, 0.3, -0.95, 3.0, neutral=0.0),
+        "f_t": _E("f_T", 0.0, 0.3, -1.0, 6.0, neutral=0.0),
     },
     "thruster": {
         "ahead": _E("T₊", 0.5, 0.0, 0.0, 1e7, unit="N"),
@@ -148,6 +149,8 @@ def estimated(geometry: Geometry, main: Particulars) -> Parameters:
     if geometry.rudders:
         blade = geometry.rudders[0]
         guess["rudder"] = estimate.rudder(main, blade.area, blade.span)
+        if blade.wide:  # a blade made for such angles turns the jet along itself
+            guess["rudder"]["f_t"] = guess["rudder"]["f_alpha"]
     if geometry.thrusters:
         # Bollard pull that holds the ship at 0.15 √(gL) against her resistance, shared out.
         speed2 = 0.15**2 * 9.81 * main.length

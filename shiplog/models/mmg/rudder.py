@@ -57,19 +57,23 @@ def rudder(
 
     v_R = -γ (v + ℓ'_R L r), γ = γ_P where v + x_R r ≥ 0, else γ_N;  α_R = δ - atan2(v_R, u_R)
     F_N = ½ρA_R (u_R² + v_R²) f_α (1 + f₃ sin²α_R) sin α_R
-    X_R = -(1 - t_R) F_N sin δ, Y_R = -(1 + a_H) F_N cos δ, N_R = -(x_R + a_H x_H) F_N cos δ
+    F_T = ½ρA_R (u_R² + v_R²) f_T (1 - cos α_R)
+    X_R = (1 - t_R) (F_T cos δ - F_N sin δ), Y_R = -(1 + a_H) (F_N cos δ + F_T sin δ),
+    N_R = (x_R + a_H x_H) Y_R / (1 + a_H)
 
-    f₃ is ours: what a blade at large angles has more or less than the sine; 0 is the MMG's.
+    f₃ and F_T are ours, zero in the MMG. A fish-tail blade (Schilling, VecTwin) turns the jet
+    until it leaves along its chord; by the balance of momentum J (Rankine) its force is then
+    J sin α across and J (1 - cos α) along the chord.
     """
     gamma = jnp.where(v + blade.ahead * r >= 0.0, p["rudder.gamma_p"], p["rudder.gamma_n"])
     v_r = -gamma * (v + p["rudder.l_r"] * g.length * r)
     attack = angle - jnp.arctan2(v_r, jnp.where((u_r == 0.0) & (v_r == 0.0), 1.0, u_r))
-    s = jnp.sin(attack)
-    normal = 0.5 * g.density * blade.area * (u_r**2 + v_r**2)
-    normal = normal * p["rudder.f_alpha"] * (1.0 + p["rudder.f_3"] * s * s) * s
-    x = -(1.0 - p["rudder.t_r"]) * normal * jnp.sin(angle)
-    across = -normal * jnp.cos(angle)
+    s, c = jnp.sin(attack), jnp.cos(attack)
+    pressure = 0.5 * g.density * blade.area * (u_r**2 + v_r**2)
+    normal = pressure * p["rudder.f_alpha"] * (1.0 + p["rudder.f_3"] * s * s) * s
+    along = pressure * p["rudder.f_t"] * (1.0 - c)
+    x = (1.0 - p["rudder.t_r"]) * (along * jnp.cos(angle) - normal * jnp.sin(angle))
+    across = -(normal * jnp.cos(angle) + along * jnp.sin(angle))
     y = (1.0 + p["rudder.a_h"]) * across
     at = blade.ahead + p["rudder.a_h"] * p["rudder.x_h"] * g.length
     return jnp.stack((x, y, at * across - blade.starboard * x), axis=-1)
-
