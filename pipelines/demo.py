@@ -9,7 +9,8 @@ from pathlib import Path
 
 from pipelines.evaluate import compare_runs
 from pipelines.prepare import ingest_logs
-from pipelines.train import choose_split, train_run
+from pipelines.split import choose_split
+from pipelines.train import train_run
 from shiplog.config import Config, Fast
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.store import Store

@@ -7,15 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import torch
 
 from pipelines.prepare import seconds
-from pipelines.train import plan
+from pipelines.split import plan
+from shiplog import band, evaluate, floors, report, runs, table, windows
 from shiplog import coverage as covering
-from shiplog import evaluate, floors, report, runs, table, windows
 from shiplog.channels import STATE
-from shiplog.comparison import Actuator, Comparison
+from shiplog.comparison import BAND, Actuator, Comparison
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.runs import Run
 from shiplog.store import Store
@@ -32,6 +33,8 @@ class Evaluation:
     rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
     coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
     floors     mean L of holding the velocity and of quadratic least squares, first run's data
+    inside     run, channel, share: of the samples inside the 90 % band, where a run has one
+    forces     of the first physical run along the voyages, as Comparison has them; or None
     """
 
     runs: tuple[Run, ...]
@@ -42,11 +45,15 @@ class Evaluation:
     rollouts: pl.DataFrame
     coverage: pl.DataFrame
     floors: dict[str, float]
+    inside: pl.DataFrame
+    forces: pl.DataFrame | None
 
     def answer(self, run: Run) -> dict:
-        """The contract's JSON for one run."""
+        """The contract's JSON for one run, and the share of samples inside its 90 % band."""
         errors = self.errors.filter(pl.col("run") == run.name)
-        return report.evaluation_json(errors, self.floors, self.coverage)
+        answer = report.evaluation_json(errors, self.floors, self.coverage)
+        shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
+        return answer | {"band_90": dict(shares.iter_rows())}
 
     def text(self) -> str:
         """Markdown: models against floors, voyages, the worst windows of the first run."""
@@ -60,6 +67,7 @@ class Evaluation:
             "",
             report.models_table(answers, self.floors, self.runs[0].name),
             "",
+            *report.band_lines(self.inside),
             f"Per voyage, {self.runs[0].name}:",
             "",
             report.voyages_table(first),
@@ -93,11 +101,12 @@ def evaluate_runs(paths: Sequence[Path], store: Store, voyages: Sequence[str]) -
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
     numbered = _numbered(cut)
-    scored = [
-        (run, seed, evaluate.score(model, cut))
-        for run in opened
-        for seed, model in run.models().items()
-    ]
+    scored, bands = [], {}
+    for run in opened:
+        models = run.models()
+        scores = {seed: evaluate.score(model, cut) for seed, model in models.items()}
+        scored += [(run, seed, one) for seed, one in scores.items()]
+        bands[run.name] = _half_widths(run, models, scores, cut)
     return Evaluation(
         runs=opened,
         voyages=tuple(names),
@@ -106,9 +115,13 @@ def evaluate_runs(paths: Sequence[Path], store: Store, voyages: Sequence[str]) -
         errors=pl.concat(
             [_labelled(numbered, run, seed).hstack(s.errors) for run, seed, s in scored]
         ),
-        rollouts=pl.concat([_rollout(numbered, cut, run, seed, s) for run, seed, s in scored]),
+        rollouts=pl.concat(
+            [_rollout(numbered, cut, run, seed, s, bands[run.name]) for run, seed, s in scored]
+        ),
         coverage=_coverage(first, rows, numbered, size),
         floors=_floors(first, cut),
+        inside=_inside(scored, bands, cut),
+        forces=_forces(opened, rows),
     )
 
 
@@ -122,7 +135,7 @@ def save(evaluation: Evaluation) -> None:
 def comparison(evaluation: Evaluation, title: str) -> Comparison:
     """What the viewer shows of an evaluation."""
     run = evaluation.runs[0]
-    labels = {r.name: f"{r.name} ({r.config.recipe})" for r in evaluation.runs}
+    labels = {r.name: f"{r.name} ({r.config.kind})" for r in evaluation.runs}
     profile = run.profile
     return Comparison(
         title=title,
@@ -141,6 +154,11 @@ def comparison(evaluation: Evaluation, title: str) -> Comparison:
         summary=evaluation.text(),
         banks=profile.site.banks,
         trained=run.name if len(evaluation.runs) > 1 else "",
+        forces=None
+        if evaluation.forces is None
+        else evaluation.forces.with_columns(
+            model=pl.col("run").replace_strict(labels, return_dtype=pl.String)
+        ).drop("run"),
     )
 
 
@@ -219,8 +237,59 @@ def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:
     )
 
 
+def _half_widths(
+    run: Run, models: dict, scores: dict[int, evaluate.Scores], cut: Windows
+) -> np.ndarray | None:
+    """[N, I, 6] of the run's 90 % band: of its parameters' spread or of its seeds'."""
+    learnt = run.band()
+    if learnt is None or len(learnt.growth) != cut.state.shape[1]:
+        return None
+    if run.config.physical:
+        spread = next(iter(models.values())).spread(cut)
+    else:
+        spread = band.seeds_spread([one.simulated.numpy() for one in scores.values()])
+    return learnt.half_width(spread)
+
+
+def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> pl.DataFrame:
+    """run, channel, share of the samples of all seeds inside the band."""
+    rows = []
+    for run in dict.fromkeys(run.name for run, _, _ in scored):
+        half = bands[run]
+        if half is None:
+            continue
+        shares = np.mean(
+            [
+                band.coverage((s.simulated - cut.state).numpy(), half)
+                for r, _, s in scored
+                if r.name == run
+            ],
+            axis=0,
+        )
+        rows += [(run, c.name, float(shares[i])) for i, c in enumerate(STATE)]
+    schema = {"run": pl.String, "channel": pl.String, "share": pl.Float64}
+    return pl.DataFrame(rows, schema=schema, orient="row")
+
+
+def _forces(opened: tuple[Run, ...], rows: pl.DataFrame) -> pl.DataFrame | None:
+    for run in opened:
+        if run.config.physical:
+            from shiplog import forces
+
+            simulator = run.simulator(run.config.seeds[0])
+            return forces.along(simulator, rows, run.profile).with_columns(
+                pl.lit(run.name).alias("run")
+            )
+    return None
+
+
 def _rollout(
-    numbered: pl.DataFrame, cut: Windows, run: Run, seed: int, scores: evaluate.Scores
+    numbered: pl.DataFrame,
+    cut: Windows,
+    run: Run,
+    seed: int,
+    scores: evaluate.Scores,
+    half: np.ndarray | None,
 ) -> pl.DataFrame:
     count, size, _ = scores.simulated.shape
     since = torch.cat((torch.zeros(count, 1, dtype=torch.float64), cut.dt.cumsum(1)), 1)
@@ -231,9 +300,23 @@ def _rollout(
         pl.DataFrame(
             {"time": index["elapsed"].to_numpy() + since.flatten().numpy()}
             | {c.name: states[:, j] for j, c in enumerate(STATE)}
+            | _edges(states, half)
             | {"d": scores.d.flatten().numpy()}
         )
     )
+
+
+def _edges(states: np.ndarray, half: np.ndarray | None) -> dict[str, pl.Series]:
+    """<channel>_low and _high of the 90 % band; without one, nulls."""
+    wide = None if half is None else half.reshape(-1, len(STATE))
+    edges = {}
+    for j, c in enumerate(STATE):
+        for suffix, sign in zip(BAND, (-1.0, 1.0), strict=True):
+            at = None if wide is None else states[:, j] + sign * wide[:, j]
+            edges[c.name + suffix] = pl.Series(
+                values=[None] * len(states) if at is None else at, dtype=pl.Float64
+            )
+    return edges
 
 
 def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:

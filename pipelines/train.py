@@ -1,42 +1,36 @@
-"""Voyages to a trained run: split, windows, one process a seed."""
+"""Voyages to a trained network: windows, one process a seed."""
 
 from __future__ import annotations
 
-import datetime
 import logging
 import os
-import platform
-import subprocess
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
-from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import torch
 
 from pipelines.prepare import seconds
-from shiplog import engine, runs, seeds, table, train, windows
-from shiplog.config import Config, Split
-from shiplog.exceptions import RunError, StoreError, listed, nearest
+from pipelines.provenance import Answer, provenance
+from pipelines.split import choose_split, plan, refuse_shared_rows
+from shiplog import band, engine, runs, seeds, train, windows
+from shiplog.config import Config
+from shiplog.exceptions import RunError, listed, nearest
 from shiplog.findings import CONTRACT
 from shiplog.models import MODELS
 from shiplog.models.feedforward import scaling
 from shiplog.runs import Run
+from shiplog.simulate import simulate
 from shiplog.store import Store
 from shiplog.windows import AUGMENTATIONS, Windows
 
 log = logging.getLogger(__name__)
-
-PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
-SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
-HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
 
 
 def train_run(config: Config, store: Store, out: Path) -> Run:
@@ -81,7 +75,17 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
                 "A training process was ended from outside, perhaps for want of memory.",
                 hint="give the same command again: finished seeds and checkpoints are kept.",
             ) from error
+    run.save_band(_band(run, held))
     return run.finish(provenance(store, split, began))
+
+
+def _band(run: Run, held: pl.DataFrame) -> band.Band:
+    """How far off its seeds were on the validation voyages, which they did not learn from."""
+    unseen = _cut(run, held, plan(held, "ref", run.config.window))
+    simulated = [simulate(model, unseen).numpy() for model in run.models().values()]
+    error = np.concatenate([states - unseen.state.numpy() for states in simulated])
+    spread = np.concatenate([band.seeds_spread(simulated)] * len(simulated))
+    return band.calibrate(error, spread)
 
 
 @contextmanager
@@ -132,150 +136,24 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     return progress.best, progress.epoch, time.time() - began
 
 
-def plan(rows: pl.DataFrame, data: str, size: int) -> pl.DataFrame:
-    """The planned windows of one of the paper's datasets; steps scale with the window."""
-    augmentation = AUGMENTATIONS[data]
-    step = max(1, augmentation.step * size // windows.SIZE)
-    return windows.plan(rows.lazy(), size, step, augmentation.copies).collect()
-
-
 def _cut(run: Run, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
     names = (run.profile.actuator_names, run.profile.wind_names)
     return windows.cut(rows, planned, run.config.window, *names)
 
 
-def choose_split(
-    store: Store, voyages: Sequence[str], validation: Sequence[str], data: str, size: int
-) -> Split:
-    """Which voyages train, validate and test; what the user did not say is chosen, and said.
-
-    Six voyages in order, or the sample logs, are split as in the paper; else whole voyages are
-    dealt out in order of time, about 15 % of the seconds each to validation and test.
-    """
-    names = store.select(list(voyages) or None)
-    if validation:
-        held = store.select(list(validation))
-        training = tuple(n for n in names if n not in held)
-        if not training:
-            raise StoreError(
-                "Every training voyage is also a validation voyage.",
-                hint="name other voyages with --voyages.",
+def check_choices(model: str, data: str, recipe: str, wind_input: str | None) -> None:
+    """Raises RunError for a word that names nothing."""
+    for value, allowed, option in (
+        (model, tuple(MODELS), "--model"),
+        (data, tuple(AUGMENTATIONS), "--data"),
+        (recipe, ("fast", "paper"), "--recipe"),
+        (wind_input or "angle", ("angle", "components"), "--wind-input"),
+    ):
+        if value not in allowed:
+            raise RunError(
+                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
+                hint=f"{option} can be {listed(allowed)}.",
             )
-        return Split(training=training, validation=tuple(held), chosen_by="the user")
-    if not voyages and set(SAMPLE_VOYAGES) <= set(names):
-        names = list(SAMPLE_VOYAGES)
-    if len(names) == 6 and (voyages or names == list(SAMPLE_VOYAGES)):
-        count = PAPER_TRAINING.get(data, 2)
-        return Split(
-            training=tuple(names[:count]),
-            validation=(names[4],),
-            test=(names[5],),
-            chosen_by="the paper's Table 4, voyages 1 to 6 in order",
-        )
-    return _deal(store, names, size)
-
-
-def _deal(store: Store, names: list[str], size: int) -> Split:
-    profile = store.profile(names)
-    rows = seconds(store, names, profile)
-    whole = plan(rows, "ref", size).group_by("voyage").len()
-    counts = dict(whole.iter_rows())
-    first = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())
-    usable = sorted((n for n in names if n in counts), key=lambda n: (first[n], n))
-    twin = {}  # the same data under two names stays on one side
-    for left, right, _ in table.shared_rows(rows).iter_rows():
-        twin[right] = twin.get(left, left)
-    groups: dict[str, list[str]] = {}
-    for name in usable:
-        groups.setdefault(twin.get(name, name), []).append(name)
-    if len(groups) < 2:
-        raise StoreError(
-            f"{len(groups)} voyage(s) with a window of {size} s cannot be split into training and "
-            f"validation.",
-            hint="ingest at least two voyages, or choose a shorter --window.",
-        )
-    sides: dict[str, list[str]] = {"training": [], "validation": [], "test": []}
-    taken = dict.fromkeys(sides, 0)
-    want = {"validation": HELD_OUT_SHARE, "test": HELD_OUT_SHARE if len(groups) > 2 else 0.0}
-    left = len(groups)
-    for members in groups.values():
-        weight = sum(counts[m] for m in members)
-        total = sum(taken.values()) + weight
-        lacking = [s for s in ("validation", "test") if want[s] and not taken[s]]
-        behind = [s for s in ("validation", "test") if taken[s] < want[s] * total]
-        side = "training"
-        if taken["training"] and (behind or left <= len(lacking)):
-            side = (lacking or behind)[0] if left <= len(lacking) else behind[0]
-        sides[side] += members
-        taken[side] += weight
-        left -= 1
-    return Split(
-        **{side: tuple(members) for side, members in sides.items()},
-        chosen_by="whole voyages dealt out in order of time",
-    )
-
-
-def refuse_shared_rows(rows: pl.DataFrame, split: Split) -> None:
-    """The same seconds in training and validation make the validation worthless: refuse."""
-    for left, right, count in table.shared_rows(rows).iter_rows():
-        if (left in split.training) != (right in split.training):
-            raise StoreError(
-                f"{left} and {right} hold {count} identical seconds, one in training, the other "
-                "in validation.",
-                hint="leave one of them out.",
-            )
-
-
-def provenance(store: Store, split: Split, began: float) -> dict:
-    """Versions, commit, log hashes, device and times."""
-    hashes = {e.name: e.sha256 for e in store.entries()}
-    used = [*split.training, *split.validation]
-    return {
-        "shiplog": version("shiplog"),
-        "commit": _commit(),
-        "python": platform.python_version(),
-        "torch": torch.__version__,
-        "polars": pl.__version__,
-        "machine": platform.machine(),
-        "device": "cpu",
-        "logs_sha256": {name: hashes.get(name) for name in used},
-        "began": _utc(began),
-        "ended": _utc(time.time()),
-        "command": sys.argv,
-    }
-
-
-def _utc(stamp: float) -> str:
-    return datetime.datetime.fromtimestamp(stamp, datetime.UTC).isoformat(timespec="seconds")
-
-
-def _commit() -> str | None:
-    """The source's commit, where shiplog runs from its own checkout.
-
-    Installed into an environment inside somebody's repository, git would name their commit.
-    """
-    checkout = Path(__file__).parents[1]
-    if not (checkout / ".git").exists():
-        return None
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(checkout), "rev-parse", "HEAD"],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=False,
-        )
-    except OSError:
-        return None
-    return done.stdout.strip() or None
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a command says: to a person and to a machine."""
-
-    text: str
-    content: dict
 
 
 def train_command(
@@ -294,17 +172,6 @@ def train_command(
     epochs: int | None,
 ) -> Answer:
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
-    for value, allowed, option in (
-        (model, tuple(MODELS), "--model"),
-        (data, tuple(AUGMENTATIONS), "--data"),
-        (recipe, ("fast", "paper"), "--recipe"),
-        (wind_input or "angle", ("angle", "components"), "--wind-input"),
-    ):
-        if value not in allowed:
-            raise RunError(
-                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
-                hint=f"{option} can be {listed(allowed)}.",
-            )
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
     log.info(

@@ -214,7 +214,9 @@ def voyages(store: StoreOption = STORE, json_to: JsonOption = None) -> None:
 @app.command()
 def train(
     out: Annotated[Path, typer.Option(help="The run folder to make.")],
-    model: Annotated[str, typer.Option(help="Which dynamic model: feedforward.")] = "feedforward",
+    model: Annotated[
+        str, typer.Option(help="Which dynamic model: feedforward, mmg or hybrid.")
+    ] = "feedforward",
     data: Annotated[
         str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")
     ] = "ref",
@@ -233,15 +235,49 @@ def train(
     epochs: Annotated[
         int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
     ] = None,
+    fit: Annotated[
+        bool,
+        typer.Option("--fit/--no-fit", help="Physical models: identify, or as published."),
+    ] = True,
+    parameters: Annotated[
+        Path | None, typer.Option(help="Physical models: TOML of coefficients to start from.")
+    ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(help="Physical models: a force to switch off, such as wind.")
+    ] = None,
+    free: Annotated[
+        list[str] | None, typer.Option(help="Physical models: parameters that may move: 'wind.*'.")
+    ] = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
     """Train a model; interrupted, give the same command again and it goes on.
 
     Example: shiplog train --data ref --seeds 3 --out runs/ref
+    Example: shiplog train --model mmg --voyages 'trial_*' --out runs/mmg
     """
-    from pipelines.train import train_command
+    from pipelines.train import check_choices, train_command
 
+    check_choices(model, data, recipe, wind_input)
+    if model != "feedforward":
+        from pipelines.identify import identify_command
+
+        found = identify_command(
+            store,
+            out,
+            model=model,
+            data=data,
+            voyages=voyages or [],
+            validation=validation or [],
+            seeds=seeds,
+            window=window,
+            fit=fit,
+            parameters=parameters,
+            without=without or [],
+            free=free or [],
+        )
+        _answer(found.text, found.content, json_to)
+        return
     answer = train_command(
         store,
         out,

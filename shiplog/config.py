@@ -51,6 +51,18 @@ class Network(Section):
     input_tanh: bool = False
 
 
+class Physics(Section):
+    """How a physical model is identified; the hybrid's network too."""
+
+    fit: bool = True  # else the starting values as they are
+    parameters: str = ""  # where the starting values are from
+    without: tuple[str, ...] = ()  # forces switched off
+    free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
+    folds: int = Field(default=5, ge=2)
+    width: int = Field(default=8, gt=0)  # of the hybrid's residual network
+    strengths: tuple[float, ...] = (0.1, 0.3, 1.0)  # of it, to choose from on held-out voyages
+
+
 class Split(Section):
     """Whole voyages, never parts of one on both sides."""
 
@@ -72,6 +84,11 @@ class Config(Section):
     network: Network = Field(default_factory=lambda: Network(wind_input="components"))
     paper: Paper = Paper()
     fast: Fast = Fast()
+    physics: Physics = Physics()
+
+    @property
+    def physical(self) -> bool:
+        return self.model != "feedforward"
 
     @model_validator(mode="before")
     @classmethod
@@ -83,8 +100,17 @@ class Config(Section):
         )
         return {**values, "network": network}
 
+    @property
+    def kind(self) -> str:
+        """What a legend says of the model in a word: the recipe, or the physics."""
+        if not self.physical:
+            return self.recipe
+        return self.model if self.physics.fit else f"{self.model}, as published"
+
     def to_toml(self) -> str:
-        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+        """As it is saved; the sections of the other kind of model left out."""
+        other = {"network", "paper", "fast"} if self.physical else {"physics"}
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True, exclude=other))
 
 
 def load(path: Path) -> Config:

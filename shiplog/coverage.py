@@ -82,16 +82,7 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
     mean, std = values.mean(0), values.std(0)
     std = np.where(std > 1e-9, std, 1.0)
     features = (values - mean) / std
-    even = (np.arange(len(features)) // BLOCK) % 2 == 0
-    if even.all():  # less than two blocks: nothing to compare with but itself
-        even = np.arange(len(features)) % 2 == 0
-    apart = np.concatenate(
-        (
-            KDTree(features[even]).query(features[~even])[0],
-            KDTree(features[~even]).query(features[even])[0],
-        )
-    )
-    limit = max(float(np.quantile(apart, QUANTILE)), 1e-9)
+    limit = independent_distance(features)
     bins = {
         name: set(_bins(training[name].to_numpy(), std[j]).tolist())
         for j, name in enumerate(names)
@@ -101,6 +92,20 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
     return Coverage(
         names, mean, std, KDTree(features), limit, bins, seen, tuple(actuators), has_wind
     )
+
+
+def independent_distance(features: np.ndarray) -> float:
+    """How far all but 5 % of samples [n, Z] lie from the nearest of another stretch of time."""
+    even = (np.arange(len(features)) // BLOCK) % 2 == 0
+    if even.all():  # less than two blocks: nothing to compare with but itself
+        even = np.arange(len(features)) % 2 == 0
+    apart = np.concatenate(
+        (
+            KDTree(features[even]).query(features[~even])[0],
+            KDTree(features[~even]).query(features[even])[0],
+        )
+    )
+    return max(float(np.quantile(apart, QUANTILE)), 1e-9)
 
 
 def reason(row: dict, seconds: pl.DataFrame) -> str:

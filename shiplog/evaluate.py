@@ -12,7 +12,7 @@ from torch import Tensor
 
 from shiplog import channels
 from shiplog.models.base import Dynamics
-from shiplog.simulate import simulate
+from shiplog.simulate import Simulates, simulate
 from shiplog.windows import Windows
 
 ERRORS = ("loss", "rmse_surge", "rmse_sway", "rmse_yaw_rate", "end_position_m", "end_heading_deg")
@@ -40,7 +40,7 @@ class Scores:
     errors: pl.DataFrame
 
 
-def score(dynamics: Dynamics, windows: Windows) -> Scores:
+def score(dynamics: Dynamics | Simulates, windows: Windows) -> Scores:
     """Roll a model out over the windows and compare. A rollout that diverges scores infinity."""
     simulated = simulate(dynamics, windows)
     d = prediction_error(simulated, windows.state)

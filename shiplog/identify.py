@@ -8,18 +8,14 @@ error at one second is its error a second later.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from shiplog.exceptions import ModelError, listed
-from shiplog.sensitivity import Physical, Series, losses, normal, rollout
-
-log = logging.getLogger(__name__)
+from shiplog.sensitivity import Physical, Series, losses, normal
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
 ROUNDS = 3  # of weighing the ridge by the noise that the fit before it left
@@ -63,6 +59,8 @@ def identify(
     bounds: tuple[np.ndarray, np.ndarray] | None = None,
     free: np.ndarray | None = None,
     begin: np.ndarray | None = None,
+    most: int = MOST_EVALUATIONS,
+    rounds: int = ROUNDS,
 ) -> Identified:
     """Fit θ by rollout error over all windows with weight.
 
@@ -70,14 +68,14 @@ def identify(
     bounds          [P], [P]  physical range
     free            [P]  which may move; all
     begin           [P]  where to begin, if not at `start`
+    most, rounds    evaluations a round; rounds of weighing the ridge by the noise left over
 
     Raises ModelError where not even the start can be rolled out.
     """
     free = np.ones(len(start), dtype=bool) if free is None else free
     values = np.array(start if begin is None else begin, dtype=float)
-    low, high = bounds if bounds is not None else (np.full_like(start, -np.inf),) * 2
-    if bounds is None:
-        high = np.full_like(start, np.inf)
+    endless = np.full(len(start), np.inf)
+    low, high = bounds if bounds is not None else (-endless, endless)
     weight = data.weight
     before = losses(model, values, data)
     if not np.isfinite(before[weight > 0]).all():
@@ -89,7 +87,7 @@ def identify(
     samples = 3.0 * float((weight * data.dt.sum(1)).sum())
     noise = CORRELATION * float(weight @ before) / samples
     evaluations, converged, message = 0, True, "converged"
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         problem = _Problem(model, start, spread, data, free, noise)
         guess = (values - start)[free] / spread[free]
         side = [(b - start)[free] / spread[free] for b in (low, high)]
@@ -103,12 +101,12 @@ def identify(
             xtol=1e-4,
             ftol=TOLERANCE,
             gtol=1e-10,
-            max_nfev=MOST_EVALUATIONS,
+            max_nfev=most,
         )
         evaluations += problem.evaluations
         values = problem.whole(done.x)
         converged = done.status > 0
-        message = "converged" if converged else "the limit of evaluations was reached"
+        message = "converged" if converged else _unsettled(done, model.names, free, most)
         after = losses(model, values, data)
         now = CORRELATION * float(weight @ after) / samples
         settled = abs(now / noise - 1.0) < 0.05
@@ -125,6 +123,16 @@ def identify(
         evaluations=evaluations,
         converged=converged,
         message=message,
+    )
+
+
+def _unsettled(done, names: Sequence[str], free: np.ndarray, most: int) -> str:
+    """Which parameters the cost still falls along, where the evaluations ran out."""
+    slope = np.abs(done.jac.T @ done.fun)
+    moving = [np.flatnonzero(free)[i] for i in np.argsort(-slope)[:3]]
+    return (
+        f"after {most} evaluations {listed(names[i] for i in moving)} still move; "
+        "the last values that made the error smaller are kept"
     )
 
 

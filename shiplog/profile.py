@@ -281,7 +281,7 @@ def load(name_or_path: str | Path) -> Profile:
                 hint=f"shipped profiles: {listed(shipped())}; "
                 "or draft one with `shiplog profile LOG`.",
             )
-        text, source = path.read_text(encoding="utf-8"), str(path)
+        text, source = path.read_text(encoding="utf-8"), str(path.resolve())
     else:
         name = str(name_or_path)
         if name not in shipped():

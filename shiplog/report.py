@@ -213,6 +213,37 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
     )
 
 
+def parameters_table(identified: pl.DataFrame) -> str:
+    """Every parameter that was free: start, value, standard error, and how far it moved."""
+    rows = [
+        (
+            r["name"],
+            r["symbol"],
+            r["meaning"],
+            f"{r['start']:.4g}",
+            f"{r['value']:.4g}",
+            f"{r['standard_error']:.2g}",
+            f"{(r['value'] - r['start']) / r['spread']:+.1f}",
+        )
+        for r in identified.filter(pl.col("free")).to_dicts()
+    ]
+    head = ("parameter", "symbol", "what", "start", "value", "standard error", "moved (spreads)")
+    return table(head, rows)
+
+
+def band_lines(inside: pl.DataFrame) -> list[str]:
+    """What share of the samples lies inside each run's 90 % band, and a blank line."""
+    lines = []
+    for run in inside["run"].unique(maintain_order=True):
+        mine = inside.filter(pl.col("run") == run)
+        shares = ", ".join(
+            f"{channel.replace('_', ' ')} {share:.0%}"
+            for channel, share in mine.select("channel", "share").iter_rows()
+        )
+        lines.append(f"Inside the 90 % band of {run}: {shares}.")
+    return [*lines, ""] if lines else []
+
+
 def voyages_table(answer: dict) -> str:
     """L, windows and coverage of each voyage."""
     rows = [

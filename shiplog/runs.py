@@ -4,8 +4,11 @@
     <run>/profile.json                      the ship the run is of
     <run>/windows.parquet                     which windows it learned from
     <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from
-    <run>/scaling.safetensors               mean and std of inputs and accelerations
+    <run>/scaling.safetensors               mean and std of inputs and accelerations (networks)
     <run>/seed<k>/model.safetensors  training.parquet   weights; epoch, losses; never redone
+    <run>/seed<k>/model.safetensors  parameters.toml  identified.parquet    of physical models
+    <run>/cross_validation.parquet          L of every training window by a fit without its voyage
+    <run>/band.safetensors                  how far off a simulation may be
     <run>/errors.parquet  rollouts.parquet  of the latest evaluation, per window, step and seed
 
 While it is being trained a run is called <run>.partial; it is renamed when every seed is done.
@@ -24,14 +27,18 @@ import numpy as np
 import polars as pl
 import torch
 from safetensors import SafetensorError
+from safetensors.numpy import load_file as load_arrays
+from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog import config as configuration
+from shiplog.band import Band
 from shiplog.config import Config
-from shiplog.exceptions import RunError
+from shiplog.exceptions import RunError, listed
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.profile import Profile
 from shiplog.report import finite
+from shiplog.sensitivity import Simulator
 from shiplog.train import HISTORY, Progress
 
 
@@ -50,6 +57,10 @@ class Run:
     @property
     def label(self) -> str:
         """How results are headed: model, data, recipe, and how the wind enters if it does."""
+        if self.config.physical:
+            off = f", without {listed(off)}" if (off := self.config.physics.without) else ""
+            how = f"identified on {self.config.data}" if self.config.physics.fit else "as published"
+            return f"{self.config.model} {how}{off}"
         wind = f", wind {self.config.network.wind_input}" if self.profile.has_wind else ""
         return f"{self.config.model} {self.config.data} ({self.config.recipe} recipe{wind})"
 
@@ -84,9 +95,65 @@ class Run:
     def empty_model(self) -> FeedForward:
         return FeedForward(self.shape, self.scaling())
 
-    def models(self) -> dict[int, FeedForward]:
-        """Seed → trained network in float64."""
-        return {seed: self.model(seed) for seed in self.config.seeds}
+    def models(self) -> dict[int, FeedForward | Simulator]:
+        """Seed → what can be simulated: a network in float64, or physics with its numbers."""
+        one = self.simulator if self.config.physical else self.model
+        return {seed: one(seed) for seed in self.config.seeds}
+
+    def simulator(self, seed: int) -> Simulator:
+        """A physical model: equations of the profile's geometry, numbers of this seed."""
+        from shiplog.models import hybrid, mmg
+
+        arrays = _arrays(self._seed(seed) / "model.safetensors")
+        ship, _, _ = mmg.geometry(self.profile, self.config.physics.without)
+        physics = mmg.MMG(ship)
+        if self.config.model == "mmg":
+            return Simulator(physics, arrays["theta"], arrays["covariance"])
+        fixed = {
+            name.removeprefix("residual."): value
+            for name, value in arrays.items()
+            if name.startswith("residual.")
+        }
+        residual = hybrid.Residual(width=self.config.physics.width, **fixed)
+        return Simulator(hybrid.Hybrid(physics, residual), arrays["theta"], arrays["covariance"])
+
+    def save_simulator(
+        self,
+        seed: int,
+        simulator: Simulator,
+        fixed: dict[str, np.ndarray],
+        parameters: str,
+        identified: pl.DataFrame,
+    ) -> None:
+        """One seed of a physical model.
+
+        fixed       arrays that are no parameters (the hybrid's scaling and anchors)
+        parameters  TOML that --parameters takes
+        identified  a row a parameter: name, value, standard error, start, spread
+        """
+        folder = self._seed(seed)
+        folder.mkdir(exist_ok=True)
+        arrays = {"theta": simulator.theta, "covariance": simulator.covariance}
+        arrays |= {f"residual.{name}": np.asarray(value) for name, value in fixed.items()}
+        _save_arrays(folder / "model.safetensors", arrays)
+        (folder / "parameters.toml").write_text(parameters, encoding="utf-8")
+        identified.write_parquet(folder / "identified.parquet")
+
+    def identified(self, seed: int = 0) -> pl.DataFrame:
+        """name, symbol, meaning, unit, start, spread, value, standard_error, free."""
+        return pl.read_parquet(self._seed(seed) / "identified.parquet")
+
+    def save_cross_validation(self, losses: pl.DataFrame) -> None:
+        """groups, voyage, window, start (L of the starting values), loss."""
+        losses.write_parquet(self.path / "cross_validation.parquet")
+
+    def save_band(self, band: Band) -> None:
+        _save_arrays(self.path / "band.safetensors", {"growth": band.growth, "factor": band.factor})
+
+    def band(self) -> Band | None:
+        """How far off its simulations may be; None where nothing was held out to learn it from."""
+        path = self.path / "band.safetensors"
+        return Band(**_arrays(path)) if path.is_file() else None
 
     def model(self, seed: int) -> FeedForward:
         model = self.empty_model()
@@ -173,7 +240,7 @@ def create(
     path: Path,
     config: Config,
     profile: Profile,
-    scaling: Scaling,
+    scaling: Scaling | None,
     windows: pl.DataFrame,
     training: pl.DataFrame,
     validation: pl.DataFrame,
@@ -200,10 +267,11 @@ def create(
     training.write_parquet(partial / "training.parquet")
     validation.write_parquet(partial / "validation.parquet")
     write_json(partial / "profile.json", profile.model_dump(mode="json"))
-    _save(
-        partial / "scaling.safetensors",
-        {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
-    )
+    if scaling is not None:
+        _save(
+            partial / "scaling.safetensors",
+            {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
+        )
     # Last: a folder with a config is one that can be gone on with.
     (partial / "config.toml").write_text(config.to_toml(), encoding="utf-8")
     return Run(partial, config, profile)
@@ -268,6 +336,19 @@ def _tensors(path: Path) -> dict[str, torch.Tensor]:
         return load_file(path)
     except (OSError, SafetensorError) as error:
         raise RunError(f"{path} cannot be read: {error}.", hint="train the run again.") from error
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        return load_arrays(path)
+    except (OSError, SafetensorError) as error:
+        raise RunError(f"{path} cannot be read: {error}.", hint="train the run again.") from error
+
+
+def _save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    partial = path.with_name(f"{path.name}.partial")
+    save_arrays({name: np.ascontiguousarray(a, float) for name, a in arrays.items()}, partial)
+    partial.replace(path)
 
 
 def _save(path: Path, tensors: dict[str, torch.Tensor]) -> None:

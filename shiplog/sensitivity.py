@@ -28,7 +28,10 @@ CHUNK = 128  # windows at a time: their sensitivities to 60 parameters are 45 MB
 
 
 class Physical(Protocol):
-    """Equations of motion that can be compiled: hashable, numbers in a vector of their own."""
+    """Equations of motion that can be compiled, their numbers in a vector of their own.
+
+    A JAX pytree: `jax.tree_util.register_static` for what is hashable and never changes shape.
+    """
 
     @property
     def names(self) -> tuple[str, ...]: ...
@@ -115,7 +118,7 @@ def rate(model: Physical, theta: Array, state: Array, actuator: Array, wind: Arr
     )
 
 
-@partial(jax.jit, static_argnames=("model", "substeps"))
+@partial(jax.jit, static_argnames=("substeps",))
 def _rollout(model, theta, start, actuator, wind, dt, substeps=1):
     def step(state, driven):
         at, blowing, length = driven
@@ -129,9 +132,7 @@ def _rollout(model, theta, start, actuator, wind, dt, substeps=1):
     return jnp.concatenate((start[:, None], jnp.moveaxis(states, 0, 1)), axis=1)
 
 
-def rollout(
-    model: Physical, theta: np.ndarray, data: Series, substeps: int = 1
-) -> np.ndarray:
+def rollout(model: Physical, theta: np.ndarray, data: Series, substeps: int = 1) -> np.ndarray:
     """Explicit Euler (Eq. 9) from the first measured state: states [N, I, 6].
 
     substeps   Euler steps within each measured one, inputs held; the paper's is 1
@@ -141,11 +142,6 @@ def rollout(
         model, theta, whole.measured[:, 0], whole.actuator, whole.wind, whole.dt, substeps
     )
     return np.asarray(states)[: len(data.measured)]
-
-
-def simulate(model: Physical, theta: np.ndarray, windows: Windows) -> torch.Tensor:
-    """As shiplog.simulate: states [N, I, 6] of the windows."""
-    return torch.from_numpy(rollout(model, theta, series(windows)).copy())
 
 
 def padded(data: Series) -> Series:
@@ -164,15 +160,15 @@ def padded(data: Series) -> Series:
     )
 
 
-@partial(jax.jit, static_argnames=("model",))
+@jax.jit
 def _linearised(model, theta, start, actuator, wind, dt):
     states = _rollout(model, theta, start, actuator, wind, dt)
     count = len(theta)
 
     def slopes(state, at, blowing):
-        return jax.jacrev(
-            lambda s, t: model.acceleration(t, s, at, blowing), argnums=(0, 1)
-        )(state, theta)
+        return jax.jacrev(lambda s, t: model.acceleration(t, s, at, blowing), argnums=(0, 1))(
+            state, theta
+        )
 
     by_state, by_theta = jax.vmap(jax.vmap(slopes))(states[:, :-1], actuator[:, :-1], wind[:, :-1])
 
@@ -207,9 +203,7 @@ def _linearised(model, theta, start, actuator, wind, dt):
     return states, jnp.concatenate((first[:, None], jnp.moveaxis(path, 0, 1)), axis=1)
 
 
-def linearised(
-    model: Physical, theta: np.ndarray, data: Series
-) -> tuple[np.ndarray, np.ndarray]:
+def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.ndarray, np.ndarray]:
     """States [N, I, 6] and their derivatives by θ [N, I, 6, P], exact for the Euler rollout."""
     whole = padded(data)
     states, slopes = _linearised(
@@ -219,7 +213,7 @@ def linearised(
     return np.asarray(states)[:count], np.asarray(slopes)[:count]
 
 
-@partial(jax.jit, static_argnames=("model",))
+@jax.jit
 def _normal(model, theta, measured, actuator, wind, dt, steps, weight):
     states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt)
     scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
@@ -253,10 +247,7 @@ def normal(model: Physical, theta: np.ndarray, data: Series) -> Normal:
         _normal(
             model,
             theta,
-            *(
-                values[at : at + CHUNK]
-                for values in (*whole[:4], whole.steps, whole.weight)
-            ),
+            *(values[at : at + CHUNK] for values in (*whole[:4], whole.steps, whole.weight)),
         )
         for at in range(0, len(whole.measured), CHUNK)
     ]
@@ -272,6 +263,34 @@ def losses(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
     return np.where(np.isfinite(each), each, np.inf)
 
 
-def pick(data: Series, rows: Sequence[int] | np.ndarray) -> Series:
+def pick(data: Series, rows: Sequence[int] | np.ndarray | slice) -> Series:
     """Some of the windows."""
     return Series(*(values[rows] for values in data))
+
+
+def spread(model: Physical, theta: np.ndarray, covariance: np.ndarray, data: Series) -> np.ndarray:
+    """Standard deviation of the states [N, I, 6] that the parameters' uncertainty alone makes."""
+    parts = []
+    for at in range(0, len(data.measured), CHUNK):
+        part = pick(data, slice(at, at + CHUNK))
+        slopes = linearised(model, theta, part)[1]
+        variance = np.einsum("nkip,pq,nkiq->nki", slopes, covariance, slopes, optimize=True)
+        parts.append(np.sqrt(np.maximum(variance, 0.0)))
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Equations, their numbers, and how sure those are: what a run of a physical model holds."""
+
+    model: Physical
+    theta: np.ndarray  # [P]
+    covariance: np.ndarray  # [P, P]
+
+    def simulate(self, windows: Windows) -> torch.Tensor:
+        """States [N, I, 6], as shiplog.simulate gives them."""
+        return torch.from_numpy(rollout(self.model, self.theta, series(windows)).copy())
+
+    def spread(self, windows: Windows) -> np.ndarray:
+        """[N, I, 6]"""
+        return spread(self.model, self.theta, self.covariance, series(windows))

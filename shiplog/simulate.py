@@ -3,6 +3,8 @@ measured ship state at the first step only. What it gets wrong afterwards, `eval
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import torch
 from torch import Tensor
 
@@ -31,6 +33,16 @@ def rollout(
     return torch.stack(states, dim=1)
 
 
-def simulate(dynamics: Dynamics, windows: Windows) -> Tensor:
+class Simulates(Protocol):
+    """A model that knows how to roll itself out: compiled physics, in `sensitivity`."""
+
+    def simulate(self, windows: Windows) -> Tensor: ...
+
+
+def simulate(dynamics: Dynamics | Simulates, windows: Windows) -> Tensor:
     """Roll out every window from its first measured state: [N, I, 6]."""
+    own = getattr(dynamics, "simulate", None)
+    if own is not None:
+        return own(windows)
+    assert callable(dynamics)
     return rollout(dynamics, windows.state[:, 0], windows.actuator, windows.wind, windows.dt)

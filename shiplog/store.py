@@ -137,7 +137,9 @@ class Store:
         chosen: Profile | None = None
         first = ""
         for name in names:
-            profile = Profile.model_validate(_facts(self._folder(name))["profile"])
+            facts = _facts(self._folder(name))
+            source = facts.get("profile_source", "")
+            profile = Profile.model_validate(facts["profile"] | {"source": source})
             if chosen is None:
                 chosen, first = profile, name
             elif profile.columns != chosen.columns or profile.ship.name != chosen.ship.name:
@@ -213,5 +215,6 @@ def _describe(voyage: Voyage, fingerprint: str) -> dict:
         "start": str(voyage.table["time"][0]),
         "datum": voyage.datum,
         "profile": voyage.profile.model_dump(mode="json"),
+        "profile_source": voyage.profile.source,
         "report": voyage.report.as_json(),
     }

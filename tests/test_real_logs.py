@@ -8,7 +8,7 @@ import pytest
 from test_cli import call
 
 from pipelines.prepare import seconds
-from pipelines.train import plan
+from pipelines.split import plan
 from shiplog import table
 from shiplog.store import Store
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import sailing
 
-from pipelines.train import choose_split, train_run
+from pipelines.split import choose_split
+from pipelines.train import train_run
 from shiplog.config import Config, Split
 from shiplog.exceptions import StoreError
 from shiplog.ingest import ingest

@@ -250,15 +250,17 @@ class Peer:
         if function.nnz_out(0) != out.size:
             raise ValueError(f"{function.name()} gives {function.nnz_out(0)}, not {out.size}")
         held = np.zeros(self.parameters)
+        memory = [held if values is None else values for values in inputs]
         buffer, evaluate = function.buffer()
-        for i, values in enumerate(inputs):
-            buffer.set_arg(i, memoryview(held if values is None else values))
-        buffer.set_res(0, memoryview(out.reshape(-1)))
+        for i, values in enumerate(memory):
+            buffer.set_arg(i, values.data)
+        buffer.set_res(0, out.reshape(-1).data)
 
         def call(theta: np.ndarray) -> np.ndarray:
             held[:] = theta
             evaluate()
             return out
 
-        call.keep = (buffer, function, held)  # type: ignore[attr-defined]
+        # The buffer holds bare addresses: what is behind them must live as long as the call.
+        call.memory = (buffer, function, memory)  # type: ignore[attr-defined]
         return call

@@ -1,4 +1,4 @@
-"""Rollouts of the MMG, their sensitivities and a refit, beside the same model in CasADi as the peer.
+"""Rollouts of the MMG, their sensitivities and a refit; the peer is the same model in CasADi.
 
     python -m pipelines.benchmarks.rollouts [--windows 119] [--rounds 9]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from shiplog.models.feedforward import FeedForward
-
-MODELS = {"feedforward": FeedForward}
+MODELS = {
+    "feedforward": "the paper's network, from the velocities, actuators and apparent wind",
+    "mmg": "hull, screws, rudders and wind on a rigid body, identified from the logs",
+    "hybrid": "the mmg and a small residual network that fades outside its training data",
+}

@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -18,21 +20,26 @@ ANCHORS = 200  # training samples that stand for all of them in the distance
 REACH = 2.0  # limits of the coverage figure beyond the training data, where nothing is left
 
 
-@dataclass(frozen=True, slots=True)
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["mean", "std", "bound", "anchors", "radius", "limit"],
+    meta_fields=["width"],
+)
+@dataclass(frozen=True)
 class Residual:
-    """What is fixed of a residual network; tuples, so that a compiled rollout is made once.
+    """What is fixed of a residual network.
 
-    mean, std  of z = (ν, u, U_A cos γ_A, U_A sin γ_A) over the training seconds
-    bound      [3]  the most it can add to ν̇ [m/s², m/s², rad/s²]
-    anchors    [K][Z]  standardised training samples, no other farther than `radius` from one
+    mean, std  [Z]     of z = (ν, u, U_A cos γ_A, U_A sin γ_A) over the training seconds
+    bound      [3]     the most it can add to ν̇ [m/s², m/s², rad/s²]
+    anchors    [K, Z]  standardised training samples, no other farther than `radius` from one
     limit      distance that all but 5 % of the training seconds have from independent others
     """
 
     width: int
-    mean: tuple[float, ...]
-    std: tuple[float, ...]
-    bound: tuple[float, float, float]
-    anchors: tuple[tuple[float, ...], ...]
+    mean: np.ndarray
+    std: np.ndarray
+    bound: np.ndarray
+    anchors: np.ndarray
     radius: float
     limit: float
 
@@ -52,7 +59,8 @@ class Residual:
         return sum(int(np.prod(shape)) for shape in self.shapes.values())
 
 
-@dataclass(frozen=True, slots=True)
+@partial(jax.tree_util.register_dataclass, data_fields=["residual"], meta_fields=["physics"])
+@dataclass(frozen=True)
 class Hybrid:
     """The MMG and a residual network in one rollout; θ is the MMG's, then the weights."""
 
@@ -76,12 +84,12 @@ class Hybrid:
             wind = apparent(true_wind, heading, u, v)
             parts += [wind[0][..., None], wind[1][..., None]]
         z = jnp.concatenate(parts, axis=-1)
-        return (z - jnp.array(self.residual.mean)) / jnp.array(self.residual.std)
+        return (z - self.residual.mean) / self.residual.std
 
     def fade(self, z: Array) -> Array:
         """1 within the training data, 0 from REACH limits beyond them on; smooth between."""
         net = self.residual
-        square = ((z[..., None, :] - jnp.array(net.anchors)) ** 2).sum(-1).min(-1)
+        square = ((z[..., None, :] - net.anchors) ** 2).sum(-1).min(-1)
         beyond = jnp.sqrt(jnp.maximum(square, 1e-12)) - net.radius
         share = jnp.clip(1.0 - beyond / (REACH * net.limit), 0.0, 1.0)
         return share * share * (3.0 - 2.0 * share)
@@ -94,14 +102,18 @@ class Hybrid:
             parts[name] = theta[at : at + size].reshape(shape)
             at += size
         hidden = jnp.tanh(z @ parts["w1"].T + parts["c1"])
-        return jnp.array(self.residual.bound) * jnp.tanh(hidden @ parts["w2"].T + parts["c2"])
+        return self.residual.bound * jnp.tanh(hidden @ parts["w2"].T + parts["c2"])
+
+    def added(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
+        """What the network adds to ν̇ [..., 3], faded."""
+        z = self.features(state, actuator, true_wind)
+        return self.fade(z)[..., None] * self.network(theta, z)
 
     def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3]; arguments as for MMG.acceleration."""
         count = len(self.physics.names)
-        z = self.features(state, actuator, true_wind)
-        added = self.fade(z)[..., None] * self.network(theta, z)
-        return self.physics.acceleration(theta[:count], state, actuator, true_wind) + added
+        physics = self.physics.acceleration(theta[:count], state, actuator, true_wind)
+        return physics + self.added(theta, state, actuator, true_wind)
 
 
 def first_weights(residual: Residual, rng: np.random.Generator) -> np.ndarray:

@@ -5,3 +5,19 @@ from __future__ import annotations
 import jax
 
 jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
+
+from shiplog.models.mmg.geometry import PARTS, Geometry, geometry  # noqa: E402
+from shiplog.models.mmg.model import MMG  # noqa: E402
+from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning  # noqa: E402
+
+__all__ = [
+    "MMG",
+    "PARTS",
+    "Geometry",
+    "Parameters",
+    "beside",
+    "estimated",
+    "geometry",
+    "load",
+    "meaning",
+]

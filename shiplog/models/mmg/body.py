@@ -34,3 +34,18 @@ def accelerations(
     determinant = a * c - b * b
     sway = (c * across - b * turning) / determinant
     return jnp.stack((surge, sway, (a * turning - b * across) / determinant), axis=-1)
+
+
+def forces_of(p: Mapping[str, Array], g: Geometry, acceleration: Array) -> Array:
+    """The force X, Y, N [..., 3] at midship that adds this ν̇ [..., 3]: mass with added mass."""
+    m, x_g = g.mass, g.x_g
+    m_x, m_y, yaw = masses(p, g)
+    du, dv, dr = (acceleration[..., i] for i in range(3))
+    return jnp.stack(
+        (
+            (m + m_x) * du,
+            (m + m_y) * dv + x_g * m * dr,
+            x_g * m * dv + (yaw + x_g**2 * m) * dr,
+        ),
+        axis=-1,
+    )

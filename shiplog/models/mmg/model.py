@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -12,6 +13,7 @@ from shiplog.models.mmg import body, hull, parameters, propeller, rudder, thrust
 from shiplog.models.mmg.geometry import Geometry
 
 
+@jax.tree_util.register_static
 @dataclass(frozen=True, slots=True)
 class MMG:
     """A ship's equations of motion; hashable, its numbers come as a vector θ in order of `names`.
@@ -42,9 +44,7 @@ class MMG:
         if screws:
             found["propeller"] = sum(s[0] for s in screws)
         if g.rudders:
-            found["rudder"] = sum(
-                _blade(p, g, b, screws, u, v, r, actuator) for b in g.rudders
-            )
+            found["rudder"] = sum(_blade(p, g, b, screws, u, v, r, actuator) for b in g.rudders)
         if g.thrusters:
             found["thruster"] = sum(
                 thruster.thruster(p, g, t, u, v, r, actuator) for t in g.thrusters
@@ -53,9 +53,7 @@ class MMG:
             found["wind"] = wind.wind(p, g, *wind.apparent(true_wind, heading, u, v))
         return found
 
-    def acceleration(
-        self, theta: Array, state: Array, actuator: Array, true_wind: Array
-    ) -> Array:
+    def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3] in m/s² and rad/s²; arguments as for `forces`."""
         total = sum(self.forces(theta, state, actuator, true_wind).values())
         p = dict(zip(self.names, theta, strict=True))

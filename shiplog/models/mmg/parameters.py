@@ -7,7 +7,7 @@ TOML of the same sections and keys, beside the ship's profile: `<profile>.mmg.to
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -30,6 +30,7 @@ class Entry:
     """
 
     symbol: str
+    meaning: str
     share: float
     least: float
     low: float
@@ -41,54 +42,82 @@ class Entry:
 _E = Entry
 TABLE: dict[str, dict[str, Entry]] = {
     "body": {  # added masses are known best: every force and mass share one scale, this fixes it
-        "m_x": _E("m'_x", 0.08, 0.005, 0.0, 1.0), "m_y": _E("m'_y", 0.08, 0.0, 0.01, 2.0),
-        "i_j": _E("I'+J'", 0.08, 0.0, 0.001, 0.2),
+        "m_x": _E("m'_x", "added mass ahead", 0.08, 0.005, 0.0, 1.0),
+        "m_y": _E("m'_y", "added mass athwart", 0.08, 0.0, 0.01, 2.0),
+        "i_j": _E("I'+J'", "yaw inertia with added inertia", 0.08, 0.0, 0.001, 0.2),
     },
     "hull": {
-        "x_0f": _E("X'₀F", 0.3, 0.003, -0.5, 0.0), "x_0a": _E("X'₀A", 0.3, 0.003, -0.5, 0.0),
-        "x_vr": _E("X'_vr", 0.3, 0.08, -3.0, 3.0),
-        "y_v": _E("Y'_v", 0.3, 0.05, -3.0, 0.0), "y_r": _E("Y'_r", 0.3, 0.04, -1.0, 1.0),
-        "n_v": _E("N'_v", 0.3, 0.03, -1.0, 0.3), "n_r": _E("N'_r", 0.3, 0.015, -0.5, 0.0),
-        "c_d": _E("C_D", 0.3, 0.1, 0.0, 4.0),
-        "c_ry": _E("C_rY", 0.3, 0.3, 0.0, 6.0), "c_rn": _E("C_rN", 0.3, 0.2, 0.0, 6.0),
+        "x_0f": _E("X'₀F", "resistance ahead", 0.3, 0.003, -0.5, 0.0),
+        "x_0a": _E("X'₀A", "resistance astern", 0.3, 0.003, -0.5, 0.0),
+        "x_vr": _E("X'_vr", "surge force of drifting and turning", 0.3, 0.08, -3.0, 3.0),
+        "y_v": _E("Y'_v", "sway damping", 0.3, 0.05, -3.0, 0.0),
+        "y_r": _E("Y'_r", "sway force of turning", 0.3, 0.04, -1.0, 1.0),
+        "n_v": _E("N'_v", "yaw moment of drifting", 0.3, 0.03, -1.0, 0.3),
+        "n_r": _E("N'_r", "yaw damping", 0.3, 0.015, -0.5, 0.0),
+        "c_d": _E("C_D", "cross-flow drag", 0.3, 0.1, 0.0, 4.0),
+        "c_ry": _E("C_rY", "cross-flow: turning in sway", 0.3, 0.3, 0.0, 6.0),
+        "c_rn": _E("C_rN", "cross-flow: turning in yaw", 0.3, 0.2, 0.0, 6.0),
     },
     "propeller": {
-        "k0": _E("k₀", 0.15, 0.0, 0.02, 1.0), "k1": _E("k₁", 0.3, 0.0, -1.0, 0.2),
-        "k2": _E("k₂", 0.3, 0.05, -1.0, 0.5), "t": _E("t", 0.3, 0.03, -0.1, 0.7),
-        "w_p0": _E("w_P0", 0.3, 0.05, 0.0, 0.9), "tau": _E("τ", 0.3, 0.1, -1.0, 3.0),
-        "c_p": _E("C_P", 0.3, 0.1, -3.0, 3.0),
-        "c3": _E("C₃", 0.3, 0.03, -1.0, 0.0), "c6": _E("C₆", 0.3, 0.03, -1.0, 0.0),
-        "c7": _E("C₇", 0.3, 0.05, -1.0, 2.0), "c10": _E("C₁₀", 0.1, 0.0, -1.0, 0.0),
-        "a1": _E("A₁", 0.3, 1e-3, -0.05, 0.05), "a2": _E("A₂", 0.3, 1e-3, -0.1, 0.1),
-        "a3": _E("A₃", 0.3, 1e-3, -0.05, 0.05), "a4": _E("A₄", 0.3, 1e-3, -0.1, 0.1),
-        "a5": _E("A₅", 0.3, 1e-3, -0.05, 0.05), "a6": _E("A₆", 0.3, 1e-3, -0.1, 0.1),
-        "a7": _E("A₇", 0.3, 1e-3, -0.1, 0.1), "a8": _E("A₈", 0.3, 1e-3, -0.05, 0.05),
-        "b1": _E("B₁", 0.3, 3e-4, -0.02, 0.02), "b2": _E("B₂", 0.3, 3e-4, -0.05, 0.05),
-        "b3": _E("B₃", 0.3, 3e-4, -0.02, 0.02), "b4": _E("B₄", 0.3, 3e-4, -0.05, 0.05),
-        "b5": _E("B₅", 0.3, 3e-4, -0.02, 0.02), "b6": _E("B₆", 0.3, 3e-4, -0.05, 0.05),
-        "b7": _E("B₇", 0.3, 3e-4, -0.05, 0.05), "b8": _E("B₈", 0.3, 3e-4, -0.02, 0.02),
+        "k0": _E("k₀", "thrust at rest", 0.15, 0.0, 0.02, 1.0),
+        "k1": _E("k₁", "thrust fall with advance", 0.3, 0.0, -1.0, 0.2),
+        "k2": _E("k₂", "thrust fall, quadratic", 0.3, 0.05, -1.0, 0.5),
+        "t": _E("t", "thrust deduction", 0.3, 0.03, -0.1, 0.7),
+        "w_p0": _E("w_P0", "wake", 0.3, 0.05, 0.0, 0.9),
+        "tau": _E("τ", "wake loss in drift", 0.3, 0.1, -1.0, 3.0),
+        "c_p": _E("C_P", "wake loss in drift, quadratic", 0.3, 0.1, -3.0, 3.0),
+        "c3": _E("C₃", "thrust astern, fast", 0.3, 0.03, -1.0, 0.0),
+        "c6": _E("C₆", "thrust astern", 0.3, 0.03, -1.0, 0.0),
+        "c7": _E("C₇", "thrust astern with advance", 0.3, 0.05, -1.0, 2.0),
+        "c10": _E("C₁₀", "advance where astern thrust levels", 0.1, 0.0, -1.0, 0.0),
+        "a1": _E("A₁", "side force of the screw", 0.3, 1e-3, -0.05, 0.05),
+        "a2": _E("A₂", "side force of the screw", 0.3, 1e-3, -0.1, 0.1),
+        "a3": _E("A₃", "side force of the screw", 0.3, 1e-3, -0.05, 0.05),
+        "a4": _E("A₄", "side force of the screw", 0.3, 1e-3, -0.1, 0.1),
+        "a5": _E("A₅", "side force of the screw", 0.3, 1e-3, -0.05, 0.05),
+        "a6": _E("A₆", "side force of the screw", 0.3, 1e-3, -0.1, 0.1),
+        "a7": _E("A₇", "side force of the screw", 0.3, 1e-3, -0.1, 0.1),
+        "a8": _E("A₈", "side force of the screw", 0.3, 1e-3, -0.05, 0.05),
+        "b1": _E("B₁", "yaw moment of the screw", 0.3, 3e-4, -0.02, 0.02),
+        "b2": _E("B₂", "yaw moment of the screw", 0.3, 3e-4, -0.05, 0.05),
+        "b3": _E("B₃", "yaw moment of the screw", 0.3, 3e-4, -0.02, 0.02),
+        "b4": _E("B₄", "yaw moment of the screw", 0.3, 3e-4, -0.05, 0.05),
+        "b5": _E("B₅", "yaw moment of the screw", 0.3, 3e-4, -0.02, 0.02),
+        "b6": _E("B₆", "yaw moment of the screw", 0.3, 3e-4, -0.05, 0.05),
+        "b7": _E("B₇", "yaw moment of the screw", 0.3, 3e-4, -0.05, 0.05),
+        "b8": _E("B₈", "yaw moment of the screw", 0.3, 3e-4, -0.02, 0.02),
     },
     "rudder": {
-        "t_r": _E("t_R", 0.3, 0.05, -0.5, 0.9), "a_h": _E("a_H", 0.3, 0.05, -0.2, 1.5),
-        "x_h": _E("x'_H", 0.3, 0.05, -1.0, 0.5), "l_r": _E("ℓ'_R", 0.3, 0.1, -3.0, 0.5),
-        "k_x": _E("k_x", 0.3, 0.05, 0.0, 2.0), "k_xr": _E("k_xr", 0.3, 0.05, 0.0, 2.0),
-        "eps": _E("ε", 0.3, 0.1, 0.2, 3.0), "c_pr": _E("C_PR", 0.3, 0.05, -2.0, 2.0),
-        "gamma_n": _E("γ_N", 0.3, 0.05, 0.0, 2.0), "gamma_p": _E("γ_P", 0.3, 0.05, 0.0, 2.0),
-        "f_alpha": _E("f_α", 0.15, 0.0, 0.3, 6.0),
-        "f_3": _E("f₃", 0.0, 0.3, -0.95, 3.0, neutral=0.0),
-        "f_t": _E("f_T", 0.0, 0.3, -1.0, 6.0, neutral=0.0),
+        "t_r": _E("t_R", "rudder drag deduction", 0.3, 0.05, -0.5, 0.9),
+        "a_h": _E("a_H", "rudder force on the hull", 0.3, 0.05, -0.2, 1.5),
+        "x_h": _E("x'_H", "where the hull feels the rudder", 0.3, 0.05, -1.0, 0.5),
+        "l_r": _E("ℓ'_R", "rudder inflow from turning", 0.3, 0.1, -3.0, 0.5),
+        "k_x": _E("k_x", "rudder inflow from the screw", 0.3, 0.05, 0.0, 2.0),
+        "k_xr": _E("k_xr", "rudder inflow from the reversed screw", 0.3, 0.05, 0.0, 2.0),
+        "eps": _E("ε", "rudder inflow from the wake", 0.3, 0.1, 0.2, 3.0),
+        "c_pr": _E("C_PR", "rudder inflow while coasting", 0.3, 0.05, -2.0, 2.0),
+        "gamma_n": _E("γ_N", "flow straightening to port", 0.3, 0.05, 0.0, 2.0),
+        "gamma_p": _E("γ_P", "flow straightening to starboard", 0.3, 0.05, 0.0, 2.0),
+        "f_alpha": _E("f_α", "rudder force slope", 0.15, 0.0, 0.3, 6.0),
+        "f_3": _E("f₃", "rudder force at large angles", 0.0, 0.3, -0.95, 3.0, neutral=0.0),
+        "f_t": _E("f_T", "jet turned along the rudder", 0.0, 0.3, -1.0, 6.0, neutral=0.0),
     },
     "thruster": {
-        "ahead": _E("T₊", 0.5, 0.0, 0.0, 1e7, unit="N"),
-        "astern": _E("T₋", 0.5, 0.0, 0.0, 1e7, unit="N"),
-        "loss": _E("ℓ_T", 0.0, 0.5, -1.0, 5.0, neutral=0.0, unit="s/m"),
+        "ahead": _E("T₊", "thrust ahead", 0.5, 0.0, 0.0, 1e7, unit="N"),
+        "astern": _E("T₋", "thrust astern", 0.5, 0.0, 0.0, 1e7, unit="N"),
+        "loss": _E("ℓ_T", "thrust fall with speed", 0.0, 0.5, -1.0, 5.0, neutral=0.0, unit="s/m"),
     },
     "wind": {
-        "x0": _E("X_A0", 0.3, 0.05, -0.5, 0.5), "x1": _E("X_A1", 0.3, 0.1, -2.5, 0.0),
-        "x3": _E("X_A3", 0.3, 0.05, -0.6, 0.6), "x5": _E("X_A5", 0.3, 0.05, -0.6, 0.6),
-        "y1": _E("Y_A1", 0.3, 0.1, 0.0, 2.5), "y3": _E("Y_A3", 0.3, 0.05, -0.6, 0.6),
-        "y5": _E("Y_A5", 0.3, 0.05, -0.6, 0.6), "n1": _E("N_A1", 0.3, 0.03, -0.5, 0.5),
-        "n2": _E("N_A2", 0.3, 0.03, -0.5, 0.5), "n3": _E("N_A3", 0.3, 0.03, -0.5, 0.5),
+        "x0": _E("X_A0", "wind ahead, mean", 0.3, 0.05, -0.5, 0.5),
+        "x1": _E("X_A1", "wind ahead", 0.3, 0.1, -2.5, 0.0),
+        "x3": _E("X_A3", "wind ahead, 3rd harmonic", 0.3, 0.05, -0.6, 0.6),
+        "x5": _E("X_A5", "wind ahead, 5th harmonic", 0.3, 0.05, -0.6, 0.6),
+        "y1": _E("Y_A1", "wind athwart", 0.3, 0.1, 0.0, 2.5),
+        "y3": _E("Y_A3", "wind athwart, 3rd harmonic", 0.3, 0.05, -0.6, 0.6),
+        "y5": _E("Y_A5", "wind athwart, 5th harmonic", 0.3, 0.05, -0.6, 0.6),
+        "n1": _E("N_A1", "wind moment", 0.3, 0.03, -0.5, 0.5),
+        "n2": _E("N_A2", "wind moment, 2nd harmonic", 0.3, 0.03, -0.5, 0.5),
+        "n3": _E("N_A3", "wind moment, 3rd harmonic", 0.3, 0.03, -0.5, 0.5),
     },
 }  # fmt: skip
 
@@ -127,6 +156,21 @@ class Parameters:
         return tomli_w.dumps({"source": self.source, **self.sections()})
 
 
+_NEEDS = {
+    "wind": "[sensors.wind]",
+    "propeller": "actuator of kind propeller",
+    "rudder": "actuator of kind rudder",
+    "thruster": "actuator of kind thruster",
+}
+
+
+def meaning(name: str) -> str:
+    """What a parameter is, in words."""
+    if name.startswith("network."):
+        return "weight of the residual network"
+    return _entry(name).meaning
+
+
 def names(geometry: Geometry) -> tuple[str, ...]:
     """The parameters a ship of this geometry has, in order."""
     found = [f"body.{key}" for key in TABLE["body"]]
@@ -162,8 +206,11 @@ def estimated(geometry: Geometry, main: Particulars) -> Parameters:
     return _from(geometry, guess, "empirical formulas from the particulars", widen=2.0)
 
 
-def load(path: Path | str, geometry: Geometry) -> Parameters:
-    """Published or identified values. Raises ProfileError naming what is missing or impossible."""
+def load(path: Path | str, geometry: Geometry, without: Iterable[str] = ()) -> Parameters:
+    """Published or identified values. Raises ProfileError naming what is missing or impossible.
+
+    without   forces that are switched off: their sections may stand in the file
+    """
     path = Path(path)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -173,10 +220,14 @@ def load(path: Path | str, geometry: Geometry) -> Parameters:
             hint="give --parameters the path of a TOML of MMG coefficients.",
         ) from error
     except tomllib.TOMLDecodeError as error:
-        raise ProfileError(
-            f"{path} is not valid TOML: {error}.", hint="mend that line."
-        ) from error
+        raise ProfileError(f"{path} is not valid TOML: {error}.", hint="mend that line.") from error
     source = str(content.pop("source", path.name))
+    for part in content:
+        if part in TABLE and part not in (*geometry.parts, *without, "body"):
+            raise ProfileError(
+                f"{path} has a {part} force, and the ship's profile has no {_NEEDS[part]}.",
+                hint=f"add it to the profile, or leave the force out with --without {part}.",
+            )
     return _from(geometry, content, source, widen=1.0, path=path)
 
 

@@ -30,4 +30,3 @@ def thruster(
     x, y = thrust * c, thrust * s
     x, y = jnp.broadcast_arrays(x, y)
     return jnp.stack((x, y, unit.ahead * y - unit.starboard * x), axis=-1)
-

@@ -11,9 +11,7 @@ from shiplog.models.mmg.geometry import AIR, Geometry
 from shiplog.models.mmg.smooth import root
 
 
-def apparent(
-    true_wind: Array, heading: Array, u: Array, v: Array
-) -> tuple[Array, Array]:
+def apparent(true_wind: Array, heading: Array, u: Array, v: Array) -> tuple[Array, Array]:
     """U_A (cos γ_A, sin γ_A): where the wind comes from, ahead and to starboard [m/s].
 
     true_wind   [..., 2] where it comes FROM, along x₀ and y₀ [m/s]

@@ -1,0 +1,375 @@
+"""Voyages to an identified physical model: parameters, held-out voyages, the hybrid's network."""
+
+from __future__ import annotations
+
+import fnmatch
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from pipelines.prepare import seconds
+from pipelines.provenance import Answer, provenance
+from pipelines.split import choose_physical_split, plan, refuse_shared_rows
+from shiplog import band, identifiability, identify, report, residual, runs, table, windows
+from shiplog import seeds as streams
+from shiplog.config import Config
+from shiplog.crossvalidation import CrossValidated, cross_validate
+from shiplog.exceptions import RunError, WindowError, listed, nearest
+from shiplog.findings import CONTRACT
+from shiplog.identify import Identified
+from shiplog.models import mmg
+from shiplog.profile import Profile
+from shiplog.runs import Run
+from shiplog.sensitivity import Series, Simulator, losses, rollout, series
+from shiplog.store import Store
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One ship's equations, starting values and training windows.
+
+    voyages, days   [N]  group of each window; the same data under two names is one voyage
+    """
+
+    model: mmg.MMG
+    start: mmg.Parameters
+    data: Series
+    voyages: list[str]
+    days: list[str]
+    free: np.ndarray
+
+
+def identify_run(
+    config: Config, store: Store, out: Path, parameters: Path | None = None
+) -> tuple[Run, list[str]]:
+    """Identify a physical model, hold voyages out, save the run and say what was found.
+
+    Raises ShiplogError.
+    """
+    split, began = config.split, time.time()
+    used = [*split.training, *split.validation]
+    profile = store.profile(used)
+    rows = seconds(store, used, profile)
+    refuse_shared_rows(rows, split)
+    learnt = rows.filter(pl.col("voyage").is_in(split.training))
+    held = rows.filter(pl.col("voyage").is_in(split.validation))
+    planned = plan(learnt, config.data, config.window)
+    ready = prepare(config, profile, learnt, planned, parameters)
+    config = config.model_copy(
+        update={"physics": config.physics.model_copy(update={"parameters": ready.start.source})}
+    )
+    run = runs.create(out, config, profile, None, planned, learnt, held)
+    count = int(ready.free.sum()) if config.physics.fit else 0
+    log.info(
+        "%s: %d of %d parameters free, %d windows of %s; they start from %s",
+        run.label, count, len(ready.start.names), len(ready.voyages), listed(split.training),
+        ready.start.source,
+    )  # fmt: skip
+    if not config.physics.fit:
+        said = _keep(run, ready)
+        return run.finish(provenance(store, split, began)), said
+
+    def refit(part: Series) -> Identified:
+        return _physics(ready, part)
+
+    found = refit(ready.data)
+    before = losses(ready.model, ready.start.values, ready.data)
+    by_voyage = cross_validate(
+        lambda part: _simulator(ready.model, refit(part)),
+        ready.data, ready.voyages, config.physics.folds,
+    )  # fmt: skip
+    by_day = None
+    if len(set(ready.days)) > 1 and ready.days != ready.voyages:
+        by_day = cross_validate(
+            lambda part: _simulator(ready.model, refit(part)),
+            ready.data, ready.days, config.physics.folds,
+        )  # fmt: skip
+    said = [_sentence("training windows", before, losses(ready.model, found.values, ready.data))]
+    said += [
+        _sentence(f"held-out {name}", before, one.loss)
+        for name, one in (("voyages", by_voyage), ("days", by_day))
+        if one is not None
+    ]
+    if by_voyage is None:
+        said.append("One voyage only: nothing could be held out, so the gain is not tested.")
+    said += identifiability.note(
+        found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
+        mmg.meaning,
+    )  # fmt: skip
+    validated = by_voyage
+    for seed in config.seeds:
+        if config.model == "hybrid":
+            said += _hybrid(run, ready, found, by_voyage, held, seed)
+        else:
+            save(run, seed, ready, _simulator(ready.model, found), found)
+    if by_voyage is not None:
+        _save_cross_validation(run, before, by_voyage, by_day)
+    if validated is not None:
+        run.save_band(_band(ready.data, validated))
+    return run.finish(provenance(store, split, began)), said
+
+
+def prepare(
+    config: Config,
+    profile: Profile,
+    learnt: pl.DataFrame,
+    planned: pl.DataFrame,
+    parameters: Path | None,
+) -> Prepared:
+    """Equations, starting values and windows of a run. Raises ProfileError or WindowError."""
+    off = config.physics.without
+    ship, main, estimates = mmg.geometry(profile, off)
+    for sentence in estimates:
+        log.info(sentence)
+    path = parameters or mmg.beside(profile.source)
+    start = mmg.load(path, ship, off) if path else mmg.estimated(ship, main)
+    if path is None:
+        log.info("no published coefficients for this ship: %s", start.source)
+    model = mmg.MMG(ship)
+    names = (profile.actuator_names, profile.wind_names)
+    cut = windows.cut(learnt, planned, config.window, *names)
+    if planned.height == 0:
+        raise WindowError(
+            f"No window of {config.window} s in {listed(config.split.training)}.",
+            hint="choose a shorter --window.",
+        )
+    twin: dict[str, str] = {}
+    for left, right, _ in table.shared_rows(learnt).iter_rows():
+        twin[right] = twin.get(left, left)
+    first = dict(
+        learnt.group_by("voyage").agg(pl.col("time").min().dt.strftime("%Y-%m-%d")).iter_rows()
+    )
+    voyages = [twin.get(name, name) for name in cut.plan["voyage"]]
+    return Prepared(
+        model, start, series(cut), voyages, [first[v] for v in voyages],
+        _free(config.physics.free, start.names),
+    )  # fmt: skip
+
+
+def save(
+    run: Run,
+    seed: int,
+    ready: Prepared,
+    simulator: Simulator,
+    found: Identified | None,
+    fixed: dict[str, np.ndarray] | None = None,
+) -> None:
+    """One seed's numbers, for machines and as a TOML that --parameters takes."""
+    start, count = ready.start, len(ready.start.names)
+    values = simulator.theta[:count]
+    source = f"identified by shiplog in {run.name}" if found else start.source
+    error = found.standard_error[:count] if found else np.zeros(count)
+    free = found.free[:count] if found else np.zeros(count, dtype=bool)
+    entries = [start.entry(name) for name in start.names]
+    identified = pl.DataFrame(
+        {
+            "name": start.names,
+            "symbol": [e.symbol for e in entries],
+            "meaning": [e.meaning for e in entries],
+            "unit": [e.unit for e in entries],
+            "start": start.values,
+            "spread": start.spread,
+            "value": values,
+            "standard_error": error,
+            "free": free,
+        }
+    )
+    toml = start.with_values(values, source).to_toml()
+    run.save_simulator(seed, simulator, fixed or {}, toml, identified)
+
+
+def _keep(run: Run, ready: Prepared) -> list[str]:
+    """A run of the starting values as they are; their errors here no fit has seen."""
+    nothing = np.zeros((len(ready.start.values),) * 2)
+    simulator = Simulator(ready.model, ready.start.values, nothing)
+    for seed in run.config.seeds:
+        save(run, seed, ready, simulator, None)
+    states = rollout(ready.model, ready.start.values, ready.data)
+    run.save_band(band.calibrate(states - ready.data.measured, np.zeros_like(states)))
+    loss = losses(ready.model, ready.start.values, ready.data)
+    return [f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."]
+
+
+def _physics(ready: Prepared, part: Series) -> Identified:
+    return identify.identify(
+        ready.model,
+        ready.start.values,
+        ready.start.spread,
+        part,
+        bounds=(ready.start.low, ready.start.high),
+        free=ready.free,
+    )
+
+
+def _hybrid(
+    run: Run,
+    ready: Prepared,
+    found: Identified,
+    by_voyage: CrossValidated | None,
+    held: pl.DataFrame,
+    seed: int,
+) -> list[str]:
+    """Choose how much the network may say on voyages it has not seen, then fit it on all."""
+    settings = run.config.physics
+
+    def fitted(part: Series, physics: Identified, strength: float) -> tuple[Simulator, Identified]:
+        model, done = residual.fit(
+            ready.model, ready.start, physics, part,
+            width=settings.width, strength=strength,
+            rng=np.random.default_rng(streams.generator(seed, "residual").initial_seed()),
+        )  # fmt: skip
+        return Simulator(model, done.values, done.covariance), done
+
+    judged: dict[float, float] = {}
+    if held.height:
+        names = (run.profile.actuator_names, run.profile.wind_names)
+        size = run.config.window
+        unseen = series(windows.cut(held, plan(held, "ref", size), size, *names))
+        where = "the validation voyages"
+        judged[0.0] = float(losses(ready.model, found.values, unseen).mean())
+        candidates = {s: fitted(ready.data, found, s) for s in settings.strengths}
+        for strength, (simulator, _) in candidates.items():
+            judged[strength] = float(losses(simulator.model, simulator.theta, unseen).mean())
+    elif by_voyage is not None:
+        where = "held-out voyages"
+        judged[0.0] = float(by_voyage.loss.mean())
+        for strength in settings.strengths:
+            one = cross_validate(
+                lambda part, s=strength: fitted(part, _physics(ready, part), s)[0],
+                ready.data, ready.voyages, settings.folds,
+            )  # fmt: skip
+            assert one is not None
+            judged[strength] = float(one.loss.mean())
+            log.info("network of strength %g: held-out L %.0f", strength, judged[strength])
+    else:
+        raise RunError(
+            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
+            hint="name a second voyage with --voyages, or one with --validation.",
+        )
+    best = min(judged, key=lambda s: judged[s])
+    if best == 0.0:
+        # A silent network: the physics as they are, in the hybrid's form.
+        simulator, done = fitted(ready.data, found, 1e-9)
+        said = f"The network adds nothing that survives {where}: it is kept silent."
+    else:
+        simulator, done = fitted(ready.data, found, best)
+        said = (
+            f"Network of strength {best:g}: L {judged[best]:.0f} on {where}, physics alone "
+            f"{judged[0.0]:.0f}."
+        )
+    net = simulator.model.residual  # type: ignore[attr-defined]
+    fixed = {n: getattr(net, n) for n in ("mean", "std", "bound", "anchors", "radius", "limit")}
+    save(run, seed, ready, simulator, done, fixed)
+    return [f"Seed {seed}: {said}"]
+
+
+def _simulator(model: mmg.MMG, found: Identified) -> Simulator:
+    return Simulator(model, found.values, found.covariance)
+
+
+def _band(data: Series, validated: CrossValidated) -> band.Band:
+    return band.calibrate(validated.states - data.measured, validated.spread)
+
+
+def _save_cross_validation(
+    run: Run, before: np.ndarray, by_voyage: CrossValidated, by_day: CrossValidated | None
+) -> None:
+    parts = [
+        pl.DataFrame(
+            {
+                "held_out": [name] * len(before),
+                "group": one.groups,
+                "window": np.arange(len(before)),
+                "start": before,
+                "loss": one.loss,
+            }
+        )
+        for name, one in (("voyages", by_voyage), ("days", by_day))
+        if one is not None
+    ]
+    run.save_cross_validation(pl.concat(parts))
+
+
+def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
+    share = after.mean() / before.mean()
+    return (
+        f"Mean L over {len(before)} {where}: {before.mean():.0f} at the start, "
+        f"{after.mean():.0f} identified ({share:.3f})."
+    )
+
+
+def _free(patterns: Sequence[str], names: tuple[str, ...]) -> np.ndarray:
+    """Which parameters may move. Raises RunError for a pattern that none has."""
+    if not patterns:
+        return np.ones(len(names), dtype=bool)
+    for pattern in patterns:
+        if not fnmatch.filter(names, pattern):
+            raise RunError(
+                f"No parameter is called {pattern!r}{nearest(pattern, names)}.",
+                hint=f"--free takes names or patterns such as 'wind.*': {listed(names, most=99)}.",
+            )
+    return np.array([any(fnmatch.fnmatch(n, p) for p in patterns) for n in names])
+
+
+def identify_command(
+    store_path: Path,
+    out: Path,
+    *,
+    model: str,
+    data: str,
+    voyages: Sequence[str],
+    validation: Sequence[str],
+    seeds: int,
+    window: int,
+    fit: bool,
+    parameters: Path | None,
+    without: Sequence[str],
+    free: Sequence[str],
+) -> Answer:
+    """`shiplog train --model mmg|hybrid`."""
+    if model == "hybrid" and not fit:
+        raise RunError(
+            "A hybrid's network has to be fitted.", hint="--no-fit goes with --model mmg."
+        )
+    if model == "mmg" and seeds > 1:
+        log.info("an identification draws nothing: one seed stands for all")
+        seeds = 1
+    store = Store(store_path)
+    split = choose_physical_split(store, voyages, validation, data, window)
+    log.info(
+        "split by %s: training %s; validation %s; test %s",
+        split.chosen_by, listed(split.training), listed(split.validation), listed(split.test),
+    )  # fmt: skip
+    config = Config.model_validate(
+        {
+            "model": model,
+            "data": data,
+            "window": window,
+            "split": split,
+            "seeds": tuple(range(seeds)),
+            "physics": {"fit": fit, "without": tuple(without), "free": tuple(free)},
+        }
+    )
+    run, said = identify_run(config, store, out, parameters)
+    identified = run.identified()
+    lines = [f"{run.label} in {run.path}.", *said, ""]
+    if fit:
+        lines += [report.parameters_table(identified), ""]
+    lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
+    content = {
+        "contract": CONTRACT,
+        "run": str(run.path),
+        "label": run.label,
+        "windows": run.windows().height,
+        "notes": said,
+        "parameters": identified.to_dicts(),
+        "split": split.model_dump(mode="json"),
+    }
+    return Answer("\n".join(lines), content)

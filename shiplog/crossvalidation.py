@@ -1,0 +1,78 @@
+"""Errors on voyages that the fit has not seen: a gain that does not survive this is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.sensitivity import Series, Simulator, rollout, spread
+
+FOLDS = 5
+WORKERS = 2  # fits at a time; compiled rollouts leave Python's lock
+
+
+@dataclass(frozen=True)
+class CrossValidated:
+    """Every window rolled out by a fit that knew nothing of its group.
+
+    groups   [N]        which voyage (or day) a window is of
+    states   [N, I, 6]  simulated
+    spread   [N, I, 6]  the fit's own uncertainty
+    loss     [N]        L of each window
+    """
+
+    groups: np.ndarray
+    states: np.ndarray
+    spread: np.ndarray
+    loss: np.ndarray
+
+
+def folds(groups: Sequence[str], count: int = FOLDS) -> list[np.ndarray]:
+    """Masks [N] of the held-out windows: whole groups, dealt in turn in the order of windows.
+
+    Dealing in turn puts neighbours, often of one manoeuvre, into different folds. One fold a
+    group where there are fewer groups than `count`; none where there is but one.
+    """
+    order = list(dict.fromkeys(groups))
+    if len(order) < 2:
+        return []
+    of = {group: i % min(count, len(order)) for i, group in enumerate(order)}
+    number = np.array([of[group] for group in groups])
+    return [number == k for k in range(min(count, len(order)))]
+
+
+def cross_validate(
+    fit: Callable[[Series], Simulator], data: Series, groups: Sequence[str], count: int = FOLDS
+) -> CrossValidated | None:
+    """Fit without each fold and roll it out there; None where there is nothing to hold out.
+
+    fit   gets `data` with the weights of the held-out windows at zero
+    """
+    parts = folds(groups, count)
+    if not parts:
+        return None
+
+    def one(held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = fit(data._replace(weight=np.where(held, 0.0, data.weight)))
+        states = rollout(found.model, found.theta, data)
+        own = np.zeros_like(states)
+        unsure = np.where(held)[0]
+        chosen = Series(*(values[unsure] for values in data))
+        own[unsure] = spread(found.model, found.theta, found.covariance, chosen)
+        return states, own
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        results = list(pool.map(one, parts))
+    states, own = np.empty_like(data.measured), np.zeros_like(data.measured)
+    for held, (simulated, unsure) in zip(parts, results, strict=True):
+        states[held], own[held] = simulated[held], unsure[held]
+    rows = list(VELOCITY_IN_STATE)
+    error = (states[..., rows] - data.measured[..., rows]) * np.array(VELOCITY_WEIGHTS)
+    loss = (data.steps[..., None] * error**2).sum((1, 2))
+    return CrossValidated(
+        np.array(list(groups)), states, own, np.where(np.isfinite(loss), loss, np.inf)
+    )
