@@ -106,13 +106,13 @@ def identify_run(
     validated = by_voyage
     for seed in config.seeds:
         if config.model == "hybrid":
-            said += _hybrid(run, ready, found, by_voyage, held, seed)
+            sentence, validated = _hybrid(run, ready, found, by_voyage, held, seed)
+            said.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
     if by_voyage is not None:
         _save_cross_validation(run, before, by_voyage, by_day)
-    if validated is not None:
-        run.save_band(_band(ready.data, validated))
+    _band(run, ready, held, validated)
     return run.finish(provenance(store, split, began)), said
 
 
@@ -125,7 +125,7 @@ def prepare(
 ) -> Prepared:
     """Equations, starting values and windows of a run. Raises ProfileError or WindowError."""
     off = config.physics.without
-    ship, main, estimates = mmg.geometry(profile, off)
+    ship, main, estimates = mmg.geometry_of(profile, off)
     for sentence in estimates:
         log.info(sentence)
     path = parameters or mmg.beside(profile.source)
@@ -142,11 +142,11 @@ def prepare(
         )
     twin: dict[str, str] = {}
     for left, right, _ in table.shared_rows(learnt).iter_rows():
-        twin[right] = twin.get(left, left)
+        twin[str(right)] = twin.get(str(left), str(left))
     first = dict(
         learnt.group_by("voyage").agg(pl.col("time").min().dt.strftime("%Y-%m-%d")).iter_rows()
     )
-    voyages = [twin.get(name, name) for name in cut.plan["voyage"]]
+    voyages = [twin.get(name, name) for name in map(str, cut.plan["voyage"])]
     return Prepared(
         model, start, series(cut), voyages, [first[v] for v in voyages],
         _free(config.physics.free, start.names),
@@ -192,7 +192,8 @@ def _keep(run: Run, ready: Prepared) -> list[str]:
     for seed in run.config.seeds:
         save(run, seed, ready, simulator, None)
     states = rollout(ready.model, ready.start.values, ready.data)
-    run.save_band(band.calibrate(states - ready.data.measured, np.zeros_like(states)))
+    error = states - ready.data.measured
+    run.save_band(band.calibrate(error, np.zeros_like(states), len(set(ready.voyages))))
     loss = losses(ready.model, ready.start.values, ready.data)
     return [f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."]
 
@@ -215,67 +216,85 @@ def _hybrid(
     by_voyage: CrossValidated | None,
     held: pl.DataFrame,
     seed: int,
-) -> list[str]:
+) -> tuple[str, CrossValidated | None]:
     """Choose how much the network may say on voyages it has not seen, then fit it on all."""
     settings = run.config.physics
 
     def fitted(part: Series, physics: Identified, strength: float) -> tuple[Simulator, Identified]:
         model, done = residual.fit(
-            ready.model, ready.start, physics, part,
+            ready.model, physics, part,
             width=settings.width, strength=strength,
             rng=np.random.default_rng(streams.generator(seed, "residual").initial_seed()),
         )  # fmt: skip
         return Simulator(model, done.values, done.covariance), done
 
-    judged: dict[float, float] = {}
-    if held.height:
-        names = (run.profile.actuator_names, run.profile.wind_names)
-        size = run.config.window
-        unseen = series(windows.cut(held, plan(held, "ref", size), size, *names))
-        where = "the validation voyages"
-        judged[0.0] = float(losses(ready.model, found.values, unseen).mean())
-        candidates = {s: fitted(ready.data, found, s) for s in settings.strengths}
-        for strength, (simulator, _) in candidates.items():
-            judged[strength] = float(losses(simulator.model, simulator.theta, unseen).mean())
-    elif by_voyage is not None:
-        where = "held-out voyages"
-        judged[0.0] = float(by_voyage.loss.mean())
+    if by_voyage is None and not held.height:
+        raise RunError(
+            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
+            hint="name a second voyage with --voyages, or one with --validation.",
+        )
+    judged: dict[float, list[np.ndarray]] = {s: [] for s in (0.0, *settings.strengths)}
+    validated: dict[float, CrossValidated | None] = {0.0: by_voyage}
+    if by_voyage is not None:
+        judged[0.0].append(by_voyage.loss)
         for strength in settings.strengths:
             one = cross_validate(
                 lambda part, s=strength: fitted(part, _physics(ready, part), s)[0],
                 ready.data, ready.voyages, settings.folds,
             )  # fmt: skip
             assert one is not None
-            judged[strength] = float(one.loss.mean())
-            log.info("network of strength %g: held-out L %.0f", strength, judged[strength])
-    else:
-        raise RunError(
-            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
-            hint="name a second voyage with --voyages, or one with --validation.",
-        )
-    best = min(judged, key=lambda s: judged[s])
+            validated[strength] = one
+            judged[strength].append(one.loss)
+    candidates = {}
+    if held.height:
+        names = (run.profile.actuator_names, run.profile.wind_names)
+        size = run.config.window
+        unseen = series(windows.cut(held, plan(held, "ref", size), size, *names))
+        judged[0.0].append(losses(ready.model, found.values, unseen))
+        for strength in settings.strengths:
+            candidates[strength] = fitted(ready.data, found, strength)
+            simulator, _ = candidates[strength]
+            judged[strength].append(losses(simulator.model, simulator.theta, unseen))
+    whole = {strength: np.concatenate(parts) for strength, parts in judged.items()}
+    best = residual.choose(whole)
+    for strength, loss in whole.items():
+        log.info("network of strength %g: L %.0f on held-out windows", strength, loss.mean())
     if best == 0.0:
         # A silent network: the physics as they are, in the hybrid's form.
         simulator, done = fitted(ready.data, found, 1e-9)
-        said = f"The network adds nothing that survives {where}: it is kept silent."
+        said = "The network adds nothing that survives held-out windows: it is kept silent."
     else:
-        simulator, done = fitted(ready.data, found, best)
+        simulator, done = candidates.get(best) or fitted(ready.data, found, best)
         said = (
-            f"Network of strength {best:g}: L {judged[best]:.0f} on {where}, physics alone "
-            f"{judged[0.0]:.0f}."
+            f"Network of strength {best:g}: L {whole[best].mean():.0f} on {len(whole[best])} "
+            f"held-out windows, physics alone {whole[0.0].mean():.0f}."
         )
     net = simulator.model.residual  # type: ignore[attr-defined]
     fixed = {n: getattr(net, n) for n in ("mean", "std", "bound", "anchors", "radius", "limit")}
     save(run, seed, ready, simulator, done, fixed)
-    return [f"Seed {seed}: {said}"]
+    return f"Seed {seed}: {said}", validated.get(best)
 
 
 def _simulator(model: mmg.MMG, found: Identified) -> Simulator:
     return Simulator(model, found.values, found.covariance)
 
 
-def _band(data: Series, validated: CrossValidated) -> band.Band:
-    return band.calibrate(validated.states - data.measured, validated.spread)
+def _band(run: Run, ready: Prepared, held: pl.DataFrame, validated: CrossValidated | None) -> None:
+    """Learn the band on every voyage that was held out: in turn, and those for validation."""
+    errors, spreads, groups = [], [], 0
+    if validated is not None:
+        errors.append(validated.states - ready.data.measured)
+        spreads.append(validated.spread)
+        groups += len(set(ready.voyages))
+    if held.height:
+        names = (run.profile.actuator_names, run.profile.wind_names)
+        unseen = windows.cut(held, plan(held, "ref", run.config.window), run.config.window, *names)
+        simulator = run.simulator(run.config.seeds[0])
+        errors.append((simulator.simulate(unseen) - unseen.state).numpy())
+        spreads.append(simulator.spread(unseen))
+        groups += unseen.plan["voyage"].n_unique()
+    if errors:
+        run.save_band(band.calibrate(np.concatenate(errors), np.concatenate(spreads), groups))
 
 
 def _save_cross_validation(

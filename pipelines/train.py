@@ -85,7 +85,7 @@ def _band(run: Run, held: pl.DataFrame) -> band.Band:
     simulated = [simulate(model, unseen).numpy() for model in run.models().values()]
     error = np.concatenate([states - unseen.state.numpy() for states in simulated])
     spread = np.concatenate([band.seeds_spread(simulated)] * len(simulated))
-    return band.calibrate(error, spread)
+    return band.calibrate(error, spread, len(run.config.split.validation))
 
 
 @contextmanager

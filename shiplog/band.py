@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LEVEL = 0.9
+MOST = 0.95  # quantile of the held-out ratios, where voyages are too few for a conformal one
 SMOOTHED = 11  # s over which the growth of the error is averaged
 
 
@@ -33,12 +34,14 @@ class Band:
         return self.factor * np.sqrt(spread**2 + self.growth**2)
 
 
-def calibrate(error: np.ndarray, spread: np.ndarray, level: float = LEVEL) -> Band:
+def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float = LEVEL) -> Band:
     """From errors [N, I, 6] of held-out rollouts and the model's own spread there.
 
-    The quantile is that of a split conformal interval (Vovk et al. 2005) with each window one
-    observation, since the samples within a rollout err together. Rollouts that diverged count
-    as outside of any band and widen it no further.
+    groups   voyages they are of. The quantile is that of a split conformal interval (Vovk et al.
+             2005) with each voyage one observation, since what one voyage brings (her wind, her
+             water) errs in all of her windows; with few voyages no further than MOST.
+
+    Rollouts that diverged count as outside of any band and widen it no further.
     """
     good = np.isfinite(error).all((1, 2))
     error, spread = error[good], spread[good]
@@ -51,7 +54,7 @@ def calibrate(error: np.ndarray, spread: np.ndarray, level: float = LEVEL) -> Ba
     growth[0] = 0.0
     total = np.sqrt(spread[:, 1:] ** 2 + growth[1:] ** 2)
     ratio = np.abs(error[:, 1:]) / np.maximum(total, 1e-12)
-    wanted = min(1.0, level * (1.0 + 1.0 / max(len(error), 1)))
+    wanted = min(MOST, level * (1.0 + 1.0 / max(groups, 1)))
     return Band(growth, np.quantile(ratio.reshape(-1, ratio.shape[-1]), wanted, axis=0))
 
 

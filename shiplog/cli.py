@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -44,6 +45,10 @@ STORE = Path("store")
 
 def main() -> None:
     """Entry point: a fault of the input is a message and exit code 1, never a traceback."""
+    # What JAX compiled for one ship serves every later command: some ten seconds each.
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog" / "jax"
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)

@@ -50,7 +50,7 @@ def note(
     more = len(trades(found)) - MOST_PAIRS
     if more > 0:
         said.append(f"{more} more pairs correlate above {TRADING}.")
-    quiet = [names[i] for i in np.flatnonzero(silent(found, spread))]
+    quiet = [names[int(i)] for i in np.flatnonzero(silent(found, spread))]
     if quiet:
         said.append(
             f"These data say nothing about {', '.join(quiet)}: they stand where they started."
@@ -60,7 +60,7 @@ def note(
     stuck = found.free & ((found.values < low + room) | (found.values > high - room))
     for i in np.flatnonzero(stuck):
         said.append(
-            f"{names[i]} ran into the limit of its physical range at {found.values[i]:g}: "
+            f"{names[int(i)]} ran into the limit of its physical range at {found.values[i]:g}: "
             "something else in the model is missing, or a sensor is wrong."
         )
     if not found.converged:

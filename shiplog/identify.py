@@ -19,7 +19,7 @@ from shiplog.sensitivity import Physical, Series, losses, normal
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
 ROUNDS = 3  # of weighing the ridge by the noise that the fit before it left
-TOLERANCE = 1e-6
+TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit rests
 MOST_EVALUATIONS = 60
 
 
@@ -77,8 +77,8 @@ def identify(
     endless = np.full(len(start), np.inf)
     low, high = bounds if bounds is not None else (-endless, endless)
     weight = data.weight
-    before = losses(model, values, data)
-    if not np.isfinite(before[weight > 0]).all():
+    before = _used(losses(model, values, data), weight)
+    if not np.isfinite(before).all():
         raise ModelError(
             f"The starting values let {int((~np.isfinite(before)).sum())} of {len(before)} windows "
             "run away.",
@@ -95,7 +95,7 @@ def identify(
         done = least_squares(
             problem.residual,
             inside,
-            problem.jacobian,
+            problem.jacobian,  # type: ignore[arg-type]  # scipy's stub knows strings only
             bounds=(side[0], side[1]),
             method="trf",
             xtol=1e-4,
@@ -107,7 +107,7 @@ def identify(
         values = problem.whole(done.x)
         converged = done.status > 0
         message = "converged" if converged else _unsettled(done, model.names, free, most)
-        after = losses(model, values, data)
+        after = _used(losses(model, values, data), weight)
         now = CORRELATION * float(weight @ after) / samples
         settled = abs(now / noise - 1.0) < 0.05
         noise = now
@@ -129,7 +129,7 @@ def identify(
 def _unsettled(done, names: Sequence[str], free: np.ndarray, most: int) -> str:
     """Which parameters the cost still falls along, where the evaluations ran out."""
     slope = np.abs(done.jac.T @ done.fun)
-    moving = [np.flatnonzero(free)[i] for i in np.argsort(-slope)[:3]]
+    moving = [int(np.flatnonzero(free)[i]) for i in np.argsort(-slope)[:3]]
     return (
         f"after {most} evaluations {listed(names[i] for i in moving)} still move; "
         "the last values that made the error smaller are kept"
@@ -159,11 +159,12 @@ class _Problem:
             return
         self.evaluations += 1
         self._at = x.copy()
-        found = normal(self.model, self.whole(x), self.data)
+        found = normal(self.model, self.whole(x), self.data, _indices(self.free))
         scale = self.spread[self.free]
-        gram = found.gram[np.ix_(self.free, self.free)] * np.outer(scale, scale) / self.noise
-        pull = (self.data.weight @ found.pull)[self.free] * scale / self.noise
-        cost = float(self.data.weight @ found.loss) / self.noise
+        gram = found.gram * np.outer(scale, scale) / self.noise
+        weight = self.data.weight
+        pull = (weight @ _used(found.pull, weight)) * scale / self.noise
+        cost = float(weight @ _used(found.loss, weight)) / self.noise
         count = len(x)
         if not (np.isfinite(cost) and np.isfinite(gram).all()):
             self._residual = np.full(2 * count + 1, np.nan)
@@ -188,6 +189,15 @@ class _Problem:
         return self._jacobian
 
 
+def _used(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Zero where the weight is: a window left out may have run away, and 0 · inf is not 0."""
+    return np.where(weight.reshape(-1, *[1] * (values.ndim - 1)) > 0, values, 0.0)
+
+
+def _indices(free: np.ndarray) -> tuple[int, ...] | None:
+    return None if free.all() else tuple(np.flatnonzero(free).tolist())
+
+
 def covariance(
     model: Physical,
     values: np.ndarray,
@@ -198,12 +208,10 @@ def covariance(
 ) -> np.ndarray:
     """[P, P] of the estimate: the ridge's and the data's information, with each window one
     observation of its own gradient (the sandwich of Huber 1967 and White 1980)."""
-    found = normal(model, values, data)
+    found = normal(model, values, data, _indices(free))
     scale = spread[free]
-    information = found.gram[np.ix_(free, free)] * np.outer(scale, scale) / noise + np.eye(
-        int(free.sum())
-    )
-    pulls = found.pull[:, free] * scale / noise * np.sqrt(data.weight)[:, None]
+    information = found.gram * np.outer(scale, scale) / noise + np.eye(len(scale))
+    pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
     meat = pulls.T @ pulls + np.eye(len(scale))
     sandwich = inverse @ meat @ inverse

@@ -10,7 +10,7 @@ from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.coverage import independent_distance
 from shiplog.identify import Identified, identify
 from shiplog.models.hybrid import Hybrid, Residual, anchored, first_weights, weight_spread
-from shiplog.models.mmg import MMG, Parameters
+from shiplog.models.mmg import MMG
 from shiplog.sensitivity import Series, apparent_wind
 
 STRETCH = 5  # s over which an acceleration is differenced, so that noise does not set the bound
@@ -46,7 +46,6 @@ def residual(physics: MMG, data: Series, width: int) -> Residual:
 
 def fit(
     physics: MMG,
-    start: Parameters,
     found: Identified,
     data: Series,
     *,
@@ -54,23 +53,44 @@ def fit(
     strength: float,
     rng: np.random.Generator,
 ) -> tuple[Hybrid, Identified]:
-    """Physics and network together, from the identified physics and a silent network on.
+    """The network on top of identified physics, by the same sum of squares.
 
-    The ridge still holds the physics to its own start, and the network's output to zero with
-    `strength`: the same sum of squares, so that both come with standard errors.
+    The physics stay as they were identified alone: far from the training data, where the network
+    is silent, the hybrid is them. The ridge holds the network's output to zero with `strength`.
     """
     net = residual(physics, data, width)
-    weights = first_weights(net, rng)
-    endless = np.full(net.count, np.inf)
+    hybrid, weights = Hybrid(physics, net), first_weights(net, rng)
+    count = len(found.values)
+    start = np.concatenate((found.values, weights))
     done = identify(
-        Hybrid(physics, net),
-        np.concatenate((start.values, weights)),
-        np.concatenate((start.spread, weight_spread(net, strength))),
+        hybrid,
+        start,
+        np.concatenate((np.ones(count), weight_spread(net, strength))),
         data,
-        bounds=(np.concatenate((start.low, -endless)), np.concatenate((start.high, endless))),
-        free=np.concatenate((found.free, np.ones(net.count, dtype=bool))),
-        begin=np.concatenate((found.values, weights)),
+        free=np.arange(len(start)) >= count,
         most=EVALUATIONS,
         rounds=1,
     )
-    return Hybrid(physics, net), replace(done, loss=(found.loss[0], done.loss[1]))
+    covariance = done.covariance.copy()
+    covariance[:count, :count] = found.covariance
+    return hybrid, replace(
+        done,
+        covariance=covariance,
+        free=np.concatenate((found.free, done.free[count:])),
+        loss=(found.loss[0], done.loss[1]),
+    )
+
+
+def choose(judged: dict[float, np.ndarray]) -> float:
+    """The least strength that is not worse than the best by more than chance.
+
+    judged   strength → L of each held-out window [N]; strength 0 is the physics alone
+
+    The one-standard-error rule (Breiman et al. 1984) on paired windows.
+    """
+    best = judged[min(judged, key=lambda s: float(judged[s].mean()))]
+    for strength in sorted(judged):
+        worse = judged[strength] - best
+        if worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)):
+            return strength
+    raise AssertionError("the best is not worse than itself")

@@ -105,7 +105,7 @@ class Run:
         from shiplog.models import hybrid, mmg
 
         arrays = _arrays(self._seed(seed) / "model.safetensors")
-        ship, _, _ = mmg.geometry(self.profile, self.config.physics.without)
+        ship, _, _ = mmg.geometry_of(self.profile, self.config.physics.without)
         physics = mmg.MMG(ship)
         if self.config.model == "mmg":
             return Simulator(physics, arrays["theta"], arrays["covariance"])
@@ -347,7 +347,7 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 def _save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     partial = path.with_name(f"{path.name}.partial")
-    save_arrays({name: np.ascontiguousarray(a, float) for name, a in arrays.items()}, partial)
+    save_arrays({name: np.array(a, dtype=float, order="C") for name, a in arrays.items()}, partial)
     partial.replace(path)
 
 

@@ -123,8 +123,11 @@ def _rollout(model, theta, start, actuator, wind, dt, substeps=1):
     def step(state, driven):
         at, blowing, length = driven
         h = length[:, None] / substeps
-        for _ in range(substeps):
-            state = state + h * rate(model, theta, state, at, blowing)
+
+        def within(_, state):
+            return state + h * rate(model, theta, state, at, blowing)
+
+        state = jax.lax.fori_loop(0, substeps, within, state)
         return state, state
 
     driven = (jnp.moveaxis(actuator[:, :-1], 1, 0), jnp.moveaxis(wind[:, :-1], 1, 0), dt.T)
@@ -160,15 +163,22 @@ def padded(data: Series) -> Series:
     )
 
 
-@jax.jit
-def _linearised(model, theta, start, actuator, wind, dt):
+@partial(jax.jit, static_argnames=("free",))
+def _linearised(model, theta, start, actuator, wind, dt, free=None):
+    """`free`: indices of the parameters to differentiate by; all of them if None."""
     states = _rollout(model, theta, start, actuator, wind, dt)
-    count = len(theta)
+    moving = tuple(range(len(theta))) if free is None else free
+    parts = jax.lax.split(theta, [1] * len(theta))
+    count = len(moving)
 
     def slopes(state, at, blowing):
-        return jax.jacrev(lambda s, t: model.acceleration(t, s, at, blowing), argnums=(0, 1))(
-            state, theta
-        )
+        def acceleration(state, values):
+            put = dict(zip(moving, jax.lax.split(values, [1] * count), strict=True))
+            whole = jnp.concatenate([put.get(i, part) for i, part in enumerate(parts)])
+            return model.acceleration(whole, state, at, blowing)
+
+        values = jnp.concatenate([parts[i] for i in moving])
+        return jax.jacrev(acceleration, argnums=(0, 1))(state, values)
 
     by_state, by_theta = jax.vmap(jax.vmap(slopes))(states[:, :-1], actuator[:, :-1], wind[:, :-1])
 
@@ -213,15 +223,17 @@ def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.nda
     return np.asarray(states)[:count], np.asarray(slopes)[:count]
 
 
-@jax.jit
-def _normal(model, theta, measured, actuator, wind, dt, steps, weight):
-    states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt)
+@partial(jax.jit, static_argnames=("free",))
+def _normal(model, theta, measured, actuator, wind, dt, steps, weight, free=None):
+    states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free)
     scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
     error = (states[..., VELOCITY] - measured[..., VELOCITY]) * scale
     slope = slopes[:, :, VELOCITY] * scale[..., None]
     pull = jnp.einsum("nki,nkip->np", error, slope)
     loss = (error**2).sum((1, 2))
-    slope = slope * jnp.sqrt(weight)[:, None, None, None]
+    # A window of weight 0 may have run away, and 0 · inf is not 0.
+    used = (weight > 0.0)[:, None, None, None]
+    slope = jnp.where(used, slope * jnp.sqrt(weight)[:, None, None, None], 0.0)
     flat = slope.reshape(-1, slope.shape[-1])
     return loss, pull, flat.T @ flat
 
@@ -240,14 +252,20 @@ class Normal:
     gram: np.ndarray
 
 
-def normal(model: Physical, theta: np.ndarray, data: Series) -> Normal:
-    """Loss, gradient and Gauss-Newton matrix in flat memory, CHUNK windows at a time."""
+def normal(
+    model: Physical, theta: np.ndarray, data: Series, free: tuple[int, ...] | None = None
+) -> Normal:
+    """Loss, gradient and Gauss-Newton matrix in flat memory, CHUNK windows at a time.
+
+    free   indices of the parameters wanted; then P is their number
+    """
     whole = padded(data)
     parts = [
         _normal(
             model,
             theta,
             *(values[at : at + CHUNK] for values in (*whole[:4], whole.steps, whole.weight)),
+            free,
         )
         for at in range(0, len(whole.measured), CHUNK)
     ]
@@ -259,7 +277,8 @@ def normal(model: Physical, theta: np.ndarray, data: Series) -> Normal:
 def losses(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
     """L of each window [N], infinite where the rollout diverges."""
     error = rollout(model, theta, data)[..., VELOCITY] - data.measured[..., VELOCITY]
-    each = (data.steps[..., None] * (error * np.array(VELOCITY_WEIGHTS)) ** 2).sum((1, 2))
+    with np.errstate(over="ignore", invalid="ignore"):
+        each = (data.steps[..., None] * (error * np.array(VELOCITY_WEIGHTS)) ** 2).sum((1, 2))
     return np.where(np.isfinite(each), each, np.inf)
 
 

@@ -17,8 +17,9 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"ingest"},
     {"store", "windows"},
     {"models"},
-    {"engine", "simulate", "coverage"},
-    {"evaluate", "floors", "train"},
+    {"engine", "simulate", "coverage", "sensitivity"},
+    {"identify", "band"},
+    {"evaluate", "floors", "train", "crossvalidation", "identifiability", "residual", "forces"},
     {"runs", "report", "viewer"},
     {"cli"},
 )

@@ -24,7 +24,7 @@ import numpy as np
 from shiplog import profile
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.identify import Identified, identify
-from shiplog.models.mmg.geometry import geometry
+from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, beside, load
 from shiplog.sensitivity import Series, linearised, normal, padded, rollout
@@ -190,7 +190,7 @@ def main() -> None:
     parser.add_argument("--no-peer", action="store_true")
     options = parser.parse_args()
 
-    model = MMG(geometry(profile.load(SHIP))[0])
+    model = MMG(geometry_of(profile.load(SHIP))[0])
     path = beside(SHIP)
     assert path is not None, f"{SHIP} has no parameter file"
     known = load(path, model.geometry)

@@ -36,12 +36,12 @@ class Residual:
     """
 
     width: int
-    mean: np.ndarray
-    std: np.ndarray
-    bound: np.ndarray
-    anchors: np.ndarray
-    radius: float
-    limit: float
+    mean: np.ndarray | Array
+    std: np.ndarray | Array
+    bound: np.ndarray | Array
+    anchors: np.ndarray | Array
+    radius: float | np.ndarray
+    limit: float | np.ndarray
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
@@ -102,7 +102,7 @@ class Hybrid:
             parts[name] = theta[at : at + size].reshape(shape)
             at += size
         hidden = jnp.tanh(z @ parts["w1"].T + parts["c1"])
-        return self.residual.bound * jnp.tanh(hidden @ parts["w2"].T + parts["c2"])
+        return jnp.asarray(self.residual.bound) * jnp.tanh(hidden @ parts["w2"].T + parts["c2"])
 
     def added(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """What the network adds to ν̇ [..., 3], faded."""

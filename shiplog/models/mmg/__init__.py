@@ -6,7 +6,7 @@ import jax
 
 jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
-from shiplog.models.mmg.geometry import PARTS, Geometry, geometry  # noqa: E402
+from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of  # noqa: E402
 from shiplog.models.mmg.model import MMG  # noqa: E402
 from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning  # noqa: E402
 
@@ -17,7 +17,7 @@ __all__ = [
     "Parameters",
     "beside",
     "estimated",
-    "geometry",
+    "geometry_of",
     "load",
     "meaning",
 ]

@@ -83,7 +83,7 @@ class Geometry:
         return tuple(name for name in PARTS if has[name])
 
 
-def geometry(
+def geometry_of(
     profile: Profile, without: Iterable[str] = ()
 ) -> tuple[Geometry, Particulars, tuple[str, ...]]:
     """A profile's geometry, its particulars, and a sentence for each that had to be estimated.
@@ -114,7 +114,7 @@ def geometry(
             *a.position_m,
             _needed(a, "area_m2", "rudder"),
             _needed(a, "span_m", "rudder"),
-            a.limits is not None and max(map(abs, a.limits)) * a.scale()[0][1] > WIDE,
+            _reach(a) > WIDE,
             _slipstream(a, propellers),
         )
         for a in profile.actuators
@@ -165,21 +165,35 @@ def _needed(actuator: Actuator, key: str, part: str) -> float:
 
 
 def _slipstream(rudder: Actuator, propellers: tuple[Propeller, ...]) -> int | None:
-    """The screw ahead of a rudder that is nearest across; None where none stands before it."""
-    before = [
-        (abs(p.starboard - rudder.position_m[1]), i)
+    """The screw that a rudder stands behind: nearest across, then along; None where none is."""
+    ahead, starboard = rudder.position_m
+    near = [
+        (round(abs(p.starboard - starboard), 6), abs(p.ahead - ahead), i)
         for i, p in enumerate(propellers)
-        if abs(p.starboard - rudder.position_m[1]) <= p.diameter
+        if abs(p.starboard - starboard) <= p.diameter
     ]
-    return min(before)[1] if before else None
+    return min(near)[2] if near else None
+
+
+def _reach(actuator: Actuator) -> float:
+    """The larger of its limits from zero, in SI; 0 where the profile gives none."""
+    offset, factor = actuator.scale()[0]
+    return max((abs((limit - offset) * factor) for limit in actuator.limits or ()), default=0.0)
 
 
 def _full(thruster: Actuator) -> float:
-    """The command at full thrust, in SI: the larger limit, or 1 where no limits are given."""
-    if thruster.limits is None:
-        return 1.0
-    offset, factor = thruster.scale()[0]
-    return max(abs((limit - offset) * factor) for limit in thruster.limits)
+    """The command at full thrust, in SI; 1 for a command that has no unit and no limits.
+
+    Raises ProfileError for revolutions without limits: full thrust is then not known.
+    """
+    reach = _reach(thruster)
+    if not reach and thruster.si_unit != "1":
+        raise ProfileError(
+            f"The profile gives no limits for the thruster {thruster.name!r}, and its command is "
+            f"in {thruster.unit}: what full thrust is cannot be told.",
+            hint="add limits to that actuator, or leave the force out with --without thruster.",
+        )
+    return reach or 1.0
 
 
 def _turning(thruster: Actuator, profile: Profile) -> int | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import jax
 import jax.numpy as jnp
@@ -37,16 +38,16 @@ class MMG:
         actuator   [..., A]   the profile's order [rad, rev/s or 1]
         true_wind  [..., 2]   where it comes from, along x₀ and y₀ [m/s]
         """
-        g, p = self.geometry, dict(zip(self.names, theta, strict=True))
+        g, p = self.geometry, named(self.names, theta)
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
         found = {"hull": hull.hull(p, g, u, v, r)}
         screws = [_screw(p, g, s, u, v, r, actuator) for s in g.propellers]
         if screws:
-            found["propeller"] = sum(s[0] for s in screws)
+            found["propeller"] = total(s[0] for s in screws)
         if g.rudders:
-            found["rudder"] = sum(_blade(p, g, b, screws, u, v, r, actuator) for b in g.rudders)
+            found["rudder"] = total(_blade(p, g, b, screws, u, v, r, actuator) for b in g.rudders)
         if g.thrusters:
-            found["thruster"] = sum(
+            found["thruster"] = total(
                 thruster.thruster(p, g, t, u, v, r, actuator) for t in g.thrusters
             )
         if g.wind:
@@ -55,10 +56,24 @@ class MMG:
 
     def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3] in m/s² and rad/s²; arguments as for `forces`."""
-        total = sum(self.forces(theta, state, actuator, true_wind).values())
-        p = dict(zip(self.names, theta, strict=True))
+        force = total(self.forces(theta, state, actuator, true_wind).values())
+        p = named(self.names, theta)
         u, v, r = state[..., 1], state[..., 3], state[..., 5]
-        return body.accelerations(p, self.geometry, u, v, r, total)
+        return body.accelerations(p, self.geometry, u, v, r, force)
+
+
+def named(names: Sequence[str], theta: Array) -> dict[str, Array]:
+    """θ [P] as name → number.
+
+    Split, not indexed: reverse mode adds up a whole vector for every index, P² work for P numbers.
+    """
+    return dict(
+        zip(names, (part[0] for part in jax.lax.split(theta, [1] * len(names))), strict=True)
+    )
+
+
+def total(forces: Iterable[Array]) -> Array:
+    return reduce(jnp.add, forces)
 
 
 def _screw(

@@ -219,7 +219,7 @@ def load(path: Path | str, geometry: Geometry, without: Iterable[str] = ()) -> P
             f"{path} cannot be read: {error.strerror}.",
             hint="give --parameters the path of a TOML of MMG coefficients.",
         ) from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ProfileError(f"{path} is not valid TOML: {error}.", hint="mend that line.") from error
     source = str(content.pop("source", path.name))
     for part in content:
@@ -258,8 +258,18 @@ def _from(
                 f"{where} has a section [{part}] that no force reads{nearest(part, TABLE)}.",
                 hint=f"sections are {listed(TABLE)}.",
             )
-        for key in values:
-            if part != "thruster" and key not in known[part]:
+        if not isinstance(values, Mapping):
+            raise ProfileError(
+                f"{where}: {part} is {values!r}, not a section.", hint=f"write it as [{part}]."
+            )
+        for key, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ProfileError(
+                    f"{where}: {part}.{key} is {value!r}, not a number.", hint="give a number."
+                )
+            if part == "thruster":
+                known[part] = [n.split(".", 1)[1] for n in wanted if n.startswith("thruster.")]
+            if key not in known[part] and part in (*geometry.parts, "body"):
                 raise ProfileError(
                     f"{where}: {part}.{key} is not a coefficient{nearest(key, known[part])}.",
                     hint=f"[{part}] can hold {listed(known[part], most=40)}.",
@@ -272,10 +282,11 @@ def _from(
             missing.append(name)
         values.append(value)
     if missing:
-        parts = sorted({name.split(".")[0] for name in missing})
+        parts = sorted({name.split(".")[0] for name in missing} - {"body", "hull"})
+        off = f", or leave the force out with --without {' --without '.join(parts)}"
         raise ProfileError(
             f"{where} lacks {listed(missing, most=8)}.",
-            hint=f"add them, or leave the force out with --without {' --without '.join(parts)}.",
+            hint=f"add them{off if parts else ''}.",
         )
     entries = [_entry(name) for name in wanted]
     array = np.array(values, dtype=float)
