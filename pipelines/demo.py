@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.evaluate import compare_runs
+from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
-from pipelines.split import choose_split
+from pipelines.split import choose_physical_split, choose_split
 from pipelines.train import train_run
-from shiplog.config import Config, Fast
+from shiplog.config import Config, Fast, Physics
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.store import Store
 
@@ -55,6 +56,13 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
             listed(split.validation),
         )
         train_run(Config(data=data, seeds=SEEDS, split=split, fast=RECIPE), store, path)
+    path = out / "runs" / "mmg"
+    if not path.exists():
+        split = choose_physical_split(store, (), (), DATASETS[0], 100)
+        log.info("2/3 identifying mmg on %s", listed(split.training))
+        config = Config(model="mmg", data=DATASETS[0], split=split, physics=Physics(folds=2))
+        identify_run(config, store, path)
+    paths.append(path)
     log.info("3/3 comparing on the test voyage")
     result = compare_runs(paths, store, (), out / "compare.rrd")
     took = time.monotonic() - began

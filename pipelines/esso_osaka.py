@@ -38,12 +38,18 @@ def published_split(folder: Path) -> Split:
     )
 
 
-def run(folder: Path, out: Path, seeds: int, recipe: str) -> Evaluation:
-    """Convert, ingest, train and evaluate; what stands in `out` already is not done again."""
-    split, store = published_split(folder), Store(out / "store")
+def trials_store(folder: Path, out: Path) -> Store:
+    """The tables as logs, and the logs as a store, in `out`."""
+    store = Store(out / "store")
     if not store.entries():
         convert(sorted(folder.glob("*/*.parquet")), profiles.load("esso-osaka"), out / "logs")
         ingest_logs(expand([out / "logs"]), "esso-osaka", store)
+    return store
+
+
+def run(folder: Path, out: Path, seeds: int, recipe: str) -> Evaluation:
+    """Convert, ingest, train and evaluate; what stands in `out` already is not done again."""
+    split, store = published_split(folder), trials_store(folder, out)
     path = out / f"feedforward-{recipe}"
     if not path.exists():
         config = {"recipe": recipe, "seeds": tuple(range(seeds)), "split": split}

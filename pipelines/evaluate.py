@@ -29,7 +29,8 @@ log = logging.getLogger(__name__)
 class Evaluation:
     """Every run and both floors on the same test windows.
 
-    errors     run, seed, voyage, window, elapsed, and evaluate.ERRORS: one row a window and seed
+    errors     run, seed, voyage, window, elapsed, wind_speed (mean apparent, m/s) and
+               evaluate.ERRORS: one row a window and seed
     rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
     coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
     floors     mean L of holding the velocity and of quadratic least squares, first run's data
@@ -53,7 +54,10 @@ class Evaluation:
         errors = self.errors.filter(pl.col("run") == run.name)
         answer = report.evaluation_json(errors, self.floors, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
-        return answer | {"band_90": dict(shares.iter_rows())}
+        return answer | {
+            "band_90": dict(shares.iter_rows()),
+            "winds": report.winds(errors).drop("run").to_dicts(),
+        }
 
     def text(self) -> str:
         """Markdown: models against floors, voyages, the worst windows of the first run."""
@@ -72,6 +76,7 @@ class Evaluation:
             "",
             report.voyages_table(first),
             "",
+            *report.wind_lines(self.errors),
             "Worst windows, and whether the training data had been there:",
             "",
             report.windows_table(errors, self.coverage),
@@ -221,19 +226,29 @@ def _same_ship(run: Run, columns: tuple[str, ...], other: str) -> None:
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:
-    """voyage, window (counted in each voyage), elapsed."""
+    """voyage, window (counted in each voyage), segment, start, elapsed, wind_speed."""
     return cut.plan.select(
         "voyage",
         pl.int_range(pl.len()).over("voyage").alias("window"),
         "segment",
         "start",
         "elapsed",
+    ).with_columns(
+        wind_speed=pl.Series(
+            values=cut.wind[..., 0].mean(1).numpy() if cut.wind.shape[-1] else [None] * len(cut),
+            dtype=pl.Float64,
+        )
     )
 
 
 def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:
     return numbered.select(
-        pl.lit(run.name).alias("run"), pl.lit(seed).alias("seed"), "voyage", "window", "elapsed"
+        pl.lit(run.name).alias("run"),
+        pl.lit(seed).alias("seed"),
+        "voyage",
+        "window",
+        "elapsed",
+        "wind_speed",
     )
 
 
@@ -330,7 +345,9 @@ def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -
             & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)
         )
         reasons.append(covering.reason(row, within))
-    return whole.drop("segment", "start", "elapsed").with_columns(reason=pl.Series(reasons))
+    return whole.drop("segment", "start", "elapsed", "wind_speed").with_columns(
+        reason=pl.Series(reasons)
+    )
 
 
 def _floors(run: Run, cut: Windows) -> dict[str, float]:

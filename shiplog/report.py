@@ -231,6 +231,37 @@ def parameters_table(identified: pl.DataFrame) -> str:
     return table(head, rows)
 
 
+WIND_BIN = 1.0  # m/s
+
+
+def winds(errors: pl.DataFrame) -> pl.DataFrame:
+    """run, low, high [m/s], windows, loss: L by the mean apparent wind of a window."""
+    low = (pl.col("wind_speed") / WIND_BIN).floor() * WIND_BIN
+    return (
+        errors.drop_nulls("wind_speed")
+        .with_columns(low=low, high=low + WIND_BIN)
+        .group_by("run", "low", "high", maintain_order=True)
+        .agg(windows=pl.struct("voyage", "window").n_unique(), loss=pl.col("loss").mean())
+        .sort("low", maintain_order=True)
+    )
+
+
+def wind_lines(errors: pl.DataFrame) -> list[str]:
+    """A table of L by wind, a column a run, and a blank line; nothing without a wind sensor."""
+    found = winds(errors)
+    names = errors["run"].unique(maintain_order=True).to_list()
+    if found.is_empty():
+        return []
+    rows = []
+    for low in found["low"].unique(maintain_order=True):
+        here = {r["run"]: r for r in found.filter(pl.col("low") == low).to_dicts()}
+        one = here[names[0]]
+        span = f"{one['low']:.0f} to {one['high']:.0f}"
+        rows.append((span, one["windows"], *(here[n]["loss"] for n in names)))
+    head = ("apparent wind [m/s]", "windows", *(f"L of {n}" for n in names))
+    return ["By wind:", "", table(head, rows), ""]
+
+
 def band_lines(inside: pl.DataFrame) -> list[str]:
     """What share of the samples lies inside each run's 90 % band, and a blank line."""
     lines = []

@@ -531,6 +531,17 @@ def test_of_two_screws_that_reach_it_the_nearer_is_a_rudders_own():
     assert [blade.behind for blade in found.rudders] == [0, 1]
 
 
+@pytest.mark.parametrize("first", [-1.8, 1.8])
+def test_of_two_screws_on_the_centreline_the_one_along_the_ship_is_a_rudders_own(first):
+    """A double-ender: one screw at each end, given in either order; the rudders stand aft."""
+    ends = TWIN.replace("[-1.8, -0.3]", f"[{first}, 0.0]").replace(
+        "[-1.8, 0.3]", f"[{-first}, 0.0]"
+    )
+    ends = ends.replace("[-1.9, -0.3]", "[-1.9, 0.0]").replace("[-1.9, 0.3]", "[-1.9, 0.0]")
+    found, _, _ = geometry_of(profiles.parse(ends, "ends.toml"))
+    assert {found.propellers[blade.behind].ahead for blade in found.rudders} == {-1.8}
+
+
 def test_a_rudder_aside_of_every_screw_meets_the_free_stream():
     aside = TWIN.replace("[-1.8, 0.3]", "[-1.8, 0.0]")  # one screw 0.3 m from either rudder
     found, _, _ = geometry_of(profiles.parse(aside.replace("[-1.8, -0.3]", "[-1.8, 0.0]"), "aside"))
@@ -549,13 +560,15 @@ def test_a_rudder_aside_of_every_screw_meets_the_free_stream():
 @pytest.mark.parametrize("degrees", [0.0, 60.0, 90.0, -135.0])
 @pytest.mark.parametrize("number", [1, 3])
 def test_an_azimuth_pushes_where_it_points(number, degrees):
+    """Full thrust at the limit of 1300 rpm, 65/3 rev/s."""
     ship = estimated(profiles.load("milliampere"))
     g = ship.model.geometry
     ahead, starboard = {1: (1.8, -0.8), 3: (-1.8, 0.8)}[number]
     unit = g.thrusters[number - 1]
-    assert (unit.ahead, unit.starboard, unit.full) == (ahead, starboard, 1.0)
+    assert (unit.ahead, unit.starboard) == (ahead, starboard)
+    assert unit.full == pytest.approx(65.0 / 3.0)
     actuator = [0.0] * 8
-    actuator[2 * number - 2], actuator[2 * number - 1] = math.radians(degrees), 1.0
+    actuator[2 * number - 2], actuator[2 * number - 1] = math.radians(degrees), 65.0 / 3.0
     x, y, n = ship.forces(actuator=tuple(actuator))["thruster"]
     size = ship[f"thruster.thruster_{number}_ahead"]
     assert x == pytest.approx(size * math.cos(math.radians(degrees)))
@@ -586,6 +599,18 @@ def test_a_thruster_loses_thrust_to_the_flow_along_it():
     pod = ship.forces(0.3, 0.0, 0.1, actuator=(0.0, 1.0))["thruster"]
     push = 20.0 * (1 - 0.5 * 0.26)
     assert pod == pytest.approx((push, 0.0, -0.4 * push))
+
+
+def test_revolutions_without_limits_do_not_say_what_full_thrust_is():
+    text = TUNNEL.replace('field = "pod"', 'field = "pod"\nunit = "rpm"')
+    ship = profiles.parse(text, "tunnel.toml")
+    with pytest.raises(ProfileError, match="no limits for the thruster 'pod'") as error:
+        geometry_of(ship)
+    assert "in rpm" in str(error.value) and "--without thruster" in error.value.hint
+    assert geometry_of(ship, without=["thruster"])[0].parts == ("hull",)
+    limited = text.replace('unit = "rpm"', 'unit = "rpm"\nlimits = [-600.0, 300.0]')
+    bow, pod = geometry_of(profiles.parse(limited, "tunnel.toml"))[0].thrusters
+    assert (bow.full, pod.full) == (100.0, 10.0)  # the larger side, in rev/s
 
 
 # ---------------------------------------------------------------- mirror images
@@ -621,6 +646,28 @@ def test_twin_rudders_in_a_mirror_change_places_and_sign(vectwin, seed):
         assert there[part] == pytest.approx(force * [1, -1, -1], rel=1e-9, abs=1e-12), part
 
 
+@pytest.mark.parametrize(("u", "n"), [(0.3, -8.0), (0.05, -8.0), (-0.1, -8.0), (-0.1, 8.0)])
+def test_a_pair_of_screws_turns_against_each_other(twin, u, n):
+    """Astern or braking, either alone pushes the stern its own way; both together, straight."""
+    port, starboard, both = (
+        twin.forces(u, actuator=(0.0, left, 0.0, right))["propeller"]
+        for left, right in ((n, 0.0), (0.0, n), (n, n))
+    )
+    assert port == pytest.approx(starboard * [1, -1, -1], rel=1e-12)
+    assert abs(starboard[1]) > 1e-3
+    assert both == pytest.approx((2 * starboard[0], 0.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [8.0, -8.0])
+def test_twin_screws_and_rudders_in_a_mirror_change_places(twin, n):
+    """δ port and starboard change places and sign, the screws their places alone."""
+    even = twin.changed(rudder__gamma_n=0.4, rudder__gamma_p=0.4)
+    state = (0.3, 0.05, -0.02, 0.4, (0.0, 0.0))
+    here, there = mirrored(even, *state, (0.2, n, -0.1, 0.6 * n), (0.1, 0.6 * n, -0.2, n))
+    for part, force in here.items():
+        assert there[part] == pytest.approx(force * [1, -1, -1], rel=1e-9, abs=1e-12), part
+
+
 # ---------------------------------------------------------------- geometry
 
 
@@ -629,6 +676,27 @@ def test_the_profile_says_which_blades_are_wide(esso, vectwin):
     assert [blade.wide for blade in vectwin.model.geometry.rudders] == [True, True]
     assert [blade.behind for blade in vectwin.model.geometry.rudders] == [0, 0]
     assert esso["rudder.f_t"] == 0.0  # an ordinary blade's
+
+
+def test_a_blade_is_as_wide_whichever_way_its_sensor_counts():
+    """sign = -1 turns limits of -105 to 35 round; an ordinary blade stays one. Offsets count."""
+    wide = profiles.load("esso-vectwin")
+
+    def blades(**update):
+        """Which are wide, with every rudder's profile changed so."""
+        changed = tuple(
+            a.model_copy(update=update) if a.kind == "rudder" else a for a in wide.actuators
+        )
+        return [
+            b.wide for b in geometry_of(wide.model_copy(update={"actuators": changed}))[0].rudders
+        ]
+
+    for sign in (1.0, -1.0):
+        assert blades(sign=sign) == [True, True]
+        assert blades(sign=sign, limits=(-105.0, 35.0)) == [True, True]
+        assert blades(sign=sign, limits=(-35.0, 35.0)) == [False, False]
+        assert blades(sign=sign, limits=(55.0, 125.0), offset=90.0) == [False, False]
+    assert blades(limits=None) == [False, False]
 
 
 @pytest.mark.parametrize(
@@ -725,8 +793,11 @@ def edited(tmp_path, old, new):
         ("[wind]", "[winds]", ["[winds]", "did you mean 'wind'", "sections are"]),
         ("a_h = 0.393", "", ["lacks rudder.a_h", "--without rudder"]),
         ("eps = 1.42", "eps = 1.42 eps", ["not valid TOML"]),
+        ("eps = 1.42", 'eps = "1.42"', ["rudder.eps", "'1.42'", "not a number"]),
+        ("eps = 1.42", "eps = true", ["rudder.eps", "True", "not a number"]),
+        ("eps = 1.42", "eps = [1.42]", ["rudder.eps", "not a number"]),
     ],
-    ids=["high", "low", "nan", "key", "section", "missing", "syntax"],
+    ids=["high", "low", "nan", "key", "section", "missing", "syntax", "string", "bool", "array"],
 )
 def test_a_file_that_cannot_be_is_refused_with_its_name(esso, tmp_path, old, new, words):
     path = edited(tmp_path, old, new)
@@ -734,6 +805,50 @@ def test_a_file_that_cannot_be_is_refused_with_its_name(esso, tmp_path, old, new
         parameters.load(path, esso.model.geometry)
     for word in [str(path), *words]:
         assert word in str(error.value)
+
+
+def test_a_number_where_a_section_belongs_is_refused(esso, tmp_path):
+    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    path = tmp_path / "scalar.mmg.toml"
+    path.write_text("wind = 0.3\n" + text[: text.index("[wind]")], encoding="utf-8")
+    with pytest.raises(ProfileError, match=r"scalar\.mmg\.toml: wind is 0\.3, not") as error:
+        parameters.load(path, esso.model.geometry)
+    assert "[wind]" in error.value.hint
+
+
+def test_a_file_that_is_not_utf_8_is_refused(esso, tmp_path):
+    path = tmp_path / "latin.mmg.toml"
+    path.write_bytes('source = "Universität"'.encode("latin-1"))
+    with pytest.raises(ProfileError, match=r"latin\.mmg\.toml is not valid TOML"):
+        parameters.load(path, esso.model.geometry)
+
+
+def test_a_missing_hull_is_not_advised_to_be_left_out(esso, tmp_path):
+    """There is no --without hull, nor --without body."""
+    for old in ("y_v = -0.3728", "m_y = 0.2579"):
+        with pytest.raises(ProfileError, match="lacks") as error:
+            parameters.load(edited(tmp_path, old, ""), esso.model.geometry)
+        assert error.value.hint == "add them."
+    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    both = text.replace("y_v = -0.3728", "").replace("a_h = 0.393", "")
+    path = tmp_path / "both.mmg.toml"
+    path.write_text(both, encoding="utf-8")
+    with pytest.raises(ProfileError, match=r"lacks hull\.y_v, rudder\.a_h") as error:
+        parameters.load(path, esso.model.geometry)
+    assert error.value.hint == "add them, or leave the force out with --without rudder."
+
+
+def test_a_thruster_that_the_ship_lacks_is_refused(tmp_path):
+    g, main, _ = geometry_of(profiles.parse(TUNNEL, "tunnel.toml"))
+    text = parameters.estimated(g, main).to_toml()
+    path = tmp_path / "tunnel.mmg.toml"
+    path.write_text(text, encoding="utf-8")
+    assert parameters.load(path, g).names == parameters.names(g)
+    path.write_text(text.replace("bow_loss", "bow_lost"), encoding="utf-8")
+    with pytest.raises(ProfileError, match=r"thruster\.bow_lost is not a coefficient") as error:
+        parameters.load(path, g)
+    assert "did you mean 'bow_loss'" in str(error.value)
+    assert "pod_astern" in error.value.hint and "hull" not in error.value.hint
 
 
 def test_a_whole_part_that_is_missing_is_named_and_can_be_left_out(tmp_path):
