@@ -63,7 +63,11 @@ def identify_run(
     planned = plan(learnt, config.data, config.window)
     ready = prepare(config, profile, learnt, planned, parameters)
     config = config.model_copy(
-        update={"physics": config.physics.model_copy(update={"parameters": ready.start.source})}
+        update={
+            "physics": config.physics.model_copy(
+                update={"parameters": ready.start.source, "substeps": ready.model.substeps}
+            )
+        }
     )
     run = runs.create(out, config, profile, None, planned, learnt, held)
     count = int(ready.free.sum()) if config.physics.fit else 0
@@ -132,7 +136,6 @@ def prepare(
     start = mmg.load(path, ship, off) if path else mmg.estimated(ship, main)
     if path is None:
         log.info("no published coefficients for this ship: %s", start.source)
-    model = mmg.MMG(ship)
     names = (profile.actuator_names, profile.wind_names)
     cut = windows.cut(learnt, planned, config.window, *names)
     if planned.height == 0:
@@ -147,10 +150,23 @@ def prepare(
         learnt.group_by("voyage").agg(pl.col("time").min().dt.strftime("%Y-%m-%d")).iter_rows()
     )
     voyages = [twin.get(name, name) for name in map(str, cut.plan["voyage"])]
+    data = series(cut)
+    model = _stable(mmg.MMG(ship, config.physics.substeps), start.values, data)
     return Prepared(
-        model, start, series(cut), voyages, [first[v] for v in voyages],
+        model, start, data, voyages, [first[v] for v in voyages],
         _free(config.physics.free, start.names),
     )  # fmt: skip
+
+
+def _stable(model: mmg.MMG, values: np.ndarray, data: Series) -> mmg.MMG:
+    """With as many Euler steps a second as a small, quick ship needs to hold every window."""
+    for substeps in (1, 2, 4, 8):
+        finer = mmg.MMG(model.geometry, max(substeps, model.substeps))
+        if np.isfinite(losses(finer, values, data)).all():
+            if finer.substeps > model.substeps:
+                log.info("%d Euler steps within each second keep the ship stable", finer.substeps)
+            return finer
+    return model  # the identification says what is wrong
 
 
 def save(

@@ -58,6 +58,7 @@ class Physics(Section):
     parameters: str = ""  # where the starting values are from
     without: tuple[str, ...] = ()  # forces switched off
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
+    substeps: int = Field(default=1, ge=1)  # Euler steps within each measured one
     folds: int = Field(default=5, ge=2)
     width: int = Field(default=8, gt=0)  # of the hybrid's residual network
     strengths: tuple[float, ...] = (0.1, 0.3, 1.0)  # of it, to choose from on held-out voyages
@@ -105,7 +106,7 @@ class Config(Section):
         """What a legend says of the model in a word: the recipe, or the physics."""
         if not self.physical:
             return self.recipe
-        return self.model if self.physics.fit else f"{self.model}, as published"
+        return "identified" if self.physics.fit else "as published"
 
     def to_toml(self) -> str:
         """As it is saved; the sections of the other kind of model left out."""

@@ -70,22 +70,18 @@ def identify(
     begin           [P]  where to begin, if not at `start`
     most, rounds    evaluations a round; rounds of weighing the ridge by the noise left over
 
-    Raises ModelError where not even the start can be rolled out.
+    Raises ModelError where the windows run away from the start, and from what shorter ones give.
     """
     free = np.ones(len(start), dtype=bool) if free is None else free
     values = np.array(start if begin is None else begin, dtype=float)
     endless = np.full(len(start), np.inf)
     low, high = bounds if bounds is not None else (-endless, endless)
     weight = data.weight
-    before = _used(losses(model, values, data), weight)
-    if not np.isfinite(before).all():
-        raise ModelError(
-            f"The starting values let {int((~np.isfinite(before)).sum())} of {len(before)} windows "
-            "run away.",
-            hint="check the profile's signs and units, or give better --parameters.",
-        )
+    before = _used(losses(model, np.array(start, dtype=float), data), weight)
+    if not np.isfinite(_used(losses(model, values, data), weight)).all():
+        values = _from_short_windows(model, start, spread, data, (low, high), free, values)
     samples = 3.0 * float((weight * data.dt.sum(1)).sum())
-    noise = CORRELATION * float(weight @ before) / samples
+    noise = CORRELATION * float(weight @ _used(losses(model, values, data), weight)) / samples
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
         problem = _Problem(model, start, spread, data, free, noise)
@@ -124,6 +120,42 @@ def identify(
         converged=converged,
         message=message,
     )
+
+
+def _from_short_windows(
+    model: Physical,
+    start: np.ndarray,
+    spread: np.ndarray,
+    data: Series,
+    bounds: tuple[np.ndarray, np.ndarray],
+    free: np.ndarray,
+    values: np.ndarray,
+) -> np.ndarray:
+    """Values that hold whole windows, from ones that let some run away: first fitted to the
+    windows' beginnings, then to longer and longer ones. Raises ModelError where that fails."""
+    whole = data.measured.shape[1]
+    for share in (16, 8, 4, 2):
+        size = max(whole // share, 3)
+        part = data._replace(
+            measured=data.measured[:, :size],
+            actuator=data.actuator[:, :size],
+            wind=data.wind[:, :size],
+            dt=data.dt[:, : size - 1],
+        )
+        if not np.isfinite(_used(losses(model, values, part), data.weight)).all():
+            break
+        values = identify(
+            model, start, spread, part, bounds=bounds, free=free, begin=values, rounds=1
+        ).values
+    lost = ~np.isfinite(_used(losses(model, values, data), data.weight))
+    if lost.any():
+        raise ModelError(
+            f"The starting values let {int(lost.sum())} of {len(lost)} windows run away, and no "
+            "fit to shorter ones mends it.",
+            hint="check the profile's signs and units, choose a shorter --window, or give better "
+            "--parameters.",
+        )
+    return values
 
 
 def _unsettled(done, names: Sequence[str], free: np.ndarray, most: int) -> str:

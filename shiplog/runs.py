@@ -106,7 +106,7 @@ class Run:
 
         arrays = _arrays(self._seed(seed) / "model.safetensors")
         ship, _, _ = mmg.geometry_of(self.profile, self.config.physics.without)
-        physics = mmg.MMG(ship)
+        physics = mmg.MMG(ship, self.config.physics.substeps)
         if self.config.model == "mmg":
             return Simulator(physics, arrays["theta"], arrays["covariance"])
         fixed = {

@@ -36,6 +36,11 @@ class Physical(Protocol):
     @property
     def names(self) -> tuple[str, ...]: ...
 
+    @property
+    def substeps(self) -> int:
+        """Euler steps within each measured one."""
+        ...
+
     def acceleration(
         self, theta: Array, state: Array, actuator: Array, true_wind: Array
     ) -> Array: ...
@@ -118,33 +123,37 @@ def rate(model: Physical, theta: Array, state: Array, actuator: Array, wind: Arr
     )
 
 
-@partial(jax.jit, static_argnames=("substeps",))
-def _rollout(model, theta, start, actuator, wind, dt, substeps=1):
+@jax.jit
+def _rollout(model, theta, start, actuator, wind, dt):
+    """[N, I, 6] of inputs [N, I - 1, ...], a step each."""
+
     def step(state, driven):
         at, blowing, length = driven
-        h = length[:, None] / substeps
-
-        def within(_, state):
-            return state + h * rate(model, theta, state, at, blowing)
-
-        state = jax.lax.fori_loop(0, substeps, within, state)
+        state = state + length[:, None] * rate(model, theta, state, at, blowing)
         return state, state
 
-    driven = (jnp.moveaxis(actuator[:, :-1], 1, 0), jnp.moveaxis(wind[:, :-1], 1, 0), dt.T)
+    driven = (jnp.moveaxis(actuator, 1, 0), jnp.moveaxis(wind, 1, 0), dt.T)
     _, states = jax.lax.scan(step, start, driven)
     return jnp.concatenate((start[:, None], jnp.moveaxis(states, 0, 1)), axis=1)
 
 
-def rollout(model: Physical, theta: np.ndarray, data: Series, substeps: int = 1) -> np.ndarray:
+def _fine(actuator, wind, dt, substeps: int):
+    """Inputs held over each step, the step cut into `substeps`."""
+    held = (actuator[:, :-1], wind[:, :-1], dt / substeps)
+    if substeps == 1:
+        return held
+    return tuple(jnp.repeat(values, substeps, axis=1) for values in held)
+
+
+def rollout(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
     """Explicit Euler (Eq. 9) from the first measured state: states [N, I, 6].
 
-    substeps   Euler steps within each measured one, inputs held; the paper's is 1
+    The paper's step is the sampling interval; a model with `substeps` cuts it, inputs held.
     """
     whole = padded(data)
-    states = _rollout(
-        model, theta, whole.measured[:, 0], whole.actuator, whole.wind, whole.dt, substeps
-    )
-    return np.asarray(states)[: len(data.measured)]
+    driven = _fine(whole.actuator, whole.wind, whole.dt, model.substeps)
+    states = _rollout(model, theta, whole.measured[:, 0], *driven)
+    return np.asarray(states)[: len(data.measured), :: model.substeps]
 
 
 def padded(data: Series) -> Series:
@@ -166,6 +175,7 @@ def padded(data: Series) -> Series:
 @partial(jax.jit, static_argnames=("free",))
 def _linearised(model, theta, start, actuator, wind, dt, free=None):
     """`free`: indices of the parameters to differentiate by; all of them if None."""
+    actuator, wind, dt = _fine(actuator, wind, dt, model.substeps)
     states = _rollout(model, theta, start, actuator, wind, dt)
     moving = tuple(range(len(theta))) if free is None else free
     parts = jax.lax.split(theta, [1] * len(theta))
@@ -180,7 +190,7 @@ def _linearised(model, theta, start, actuator, wind, dt, free=None):
         values = jnp.concatenate([parts[i] for i in moving])
         return jax.jacrev(acceleration, argnums=(0, 1))(state, values)
 
-    by_state, by_theta = jax.vmap(jax.vmap(slopes))(states[:, :-1], actuator[:, :-1], wind[:, :-1])
+    by_state, by_theta = jax.vmap(jax.vmap(slopes))(states[:, :-1], actuator, wind)
 
     def step(sensitivity, along):
         state, a, b, length = along
@@ -210,7 +220,8 @@ def _linearised(model, theta, start, actuator, wind, dt, free=None):
         dt.T,
     )
     _, path = jax.lax.scan(step, first, along)
-    return states, jnp.concatenate((first[:, None], jnp.moveaxis(path, 0, 1)), axis=1)
+    path = jnp.concatenate((first[:, None], jnp.moveaxis(path, 0, 1)), axis=1)
+    return states[:, :: model.substeps], path[:, :: model.substeps]
 
 
 def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.ndarray, np.ndarray]:

@@ -68,6 +68,10 @@ class Hybrid:
     residual: Residual
 
     @property
+    def substeps(self) -> int:
+        return self.physics.substeps
+
+    @property
     def names(self) -> tuple[str, ...]:
         weights = [
             f"network.{name}_{i}"

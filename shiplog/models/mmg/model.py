@@ -23,6 +23,7 @@ class MMG:
     """
 
     geometry: Geometry
+    substeps: int = 1  # Euler steps within each measured second; small craft are stiff
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -103,8 +103,8 @@ TABLE: dict[str, dict[str, Entry]] = {
         "f_t": _E("f_T", "jet turned along the rudder", 0.0, 0.3, -1.0, 6.0, neutral=0.0),
     },
     "thruster": {
-        "ahead": _E("T₊", "thrust ahead", 0.5, 0.0, 0.0, 1e7, unit="N"),
-        "astern": _E("T₋", "thrust astern", 0.5, 0.0, 0.0, 1e7, unit="N"),
+        "ahead": _E("T₊", "thrust ahead", 1.0, 0.0, 0.0, 1e7, unit="N"),
+        "astern": _E("T₋", "thrust astern", 1.0, 0.0, 0.0, 1e7, unit="N"),
         "loss": _E("ℓ_T", "thrust fall with speed", 0.0, 0.5, -1.0, 5.0, neutral=0.0, unit="s/m"),
     },
     "wind": {
@@ -196,10 +196,8 @@ def estimated(geometry: Geometry, main: Particulars) -> Parameters:
         if blade.wide:  # a blade made for such angles turns the jet along itself
             guess["rudder"]["f_t"] = guess["rudder"]["f_alpha"]
     if geometry.thrusters:
-        # Bollard pull that holds the ship at 0.15 √(gL) against her resistance, shared out.
-        speed2 = 0.15**2 * 9.81 * main.length
-        resistance = -0.5 * main.density * main.length * main.draught * guess["hull"]["x_0f"]
-        share = max(resistance * speed2, 1e-3 * main.mass) / len(geometry.thrusters)
+        # A twentieth of the ship's weight, shared out: between a ferry's bollard pull and a tug's.
+        share = 0.05 * 9.81 * main.mass / len(geometry.thrusters)
         guess["thruster"] = {
             f"{t.name}_{k}": share for t in geometry.thrusters for k in ("ahead", "astern")
         }
