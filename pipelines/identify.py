@@ -62,6 +62,11 @@ def identify_run(
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     planned = plan(learnt, config.data, config.window)
     ready = prepare(config, profile, learnt, planned, parameters)
+    if config.model == "hybrid" and len(set(ready.voyages)) < 2 and not held.height:
+        raise RunError(
+            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
+            hint="name a second voyage with --voyages, or one with --validation.",
+        )
     config = config.model_copy(
         update={
             "physics": config.physics.model_copy(
@@ -90,14 +95,14 @@ def identify_run(
         ready.data, ready.voyages, config.physics.folds,
     )  # fmt: skip
     by_day = None
-    if len(set(ready.days)) > 1 and ready.days != ready.voyages:
+    if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
         by_day = cross_validate(
             lambda part: _simulator(ready.model, refit(part)),
             ready.data, ready.days, config.physics.folds,
         )  # fmt: skip
     said = [_sentence("training windows", before, losses(ready.model, found.values, ready.data))]
     said += [
-        _sentence(f"held-out {name}", before, one.loss)
+        _sentence(f"windows of held-out {name}", before, one.loss)
         for name, one in (("voyages", by_voyage), ("days", by_day))
         if one is not None
     ]
@@ -201,6 +206,11 @@ def save(
     run.save_simulator(seed, simulator, fixed or {}, toml, identified)
 
 
+def _apart(days: list[str], voyages: list[str]) -> bool:
+    """Whether days are other groups than voyages: some day holds several."""
+    return len(set(zip(days, voyages, strict=True))) > len(set(days))
+
+
 def _keep(run: Run, ready: Prepared) -> list[str]:
     """A run of the starting values as they are; their errors here no fit has seen."""
     nothing = np.zeros((len(ready.start.values),) * 2)
@@ -244,11 +254,6 @@ def _hybrid(
         )  # fmt: skip
         return Simulator(model, done.values, done.covariance), done
 
-    if by_voyage is None and not held.height:
-        raise RunError(
-            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
-            hint="name a second voyage with --voyages, or one with --validation.",
-        )
     judged: dict[float, list[np.ndarray]] = {s: [] for s in (0.0, *settings.strengths)}
     validated: dict[float, CrossValidated | None] = {0.0: by_voyage}
     if by_voyage is not None:

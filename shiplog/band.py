@@ -43,7 +43,9 @@ def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float =
 
     Rollouts that diverged count as outside of any band and widen it no further.
     """
-    good = np.isfinite(error).all((1, 2))
+    good = (np.abs(error) < 1e6).all((1, 2))
+    if not good.any():
+        return Band(np.full(error.shape[1:], np.inf), np.ones(error.shape[-1]))
     error, spread = error[good], spread[good]
     square = error**2
     excess = np.maximum((square - spread**2).mean(0), 0.05 * square.mean(0))

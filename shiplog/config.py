@@ -106,7 +106,7 @@ class Config(Section):
         """What a legend says of the model in a word: the recipe, or the physics."""
         if not self.physical:
             return self.recipe
-        return "identified" if self.physics.fit else "as published"
+        return "identified" if self.physics.fit else "as given"
 
     def to_toml(self) -> str:
         """As it is saved; the sections of the other kind of model left out."""

@@ -72,7 +72,8 @@ def cross_validate(
         states[held], own[held] = simulated[held], unsure[held]
     rows = list(VELOCITY_IN_STATE)
     error = (states[..., rows] - data.measured[..., rows]) * np.array(VELOCITY_WEIGHTS)
-    loss = (data.steps[..., None] * error**2).sum((1, 2))
+    with np.errstate(over="ignore", invalid="ignore"):
+        loss = (data.steps[..., None] * error**2).sum((1, 2))
     return CrossValidated(
         np.array(list(groups)), states, own, np.where(np.isfinite(loss), loss, np.inf)
     )

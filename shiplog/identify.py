@@ -18,6 +18,7 @@ from shiplog.exceptions import ModelError, listed
 from shiplog.sensitivity import Physical, Series, losses, normal
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
+TINY = 1e-12  # noise of data that a model fits exactly
 ROUNDS = 3  # of weighing the ridge by the noise that the fit before it left
 TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit rests
 MOST_EVALUATIONS = 60
@@ -72,7 +73,7 @@ def identify(
 
     Raises ModelError where the windows run away from the start, and from what shorter ones give.
     """
-    free = np.ones(len(start), dtype=bool) if free is None else free
+    free = (np.ones(len(start), dtype=bool) if free is None else free) & (spread > 0.0)
     values = np.array(start if begin is None else begin, dtype=float)
     endless = np.full(len(start), np.inf)
     low, high = bounds if bounds is not None else (-endless, endless)
@@ -81,7 +82,8 @@ def identify(
     if not np.isfinite(_used(losses(model, values, data), weight)).all():
         values = _from_short_windows(model, start, spread, data, (low, high), free, values)
     samples = 3.0 * float((weight * data.dt.sum(1)).sum())
-    noise = CORRELATION * float(weight @ _used(losses(model, values, data), weight)) / samples
+    loss = float(weight @ _used(losses(model, values, data), weight))
+    noise = max(CORRELATION * loss / samples, TINY)
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
         problem = _Problem(model, start, spread, data, free, noise)
@@ -104,7 +106,7 @@ def identify(
         converged = done.status > 0
         message = "converged" if converged else _unsettled(done, model.names, free, most)
         after = _used(losses(model, values, data), weight)
-        now = CORRELATION * float(weight @ after) / samples
+        now = max(CORRELATION * float(weight @ after) / samples, TINY)
         settled = abs(now / noise - 1.0) < 0.05
         noise = now
         if settled:
@@ -245,7 +247,10 @@ def covariance(
     information = found.gram * np.outer(scale, scale) / noise + np.eye(len(scale))
     pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
-    meat = pulls.T @ pulls + np.eye(len(scale))
+    # Fitted errors are too small by the parameters that the data determine (MacKinnon & White 1985).
+    determined = float(np.trace(found.gram * np.outer(scale, scale) / noise @ inverse))
+    count = float((data.weight > 0).sum())
+    meat = count / max(count - determined, 1.0) * pulls.T @ pulls + np.eye(len(scale))
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))
     whole[np.ix_(free, free)] = sandwich * np.outer(scale, scale)

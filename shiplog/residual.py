@@ -84,13 +84,18 @@ def fit(
 def choose(judged: dict[float, np.ndarray]) -> float:
     """The least strength that is not worse than the best by more than chance.
 
-    judged   strength → L of each held-out window [N]; strength 0 is the physics alone
+    judged   strength → L of each held-out window [N]; strength 0 is the physics alone, and the
+             answer where fewer than two windows can be judged
 
     The one-standard-error rule (Breiman et al. 1984) on paired windows.
     """
-    best = judged[min(judged, key=lambda s: float(judged[s].mean()))]
-    for strength in sorted(judged):
-        worse = judged[strength] - best
+    kept = np.isfinite(np.stack(list(judged.values()))).all(0)
+    if kept.sum() < 2:
+        return 0.0  # nothing to judge by
+    losses = {strength: loss[kept] for strength, loss in judged.items()}
+    winner = min(losses, key=lambda s: float(losses[s].mean()))
+    for strength in sorted(losses):
+        worse = losses[strength] - losses[winner]
         if worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)):
             return strength
-    raise AssertionError("the best is not worse than itself")
+    return winner

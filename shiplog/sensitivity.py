@@ -304,8 +304,10 @@ def spread(model: Physical, theta: np.ndarray, covariance: np.ndarray, data: Ser
     for at in range(0, len(data.measured), CHUNK):
         part = pick(data, slice(at, at + CHUNK))
         slopes = linearised(model, theta, part)[1]
-        variance = np.einsum("nkip,pq,nkiq->nki", slopes, covariance, slopes, optimize=True)
-        parts.append(np.sqrt(np.maximum(variance, 0.0)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            variance = np.einsum("nkip,pq,nkiq->nki", slopes, covariance, slopes, optimize=True)
+        known = np.isfinite(variance)
+        parts.append(np.sqrt(np.where(known, np.maximum(variance, 0.0), np.inf)))
     return np.concatenate(parts)
 
 

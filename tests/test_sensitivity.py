@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +27,8 @@ from shiplog.windows import Windows
 class Damped:
     """ν̇ = -θ ν + input, each velocity by itself."""
 
-    names = ("surge", "sway", "yaw")
+    substeps: int = 1
+    names: ClassVar = ("surge", "sway", "yaw")
 
     def acceleration(self, theta, state, actuator, true_wind):
         return -theta * state[..., jnp.array([1, 3, 5])] + actuator
@@ -37,7 +39,8 @@ class Damped:
 class Coupled:
     """A ship in four numbers, everything acting on everything: drag, turn, push and wind."""
 
-    names = ("drag", "turn", "push", "wind")
+    substeps: int = 1
+    names: ClassVar = ("drag", "turn", "push", "wind")
 
     def acceleration(self, theta, state, actuator, true_wind):
         drag, turn, push, wind = theta
@@ -185,7 +188,7 @@ def test_a_rollout_is_euler_in_closed_form_over_uneven_steps(substeps):
     data = sailed(3, 12, 2, (0.02, 0.01, 0.001))
     driven = np.repeat(data.actuator[:, :1], 12, axis=1)
     theta = np.array([0.1, 0.3, 0.2])
-    found = sensitivity.rollout(Damped(), theta, data._replace(actuator=driven), substeps)
+    found = sensitivity.rollout(Damped(substeps), theta, data._replace(actuator=driven))
     assert found.shape == data.measured.shape
     assert (found[:, 0] == data.measured[:, 0]).all()
     shrink = (1.0 - theta * data.dt[..., None] / substeps) ** substeps
@@ -215,7 +218,7 @@ def test_halving_the_step_halves_eulers_error():
     exact = rest + (data.measured[:, 0, [1, 3, 5]] - rest) * np.exp(-theta * elapsed)
     held = data._replace(actuator=driven)
     error = [
-        sensitivity.rollout(Damped(), theta, held, k)[:, -1, [1, 3, 5]] - exact for k in (2, 4, 8)
+        sensitivity.rollout(Damped(k), theta, held)[:, -1, [1, 3, 5]] - exact for k in (2, 4, 8)
     ]
     for coarse, fine in itertools.pairwise(error):
         assert coarse / fine == pytest.approx(np.full_like(fine, 2.0), abs=0.2)
@@ -225,7 +228,7 @@ def test_halving_the_step_halves_eulers_error():
 def test_a_turning_ships_path_converges_at_the_first_order_too(coupled):
     """Each halving changes the end half as much as the one before."""
     model, theta, data = coupled
-    end = [sensitivity.rollout(model, theta, data, k)[:, -1] for k in (2, 4, 8)]
+    end = [sensitivity.rollout(replace(model, substeps=k), theta, data)[:, -1] for k in (2, 4, 8)]
     change = [np.linalg.norm(a - b) for a, b in itertools.pairwise(end)]
     assert change[0] / change[1] == pytest.approx(2.0, abs=0.1)
 
@@ -404,3 +407,16 @@ def test_chunks_change_nothing(coupled, monkeypatch):
     assert parts.loss == pytest.approx(whole.loss, rel=1e-12)
     assert parts.pull == pytest.approx(whole.pull, rel=1e-10)
     assert parts.gram == pytest.approx(whole.gram, rel=1e-10)
+
+
+def test_derivatives_hold_for_a_model_that_cuts_its_step(coupled):
+    """Slopes of three Euler steps a second against central differences of the same rollout."""
+    model, theta, data = coupled
+    finer = replace(model, substeps=3)
+    states, slopes = sensitivity.linearised(finer, theta, data)
+    assert states == pytest.approx(sensitivity.rollout(finer, theta, data), abs=1e-12)
+    for i in range(len(theta)):
+        step = np.zeros(len(theta))
+        step[i] = SHIFT
+        up, down = (sensitivity.rollout(finer, theta + s * step, data) for s in (1.0, -1.0))
+        assert slopes[..., i] == pytest.approx((up - down) / (2.0 * SHIFT), rel=1e-3, abs=1e-7)

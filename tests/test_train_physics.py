@@ -1,0 +1,386 @@
+"""`shiplog train --model mmg` and `hybrid` as a user types them, on short voyages."""
+
+import json
+import math
+import shutil
+import tomllib
+from datetime import UTC, datetime
+from importlib import resources
+
+import numpy as np
+import polars as pl
+import pytest
+import sailing
+from test_cli import call
+
+from pipelines import known_ship
+from pipelines.identify import identify_run
+from pipelines.split import choose_physical_split
+from shiplog import runs
+from shiplog.config import Config, Split
+from shiplog.exceptions import RunError
+from shiplog.ingest import ingest
+from shiplog.store import Store
+
+HULL = ("--without", "propeller", "--without", "rudder")  # a hull in the wind compiles quickly
+WINDOW = ("--window", 25)
+BOTH = ("--voyages", "trip_1", "--voyages", "trip_2")
+STATES = ["x0", "surge", "y0", "sway", "heading", "yaw_rate"]
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Three short voyages of the simulated ship, all on one day."""
+    folder = tmp_path_factory.mktemp("logs")
+    for number in range(1, 4):
+        voyage = known_ship.sail(80.0, seed=number, wind=known_ship.Wind(3.0, number))
+        start = datetime(2026, 5, 1, 10 + number, 0, tzinfo=UTC)
+        known_ship.write_voyage(folder / f"trip_{number}.mcap", voyage, seed=number, start=start)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def store(logs, tmp_path_factory):
+    path = tmp_path_factory.mktemp("work") / "store"
+    assert call("ingest", logs, "--store", path)[0] == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def calm(logs, tmp_path_factory):
+    """The same voyages of a ship without wind sensor."""
+    folder = tmp_path_factory.mktemp("calm")
+    text = (resources.files("shiplog") / "profiles" / "esso-vectwin.toml").read_text("utf-8")
+    begin = text.index("[sensors.wind]")
+    profile = folder / "calm.toml"
+    profile.write_text(text[:begin] + text[text.index("[[actuators]]") :], encoding="utf-8")
+    assert call("ingest", logs, "--store", folder / "store", "--profile", profile)[0] == 0
+    return folder / "store"
+
+
+def train(store, out, *arguments):
+    return call("train", "--store", store, "--out", out, *WINDOW, *arguments)
+
+
+def answer(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def scored(run, store, to) -> dict:
+    assert call("evaluate", run, "--store", store, "--voyages", "trip_3", "--json", to)[0] == 0
+    return answer(to)
+
+
+@pytest.fixture(scope="module")
+def published(store):
+    """Nothing fitted: run folder and what was said of it."""
+    out = store.parent / "published"
+    code, said, _ = train(store, out, "--model", "mmg", "--no-fit", *BOTH, *HULL)
+    assert code == 0
+    return out, said
+
+
+@pytest.fixture(scope="module")
+def fitted(store):
+    """All of hull and wind identified, three seeds asked for: run folder, text and JSON."""
+    out, to = store.parent / "fitted", store.parent / "fitted.json"
+    code, said, _ = train(store, out, "--model", "mmg", *BOTH, *HULL, "--seeds", 3, "--json", to)
+    assert code == 0
+    return out, said, answer(to)
+
+
+# ---------------------------------------------------------------- as published
+
+
+def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_path):
+    run, said = published
+    assert "mmg as published, without propeller, rudder" in said
+    assert "over the 6 windows named, with nothing fitted" in said
+    content = scored(run, store, tmp_path / "e.json")
+    assert math.isfinite(content["loss"]) and content["loss"] > 0.0
+    assert len(content["seeds"]) == 1 and content["windows"] == 3
+    assert sorted(content["band_90"]) == sorted(STATES)
+    assert all(0.0 <= share <= 1.0 for share in content["band_90"].values())
+
+
+def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
+    run = runs.load(published[0])
+    identified = run.identified()
+    assert (identified["value"] == identified["start"]).all()
+    assert not identified["free"].any() and (identified["standard_error"] == 0.0).all()
+    assert not (run.path / "cross_validation.parquet").exists()
+    assert not run.simulator(0).covariance.any()
+    assert run.config.physics.parameters == "empirical formulas from the particulars"
+
+
+def test_a_force_left_out_is_said_and_gone(store, tmp_path):
+    code, said, _ = train(
+        store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
+    )
+    assert code == 0 and "mmg as published, without propeller, rudder, wind in" in said
+    names = runs.load(tmp_path / "r").identified()["name"]
+    assert {name.split(".")[0] for name in names} == {"body", "hull"}
+
+
+# ---------------------------------------------------------------- identified
+
+
+def test_the_answer_says_what_was_found(fitted):
+    run, said, content = fitted
+    assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split"}
+    assert content["contract"] == 1 and content["windows"] == 6
+    assert content["label"] == "mmg identified on ref, without propeller, rudder"
+    assert len(content["parameters"]) == 3 + 10 + 10
+    first = content["parameters"][0]
+    assert set(first) == {"name", "symbol", "meaning", "unit", "start", "spread", "value",
+                          "standard_error", "free"}  # fmt: skip
+    assert first["name"] == "body.m_x" and first["symbol"] == "m'_x"
+    assert content["split"]["training"] == ["trip_1", "trip_2"]
+    assert any("held-out voyages" in s for s in content["notes"])
+    assert f"Next: shiplog evaluate {run}" in said and "| hull.y_v" in said
+
+
+def test_the_training_windows_fit_better_than_at_the_start(fitted):
+    run = runs.load(fitted[0])
+    identified = run.identified()
+    assert (identified["standard_error"] > 0.0).all() and identified["free"].all()
+    assert (identified["standard_error"] <= 1.05 * identified["spread"]).all()
+    assert (identified["value"] != identified["start"]).any()
+    (sentence,) = [s for s in fitted[2]["notes"] if "training windows" in s]
+    assert float(sentence.split("(")[1].split(")")[0]) < 0.9
+
+
+def test_one_identification_stands_for_all_seeds(fitted):
+    run = runs.load(fitted[0])
+    assert run.config.seeds == (0,)
+    assert sorted(p.name for p in run.path.glob("seed*")) == ["seed0"]
+
+
+def test_the_run_folder_holds_what_it_says(fitted):
+    run = runs.load(fitted[0])
+    settings = tomllib.loads((run.path / "config.toml").read_text(encoding="utf-8"))
+    assert not {"network", "paper", "fast"} & settings.keys()
+    assert settings["physics"]["without"] == ["propeller", "rudder"]
+    assert settings["model"] == "mmg"
+    losses = pl.read_parquet(run.path / "cross_validation.parquet")
+    assert losses.columns == ["held_out", "group", "window", "start", "loss"]
+    assert losses["held_out"].unique().to_list() == ["voyages"]  # one day: no days to hold out
+    assert losses["group"].to_list() == ["trip_1"] * 3 + ["trip_2"] * 3
+    assert np.isfinite(losses["loss"].to_numpy()).all()
+    band = run.band()
+    assert band.growth.shape == (25, 6) and band.factor.shape == (6,)
+    assert not band.growth[0].any() and (band.growth[1:] > 0).all() and (band.factor > 0).all()
+    assert {p.name for p in (run.path / "seed0").iterdir()} == {
+        "model.safetensors", "parameters.toml", "identified.parquet"}  # fmt: skip
+    simulator = run.simulator(0)
+    assert simulator.theta == pytest.approx(run.identified()["value"].to_numpy(), abs=0)
+    error = np.sqrt(np.diag(simulator.covariance))
+    assert error == pytest.approx(run.identified()["standard_error"].to_numpy())
+
+
+def test_identified_parameters_can_be_given_again(fitted, published, store, tmp_path):
+    run, _, _ = fitted
+    toml = run / "seed0" / "parameters.toml"
+    assert tomllib.loads(toml.read_text("utf-8"))["source"] == "identified by shiplog in fitted"
+    code, _, _ = train(
+        store, tmp_path / "again", "--model", "mmg", "--no-fit", "--parameters", toml, *BOTH, *HULL
+    )
+    assert code == 0
+    one, other, before = (
+        scored(path, store, tmp_path / "e.json")["loss"]
+        for path in (run, tmp_path / "again", published[0])
+    )
+    assert other == pytest.approx(one, rel=1e-9)
+    assert before != pytest.approx(one, rel=1e-3)
+    again = runs.load(tmp_path / "again")
+    assert again.config.physics.parameters == "identified by shiplog in fitted"
+
+
+def test_only_the_free_parameters_move(store, tmp_path):
+    code, _, _ = train(store, tmp_path / "r", "--model", "mmg", "--free", "wind.*", *BOTH, *HULL)
+    assert code == 0
+    found = runs.load(tmp_path / "r").identified()
+    wind = pl.col("name").str.starts_with("wind.")
+    moved, held = found.filter(wind), found.filter(~wind)
+    assert moved.height == 10 and moved["free"].all()
+    assert (moved["value"] != moved["start"]).any() and (moved["standard_error"] > 0).all()
+    assert not held["free"].any() and (held["value"] == held["start"]).all()
+    assert (held["standard_error"] == 0.0).all()
+
+
+def test_one_voyage_leaves_the_gain_untested(store, tmp_path):
+    run = tmp_path / "one"
+    code, said, _ = train(
+        store, run, "--model", "mmg", "--voyages", "trip_1", "--free", "wind.*", *HULL
+    )
+    assert code == 0 and "One voyage only: nothing could be held out" in said
+    assert "held-out" not in said
+    assert not (run / "cross_validation.parquet").exists()
+    assert runs.load(run).band() is None
+    content = scored(run, store, tmp_path / "e.json")
+    assert math.isfinite(content["loss"]) and content["band_90"] == {}
+
+
+def test_a_validation_voyage_is_where_the_band_comes_from(store, tmp_path):
+    run = tmp_path / "r"
+    code, _, _ = train(store, run, "--model", "mmg", "--voyages", "trip_1", "--validation",
+                       "trip_2", "--free", "wind.*", *HULL)  # fmt: skip
+    assert code == 0
+    loaded = runs.load(run)
+    assert loaded.config.split.validation == ("trip_2",)
+    assert loaded.training()["voyage"].unique().to_list() == ["trip_1"]
+    assert loaded.band() is not None
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--free", "wind.y_1"), ["No parameter is called 'wind.y_1'", "did you mean 'wind.y1'"]),
+        (("--free", "nonsense"), ["No parameter is called 'nonsense'", "hull.y_v", "'wind.*'"]),
+        (("--free", "rudder.*"), ["No parameter is called 'rudder.*'"]),  # it was left out
+        (("--without", "wing"), ["no force 'wing'", "did you mean 'wind'"]),
+        (("--without", "hull"), ["no force 'hull'"]),
+        (("--parameters", "nowhere.toml"), ["nowhere.toml cannot be read"]),
+    ],
+)
+def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, words):
+    code, _, said = train(store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, *arguments)
+    assert code == 1
+    for word in words:
+        assert word in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_window_longer_than_every_voyage_is_refused(store, tmp_path):
+    code, _, said = call("train", "--store", store, "--out", tmp_path / "r", "--model", "mmg",
+                         "--window", 400, *BOTH, *HULL)  # fmt: skip
+    assert code == 1 and "longer than every" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_hybrid_has_to_be_fitted(store, tmp_path):
+    code, _, said = train(store, tmp_path / "r", "--model", "hybrid", "--no-fit", *BOTH)
+    assert code == 1 and "has to be fitted" in said and "--model mmg" in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_hybrid_needs_a_second_voyage(store, tmp_path):
+    code, _, said = train(store, tmp_path / "r", "--model", "hybrid", "--voyages", "trip_1",
+                          "--free", "wind.*", *HULL)  # fmt: skip
+    assert code == 1 and "needs a voyage to hold out" in said and "--validation" in said
+    assert not (tmp_path / "r").exists()
+
+
+def test_wind_coefficients_need_a_wind_sensor(fitted, calm, tmp_path):
+    toml = fitted[0] / "seed0" / "parameters.toml"
+    given = ("--model", "mmg", "--no-fit", "--parameters", toml, *BOTH, *HULL)
+    code, _, said = train(calm, tmp_path / "r", *given)
+    assert code == 1 and "has a wind force" in said and "--without wind" in said
+    assert not list(tmp_path.iterdir())
+    code, said, _ = train(calm, tmp_path / "r", *given, "--without", "wind")
+    assert code == 0 and "without propeller, rudder, wind" in said
+
+
+# ---------------------------------------------------------------- the hybrid
+
+
+@pytest.fixture(scope="module")
+def hybrid(store):
+    """A network of two units, one strength to choose; only one parameter of the physics free."""
+    physics = {"without": ("propeller", "rudder", "wind"), "free": ("hull.x_0f",),
+               "width": 2, "strengths": (1.0,)}  # fmt: skip
+    config = Config.model_validate(
+        {
+            "model": "hybrid", "window": 25, "physics": physics,
+            "split": Split(training=("trip_1", "trip_2"), validation=()),
+        }
+    )  # fmt: skip
+    return identify_run(config, Store(store), store.parent / "hybrid")
+
+
+def test_a_hybrid_is_judged_on_held_out_voyages_and_says_so(hybrid):
+    run, said = hybrid
+    assert run.label == "hybrid identified on ref, without propeller, rudder, wind"
+    (sentence,) = [s for s in said if s.startswith("Seed 0")]
+    assert "adds nothing that survives" in sentence or "on 6 held-out windows" in sentence
+    assert run.band() is not None
+
+
+def test_a_hybrid_is_opened_as_it_was_fitted(hybrid, store, tmp_path):
+    run, _ = hybrid
+    model = run.simulator(0).model
+    assert model.residual.width == 2
+    assert len(model.names) == 3 + 10 + model.residual.count == len(run.simulator(0).theta)
+    assert model.residual.anchors.shape == (150, 6)  # two voyages of three windows of 25 s
+    found = run.identified()
+    assert found.height == 13 and not any("network" in name for name in found["name"])
+    assert found.filter(pl.col("free"))["name"].to_list() == ["hull.x_0f"]
+    held = found.filter(~pl.col("free"))
+    assert (held["value"] == held["start"]).all()
+    toml = tomllib.loads((run.path / "seed0" / "parameters.toml").read_text(encoding="utf-8"))
+    assert set(toml) == {"source", "body", "hull"}
+    content = scored(run.path, store, tmp_path / "e.json")
+    assert math.isfinite(content["loss"]) and sorted(content["band_90"]) == sorted(STATES)
+
+
+def test_a_damaged_model_is_named(hybrid, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(hybrid[0].path, copy)
+    path = copy / "seed0" / "model.safetensors"
+    path.write_bytes(path.read_bytes()[:50])
+    with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
+        runs.load(copy).simulator(0)
+
+
+# ---------------------------------------------------------------- the split
+
+
+@pytest.fixture(scope="module")
+def seven(tmp_path_factory):
+    """The names of the sample logs, and one voyage more."""
+    folder = tmp_path_factory.mktemp("seven")
+    whole = Store(folder / "store")
+    for number in range(1, 8):
+        rng = np.random.default_rng(number)
+        parts = sailing.series(30.0)
+        for one in parts.values():
+            for column, values in one.columns.items():
+                one.columns[column] = values + rng.normal(0, 1e-3, len(values))
+        path = sailing.write(folder / f"voyage_{number}.mcap", parts)
+        whole.add(ingest(path, sailing.profile()))
+    return whole
+
+
+SIX = [f"voyage_{i}" for i in range(1, 7)]
+
+
+def test_named_voyages_are_all_trained_on(seven):
+    for named in (SIX, ["voyage_7", "voyage_2"], ["voyage_[1-6]"]):
+        split = choose_physical_split(seven, named, (), "ref", 20)
+        assert set(split.training) == set(seven.select(named))
+        assert (split.validation, split.test) == ((), ())
+        assert "held out in turn" in split.chosen_by
+
+
+@pytest.mark.parametrize(("data", "count"), [("ref", 2), ("d-ref", 4)])
+def test_the_sample_logs_keep_the_papers_split(seven, data, count):
+    split = choose_physical_split(seven, (), (), data, 20)
+    assert split.training == tuple(SIX[:count])
+    assert (split.validation, split.test) == (("voyage_5",), ("voyage_6",))
+
+
+def test_the_users_validation_is_kept_apart(seven):
+    split = choose_physical_split(seven, ("voyage_[1-3]",), ("voyage_3", "voyage_7"), "ref", 20)
+    assert split.training == ("voyage_1", "voyage_2")
+    assert split.validation == ("voyage_3", "voyage_7") and split.test == ()
+    rest = choose_physical_split(seven, (), ("voyage_7",), "ref", 20)
+    assert rest.training == tuple(SIX) and rest.validation == ("voyage_7",)
+
+
+def test_with_nothing_named_a_share_is_left_for_testing(store):
+    split = choose_physical_split(Store(store), (), (), "ref", 25)
+    assert split.validation == () and len(split.test) == 1
+    assert sorted((*split.training, *split.test)) == ["trip_1", "trip_2", "trip_3"]
