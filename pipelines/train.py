@@ -28,6 +28,7 @@ from shiplog.models.feedforward import scaling
 from shiplog.runs import Run
 from shiplog.simulate import simulate
 from shiplog.store import Store
+from shiplog.train import Progress
 from shiplog.windows import AUGMENTATIONS, Windows
 
 log = logging.getLogger(__name__)
@@ -120,6 +121,13 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
     training, validation = (engine.batch(w, scale, shape, torch.float32) for w in (learnt, held))
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
+    parent = os.getppid()
+
+    def keep(progress: Progress) -> None:
+        run.save_checkpoint(seed, progress)
+        if os.getppid() != parent:  # the command was killed: hours of orphaned work help nobody
+            raise SystemExit(1)
+
     if config.recipe == "paper":
         progress = train.paper(
             model,
@@ -128,7 +136,7 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
             config.paper,
             seed,
             resume=run.load_checkpoint(seed),
-            checkpoint=lambda p: run.save_checkpoint(seed, p),
+            checkpoint=keep,
         )
     else:
         progress = train.fast(model, training, validation, config.fast, seed)

@@ -249,7 +249,7 @@ def covariance(
     inverse = np.linalg.inv(information)
     # Fitted errors are too small by the parameters that the data determine (MacKinnon & White 1985).
     determined = float(np.trace(found.gram * np.outer(scale, scale) / noise @ inverse))
-    count = float((data.weight > 0).sum())
+    count = float(data.weight.sum())
     meat = count / max(count - determined, 1.0) * pulls.T @ pulls + np.eye(len(scale))
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))

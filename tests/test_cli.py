@@ -245,8 +245,9 @@ def test_servo_pulses_become_commands_about_their_neutral(tmp_path):
     assert call("ingest", tmp_path / "7.mcap", "--store", tmp_path / "store")[0] == 0
     (path,) = (tmp_path / "store").rglob("table.parquet")
     back = pl.read_parquet(path)
-    assert back["thruster_port"].to_numpy() == pytest.approx(0.5)
+    # Half astern on both: the column "left" is the starboard unit, whose pulses run the other way.
     assert back["thruster_starboard"].to_numpy() == pytest.approx(-0.5)
+    assert back["thruster_port"].to_numpy() == pytest.approx(-0.5)
     assert (back["quality"] == 0).all()
 
 

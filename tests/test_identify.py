@@ -353,16 +353,19 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight):
 def test_each_window_is_one_observation_of_its_own_gradient():
     """Twice the windows, the same again: the data's part of the sandwich halves (Huber, White).
 
-    push alone: Σg² / (Σ JᵀJ)², the ridge far too weak to be seen."""
+    Σ g gᵀ between the inverses of Σ JᵀJ, times n/(n - 3) for the three numbers fitted to n
+    windows; the ridge is far too weak to be seen."""
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=5)
     start, spread = np.array([0.03, 0.0, 0.0]), np.full(3, 100.0)
     one = identify(Straight(), start, spread, data)
     at = sensitivity.normal(Straight(), one.values, data)
     wanted = np.linalg.inv(at.gram) @ (at.pull.T @ at.pull) @ np.linalg.inv(at.gram)
+    wanted *= COUNT / (COUNT - 3)
     assert one.covariance == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).min())
     twice = identify(Straight(), start, spread, sensitivity.pick(data, [*range(COUNT)] * 2))
     assert twice.values == pytest.approx(one.values, rel=1e-6)
-    assert np.diag(twice.covariance) == pytest.approx(np.diag(one.covariance) / 2, rel=1e-3)
+    shrinks = 0.5 * (2 * COUNT / (2 * COUNT - 3)) / (COUNT / (COUNT - 3))
+    assert np.diag(twice.covariance) == pytest.approx(np.diag(one.covariance) * shrinks, rel=1e-3)
     weighed = identify(Straight(), start, spread, data._replace(weight=np.full(COUNT, 2.0)))
     assert weighed.covariance == pytest.approx(twice.covariance, rel=1e-6)
 

@@ -94,7 +94,7 @@ def fitted(store):
 
 def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_path):
     run, said = published
-    assert "mmg as published, without propeller, rudder" in said
+    assert "mmg as given, without propeller, rudder" in said
     assert "over the 6 windows named, with nothing fitted" in said
     content = scored(run, store, tmp_path / "e.json")
     assert math.isfinite(content["loss"]) and content["loss"] > 0.0
@@ -117,7 +117,7 @@ def test_a_force_left_out_is_said_and_gone(store, tmp_path):
     code, said, _ = train(
         store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
     )
-    assert code == 0 and "mmg as published, without propeller, rudder, wind in" in said
+    assert code == 0 and "mmg as given, without propeller, rudder, wind in" in said
     names = runs.load(tmp_path / "r").identified()["name"]
     assert {name.split(".")[0] for name in names} == {"body", "hull"}
 
