@@ -59,7 +59,7 @@ class Run:
         """How results are headed: model, data, recipe, and how the wind enters if it does."""
         if self.config.physical:
             off = f", without {listed(off)}" if (off := self.config.physics.without) else ""
-            how = f"identified on {self.config.data}" if self.config.physics.fit else "as published"
+            how = f"identified on {self.config.data}" if self.config.physics.fit else "as given"
             return f"{self.config.model} {how}{off}"
         wind = f", wind {self.config.network.wind_input}" if self.profile.has_wind else ""
         return f"{self.config.model} {self.config.data} ({self.config.recipe} recipe{wind})"

@@ -89,7 +89,9 @@ def bins(values: NDArray[np.float64]) -> NDArray[np.float64]:
     low, high = (values.min(), values.max()) if len(values) else (0.0, 0.0)
     span = max(float(high - low), 1e-6 * max(abs(high), 1.0))
     power = 10.0 ** math.floor(math.log10(span / MOST_BINS))
-    width = next(power * k for k in (1.0, 2.0, 5.0, 10.0) if span / (power * k) < MOST_BINS - 1)
+    width = next(
+        power * k for k in (1.0, 2.0, 5.0, 10.0, 20.0) if span / (power * k) < MOST_BINS - 1
+    )
     first, last = math.floor(low / width), math.floor(high / width) + 1
     return width * np.arange(first, last + 1, dtype=np.float64)
 

@@ -101,6 +101,7 @@ TABLE: dict[str, dict[str, Entry]] = {
         "f_alpha": _E("f_α", "rudder force slope", 0.15, 0.0, 0.3, 6.0),
         "f_3": _E("f₃", "rudder force at large angles", 0.0, 0.3, -0.95, 3.0, neutral=0.0),
         "f_t": _E("f_T", "jet turned along the rudder", 0.0, 0.3, -1.0, 6.0, neutral=0.0),
+        "inboard": _E("f_i", "rudder force of the inboard blade", 0.0, 0.3, 0.0, 3.0, neutral=1.0),
     },
     "thruster": {
         "ahead": _E("T₊", "thrust ahead", 1.0, 0.0, 0.0, 1e7, unit="N"),
@@ -179,6 +180,8 @@ def names(geometry: Geometry) -> tuple[str, ...]:
             found += [f"thruster.{t.name}_{k}" for t in geometry.thrusters for k in TABLE[part]]
         else:
             found += [f"{part}.{key}" for key in TABLE[part]]
+    if len(geometry.rudders) < 2:  # a single blade has no other beside it
+        found = [name for name in found if name != "rudder.inboard"]
     return tuple(found)
 
 

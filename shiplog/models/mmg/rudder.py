@@ -61,15 +61,18 @@ def rudder(
     X_R = (1 - t_R) (F_T cos δ - F_N sin δ), Y_R = -(1 + a_H) (F_N cos δ + F_T sin δ),
     N_R = (x_R + a_H x_H) Y_R / (1 + a_H)
 
-    f₃ and F_T are ours, zero in the MMG. A fish-tail blade (Schilling, VecTwin) turns the jet
+    f₃, F_T and f_i are ours, without effect in the MMG. A fish-tail blade (Schilling, VecTwin) turns the jet
     until it leaves along its chord; by the balance of momentum J (Rankine) its force is then
-    J sin α across and J (1 - cos α) along the chord.
+    J sin α across and J (1 - cos α) along the chord. Of two blades, the one turned inboard works
+    beside the other: its force is f_i times that of the one turned outboard.
     """
     gamma = jnp.where(v + blade.ahead * r >= 0.0, p["rudder.gamma_p"], p["rudder.gamma_n"])
     v_r = -gamma * (v + p["rudder.l_r"] * g.length * r)
     attack = angle - jnp.arctan2(v_r, jnp.where((u_r == 0.0) & (v_r == 0.0), 1.0, u_r))
     s, c = jnp.sin(attack), jnp.cos(attack)
     pressure = 0.5 * g.density * blade.area * (u_r**2 + v_r**2)
+    if "rudder.inboard" in p:
+        pressure = pressure * jnp.where(angle * blade.starboard < 0.0, p["rudder.inboard"], 1.0)
     normal = pressure * p["rudder.f_alpha"] * (1.0 + p["rudder.f_3"] * s * s) * s
     along = pressure * p["rudder.f_t"] * (1.0 - c)
     x = (1.0 - p["rudder.t_r"]) * (along * jnp.cos(angle) - normal * jnp.sin(angle))
