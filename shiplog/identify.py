@@ -241,16 +241,19 @@ def covariance(
     noise: float,
 ) -> np.ndarray:
     """[P, P] of the estimate: the ridge's and the data's information, with each window one
-    observation of its own gradient (the sandwich of Huber 1967 and White 1980)."""
+    observation of its own gradient (the sandwich of Huber 1967 and White 1980, shrunk)."""
     found = normal(model, values, data, _indices(free))
     scale = spread[free]
     information = found.gram * np.outer(scale, scale) / noise + np.eye(len(scale))
     pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
-    # Fitted errors are too small by the parameters that the data determine (MacKinnon & White 1985).
-    determined = float(np.trace(found.gram * np.outer(scale, scale) / noise @ inverse))
+    # Few windows say little about how their gradients vary: the expected scatter counts as much
+    # more windows as there are parameters that the data determine.
+    expected = information - np.eye(len(scale))
+    determined = float(np.trace(expected @ inverse))
     count = float(data.weight.sum())
-    meat = count / max(count - determined, 1.0) * pulls.T @ pulls + np.eye(len(scale))
+    scatter = (count * pulls.T @ pulls + determined * expected) / (count + determined)
+    meat = count / max(count - 1.0, 1.0) * scatter + np.eye(len(scale))
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))
     whole[np.ix_(free, free)] = sandwich * np.outer(scale, scale)

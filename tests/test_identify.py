@@ -326,7 +326,7 @@ def test_standard_errors_cover_white_noise():
 @pytest.mark.parametrize("weight", [1.0, 2.0])
 def test_the_covariance_is_the_closed_form_of_one_window(weight):
     """u_k = u₀ + push Σ n dt. With J the sum, in the loss's cm/s and trapezoidal seconds:
-    s² (w (sJᵀr/σ²)² + 1) / (w s²JᵀJ/σ² + 1)²."""
+    s² (w S + 1) / (w s²JᵀJ/σ² + 1)², S between the gradient's square and what is expected of it."""
     whole = measured(Straight(), (0.02, -0.01, 0.005), driven(2))
     data = noisy(sensitivity.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
     free, spread = np.array([True, False, False]), np.array([0.03, 1.0, 1.0])
@@ -346,28 +346,31 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight):
     assert done.loss[1] == pytest.approx(rest)
     assert noise == pytest.approx(30.0 * rest / (3.0 * 39.0))  # three channels, 39 s
     bread = weight * s**2 * gram / noise + 1.0
-    meat = weight * (s * pull / noise) ** 2 + 1.0
+    expected = bread - 1.0
+    told = expected / bread  # of one number: how much the data determine it
+    scatter = (weight * weight * (s * pull / noise) ** 2 + told * expected) / (weight + told)
+    meat = weight * scatter + 1.0  # n/(n - 1), its divisor held at 1
     assert done.covariance[0, 0] == pytest.approx(s**2 * meat / bread**2, rel=1e-9)
 
 
 def test_each_window_is_one_observation_of_its_own_gradient():
     """Twice the windows, the same again: the data's part of the sandwich halves (Huber, White).
 
-    Σ g gᵀ between the inverses of Σ JᵀJ, times n/(n - 3) for the three numbers fitted to n
-    windows; the ridge is far too weak to be seen."""
+    Σ g gᵀ between the inverses of Σ JᵀJ, shrunk towards noise · Σ JᵀJ as if the three numbers
+    fitted were three more windows, times n/(n - 1); the ridge is far too weak to be seen."""
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=5)
     start, spread = np.array([0.03, 0.0, 0.0]), np.full(3, 100.0)
     one = identify(Straight(), start, spread, data)
     at = sensitivity.normal(Straight(), one.values, data)
-    wanted = np.linalg.inv(at.gram) @ (at.pull.T @ at.pull) @ np.linalg.inv(at.gram)
-    wanted *= COUNT / (COUNT - 3)
+    inverse = np.linalg.inv(at.gram)
+    scatter = (COUNT * at.pull.T @ at.pull + 3.0 * one.noise * at.gram) / (COUNT + 3.0)
+    wanted = COUNT / (COUNT - 1.0) * inverse @ scatter @ inverse
     assert one.covariance == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).min())
     twice = identify(Straight(), start, spread, sensitivity.pick(data, [*range(COUNT)] * 2))
     assert twice.values == pytest.approx(one.values, rel=1e-6)
-    shrinks = 0.5 * (2 * COUNT / (2 * COUNT - 3)) / (COUNT / (COUNT - 3))
-    assert np.diag(twice.covariance) == pytest.approx(np.diag(one.covariance) * shrinks, rel=1e-3)
     weighed = identify(Straight(), start, spread, data._replace(weight=np.full(COUNT, 2.0)))
     assert weighed.covariance == pytest.approx(twice.covariance, rel=1e-6)
+    assert (np.diag(twice.covariance) < np.diag(one.covariance)).all()
 
 
 # ---------------------------------------------------------------- held-out voyages
