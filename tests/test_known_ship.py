@@ -1,6 +1,7 @@
 """The known ship against closed forms, symmetries and figures that a naval architect expects."""
 
 import ast
+import json
 import math
 import tomllib
 from dataclasses import replace
@@ -16,10 +17,24 @@ from mcap_protobuf.decoder import DecoderFactory
 
 import shiplog
 from pipelines import known_ship
-from pipelines.known_ship import CALM, LIMITS, Effects, Ship, Wind, sail, varied, write_voyage
-from pipelines.known_ship.sample_logs import PLANS, SEASON_2, voyages
+from pipelines.known_ship import (
+    BANK_EAST,
+    CALM,
+    LIMITS,
+    Effects,
+    Ship,
+    Wind,
+    cases,
+    physics,
+    sail,
+    varied,
+    write_voyage,
+)
+from pipelines.known_ship import __main__ as command
+from pipelines.known_ship.sample_logs import PLANS, SEASON_2, SEED, voyages
 from pipelines.known_ship.sensors import DATUM, Blemishes
 from pipelines.known_ship.ship import ANTENNA
+from pipelines.known_ship.voyage import PULSE_TIMES
 
 START = datetime(2025, 10, 7, 1, 0, tzinfo=UTC)
 STEADY = Wind(4.0, 0.7, gust=0.0, veer=0.0, wander=0.0)
@@ -271,7 +286,8 @@ FORCES = [
     Effects(rudder_force=0.2), Effects(payload=30.0), Effects(payload=30.0, payload_ahead=1.0),
     Effects(rudder_offset_port=0.1), Effects(rudder_offset_starboard=0.1),
     Effects(rudder_lag=1.0), Effects(rudder_delay=1.0), Effects(tether=1.0, tether_north=20.0),
-    Effects(propeller_side_force=0.05),
+    Effects(propeller_side_force=0.05), Effects(rudder_limit=0.2), Effects(shallow_water=1.0),
+    Effects(turbulence=4.0), Effects(side_thrust=4.0),
 ]  # fmt: skip
 INSTRUMENTS = [
     (Effects(heading_offset=math.radians(3)), {"/gyro": "heading_deg"}, 3.0),
@@ -309,6 +325,152 @@ def test_thrust_drifts_along_the_campaign():
         for part in ((0.0, 0.1), (0.9, 1.0))
     ]
     assert ends[1] < 0.92 * ends[0] < sail(200.0, **kept).surge[-1]
+
+
+@pytest.mark.parametrize("cos", [1.0, -1.0], ids=["bank to starboard", "bank to port"])
+def test_a_bank_draws_her_in_and_turns_the_leading_end_out(cos):
+    """Starboard is east on a northern course; the bow goes out when yaw turns it west."""
+    heading = 0.0 if cos > 0 else math.pi
+
+    def gained(surge, east, **hidden):
+        kept = {"seed": 0, "wind": CALM, "helm": hold(0, 0, 0)}
+        kept["start"] = (0, surge, east, 0, heading, 0)
+        far, near = (sail(1.0, **kept, effects=Effects(**hide)) for hide in ({}, hidden))
+        return (state(near) - state(far))[-1]
+
+    ahead = gained(0.4, 38.0, bank=1.0)
+    assert ahead[2] > 0.004 and cos * ahead[3] > 0.004  # m and m/s, east
+    assert cos * ahead[5] < -0.005
+    astern = gained(-0.4, 38.0, bank=1.0)
+    assert astern[2] > 0.004 and cos * astern[5] > 0.005
+    assert np.abs(gained(0.0, 38.0, bank=1.0)).max() == 0.0
+    assert np.abs(gained(0.4, -30.0, bank=1.0)).max() < 1e-4
+    twice = gained(0.4, 38.0, bank=2.0)[[2, 3, 5]]
+    assert twice == pytest.approx(2 * ahead[[2, 3, 5]], rel=0.05)
+
+
+def test_the_bank_is_bounded_and_fades_to_half_at_its_length():
+    ship = Ship()
+    numbers = physics.coefficients(ship)
+    hidden = physics.hidden(Effects(bank=1.5, bank_length=6.0), (0.0, 1.0), 1.0)
+    wall = BANK_EAST - ship.breadth / 2
+    touching = 1.5 * 0.15 * 0.5 * 998.0 * ship.length * ship.draught * 0.5**2
+    expected = {0.0: 1.0, 6.0: 0.5, 12.0: 1 / 9, -0.2: 1.0, -1.0: 0.0}
+    for gap, share in expected.items():
+        x, y, n = physics.bank(numbers, hidden, wall - gap, 0.5, 0.0)
+        assert (x, y) == (0.0, pytest.approx(share * touching))
+        assert n == pytest.approx(-0.25 * ship.length * share * touching, rel=1e-3)
+    across = physics.bank(numbers, hidden, wall, 0.5, math.pi / 2)  # bow on: nothing slides along
+    assert np.abs(across).max() < 1e-12
+
+
+def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
+    ship = Ship()
+    numbers = physics.coefficients(ship)
+    effects = Effects(
+        shallow_water=0.8, shoal_length=4.0, shoal_north=5.0, shoal_east=-3.0, shoal_towards=0.6
+    )
+    hidden = physics.hidden(effects, (0.0, 1.0), 1.0)
+    along, off = np.exp(0.6j), 1j * np.exp(0.6j)
+    for where, share in ((0, 1.0), (20 * along, 1.0), (4 * off, 0.5), (-12 * off, 0.1)):
+        at = complex(5, -3) + where
+        assert physics.shoal(hidden, at.real, at.imag) == pytest.approx(share)
+    plain, crest = (physics.hull(numbers, hidden, 0.0, 0.2, 0.0, s) for s in (0.0, 1.0))
+    assert crest[1] == pytest.approx(plain[1] * (1 + 1.2 * 0.8))  # cross-flow
+    plain, crest = (physics.hull(numbers, hidden, 0.4, 0.0, 0.0, s) for s in (0.0, 1.0))
+    assert crest[0] == pytest.approx(plain[0] * (1 + 0.3 * 0.8))  # resistance
+
+    kept = {"seed": 0, "wind": CALM, "helm": hold(0, 0, 0), "start": (5, 0.4, -3, 0, 0.6, 0)}
+    deep = sail(60.0, **kept)
+    shallow = sail(60.0, **kept, effects=effects)
+    assert shallow.surge[-1] < 0.98 * deep.surge[-1]
+    elsewhere = sail(60.0, **kept, effects=replace(effects, shoal_east=2000.0))
+    assert state(elsewhere) == pytest.approx(state(deep), abs=1e-5)
+    # more water moves with her: the same push aside, from rest, gets her under way more slowly
+    out = np.empty((2, 11))
+    at_rest = np.zeros(11)
+    at_rest[[0, 2]] = 5.0, -3.0
+    push = np.array([2.0, 0.0, 0.0, 0.0])
+    for row, hide in zip(out, (Effects(), effects), strict=True):
+        h = physics.hidden(hide, (0.0, 1.0), 1.0)
+        physics.rates(numbers, h, at_rest, 0.0, 0.0, np.zeros(3), np.zeros(2), push, 0.0, row)
+    mass = ship.mass + ship.added_sway * np.array([1.0, 1.0 + 0.7 * 0.8])
+    inertia = ship.inertia * np.array([1.0, 1.0 + 0.2 * 0.8])
+    lever = ship.mass * ship.gravity_ahead
+    for row, m, i in zip(out, mass, inertia, strict=True):
+        expected = np.linalg.solve([[m, lever], [lever, i]], [2.0, 2.0 * 1.3])
+        assert row[[3, 5]] == pytest.approx(expected)
+
+
+def test_side_thrust_comes_in_pulses_that_turn_the_bow():
+    kept = {"seed": 5, "wind": CALM, "helm": hold(0, 0, 0), "start": (0,) * 6}
+    plain = sail(600.0, **kept)
+    voyage = sail(600.0, **kept, effects=Effects(side_thrust=4.0))
+    begins, lengths, forces = map(np.array, zip(*voyage.pulses, strict=True))
+    assert len(begins) > 3 and plain.pulses == ()
+    assert PULSE_TIMES[0] <= lengths.min() and lengths.max() <= PULSE_TIMES[1]
+    assert np.abs(forces).min() >= 1.5 and np.abs(forces).max() <= 4.0
+    assert (begins[1:] > begins[:-1] + lengths[:-1]).all()
+    assert {-1.0, 1.0} == set(np.sign(forces))
+    first = round(10 * begins[0])
+    assert np.array_equal(state(voyage)[:first], state(plain)[:first])
+    ship, arm = voyage.ship, 1.3
+    matrix = [[ship.mass + ship.added_sway, ship.mass * ship.gravity_ahead]] * 2
+    matrix[1] = [ship.mass * ship.gravity_ahead, ship.inertia]
+    sway, yaw = np.linalg.solve(matrix, [forces[0], arm * forces[0]])
+    now = first + 5  # half a second later
+    assert voyage.yaw_rate[now] == pytest.approx(0.5 * yaw, rel=0.05)
+    assert voyage.sway[now] == pytest.approx(0.5 * sway, rel=0.05)
+    weak = sail(600.0, **kept, effects=Effects(side_thrust=1.0))  # the same times, less force
+    assert [p[:2] for p in weak.pulses] == [p[:2] for p in voyage.pulses]
+
+
+def test_turbulence_moves_a_drifting_ship_in_proportion():
+    kept = {"wind": CALM, "helm": hold(0, 0, 0), "start": (0,) * 6}
+    one, four = (sail(6.0, **kept, seed=2, effects=Effects(turbulence=f)) for f in (1.0, 4.0))
+    assert state(four)[-1] == pytest.approx(4 * state(one)[-1], rel=0.1, abs=3e-5)
+    ends = [
+        [state(sail(60.0, **kept, seed=s, effects=Effects(turbulence=f)))[-1] for s in range(40)]
+        for f in (1.0, 6.0)
+    ]
+    calm, rough = (np.std(end, axis=0)[[1, 3, 5]] for end in ends)
+    assert (rough > 2.5 * calm).all()  # less than six times: drag grows too
+
+
+def test_a_limited_rudder_acts_no_further_than_its_limit():
+    kept = {"seed": 0, "wind": CALM, "start": (0, 0.2, 0, 0, 0, 0)}
+    limited = sail(
+        90.0, **kept, helm=hold(-80, 30, 9), effects=Effects(rudder_limit=math.radians(55))
+    )
+    shorter = sail(90.0, **kept, helm=hold(-55, 30, 9))
+    assert math.degrees(limited.rudder_port[-1]) == pytest.approx(-80)
+    assert state(limited)[-1] == pytest.approx(state(shorter)[-1], abs=0.02)
+    within = sail(
+        90.0, **kept, helm=hold(-55, 30, 9), effects=Effects(rudder_limit=math.radians(56))
+    )
+    assert np.array_equal(state(within), state(shorter))
+
+
+def test_an_effect_of_no_strength_is_no_effect_to_the_last_bit():
+    kept = {"seed": 9, "wind": Wind(3.0, 1.0)}
+    nothing = Effects(
+        shoal_length=2.0, shoal_north=4.0, shoal_east=1.0, shoal_towards=2.0, bank_length=30.0,
+        tether_north=3.0, payload_ahead=1.0,
+    )  # fmt: skip
+    assert np.array_equal(state(sail(120.0, **kept)), state(sail(120.0, **kept, effects=nothing)))
+
+
+def test_the_committed_logs_are_what_she_still_sails(sailed, tmp_path):
+    """To a step of resolution: another processor may round the last bit otherwise."""
+    folder = Path(known_ship.__file__).parents[2] / "sample_logs"
+    for number in (0, 6):  # nothing hidden, and something
+        plan, voyage = sailed[number]
+        write_voyage(tmp_path / "a.mcap", voyage, seed=SEED + number, start=plan.start)
+        again, committed = topics(tmp_path / "a.mcap"), topics(folder / f"{plan.name}.mcap")
+        for topic, columns in committed.items():
+            for name, values in columns.items():
+                off = np.abs(again[topic][name] - values)
+                assert np.nanmax(np.minimum(off, np.abs(off - 360.0)), initial=0.0) <= 0.07
 
 
 @pytest.fixture(scope="module")
@@ -418,6 +580,33 @@ def test_the_instruments_err_as_much_as_they_say(tmp_path):
         assert columns["late"].min() > 2e6 and columns["late"].max() < 45e6
 
 
+def test_coloured_noise_is_as_large_and_lasts_longer(tmp_path):
+    found = []
+    for share in (0.0, 0.7):
+        voyage = sail(900.0, seed=21, wind=Wind(3.0, 2.0), effects=Effects(coloured=share))
+        write_voyage(tmp_path / "a.mcap", voyage, seed=3, start=START)
+        gyro = topics(tmp_path / "a.mcap")["/gyro"]
+        true = np.rad2deg(np.interp(gyro["t"], voyage.time, voyage.yaw_rate))
+        found.append(gyro["yaw_rate_degps"] - true)
+    white, coloured = found
+    assert np.std(coloured) == pytest.approx(np.std(white), rel=0.15)
+    lasting = [np.corrcoef(error[5:], error[:-5])[0, 1] for error in found]  # half a second
+    assert lasting[0] < 0.25 and 0.45 < lasting[1] < 0.8
+
+
+def test_jittered_clocks_misstamp_and_nothing_else(logs):
+    _, clean = logs()
+    _, found = logs(Effects(clock_jitter=0.012))
+    for topic, columns in found.items():
+        off = columns["t"] - clean[topic]["t"]
+        assert np.std(off) == pytest.approx(0.012, rel=0.15)
+        assert (np.diff(columns["t"]) > 0).all()
+        arrived = columns["t"] + columns["late"] / 1e9
+        assert arrived == pytest.approx(clean[topic]["t"] + clean[topic]["late"] / 1e9, abs=1e-6)
+        for name in set(columns) - {"t", "late"}:
+            assert np.array_equal(columns[name], clean[topic][name], equal_nan=True)
+
+
 def test_blemishes_are_where_they_were_put(logs):
     _, clean = logs()
     _, found = logs(blemishes=Blemishes(dropouts=((30.0, 3.0),), spikes=((60.04, 2.0, -1.0),)))
@@ -462,6 +651,185 @@ def test_the_sample_logs_are_small_and_complete():
     names = {f"{plan.name}.mcap" for plan in (*PLANS, *SEASON_2)}
     assert {p.name for p in folder.glob("*.mcap")} == names
     assert sum(p.stat().st_size for p in folder.iterdir()) <= 16_000_000
+
+
+# --- blind cases --------------------------------------------------------------------------------
+
+SAID = {  # the contract's names and units
+    "current": {"speed": "m/s", "direction": "deg"},
+    "wind_force": {"surge_factor": "1", "sway_factor": "1", "yaw_factor": "1"},
+    "shallow_water": {"strength": "1", "length": "m"}, "bank": {"strength": "1", "length": "m"},
+    "fouling": {"factor": "1"}, "cross_flow_drag": {"factor": "1"}, "rudder_force": {"factor": "1"},
+    "thrust_loss": {"factor": "1"}, "thrust_drift": {"slope": "1"},
+    "rudder_offset": {"port": "deg", "starboard": "deg"},
+    "payload": {"mass": "kg", "position": "m"},
+    "rudder_lag": {"time": "s"}, "rudder_delay": {"time": "s"}, "side_thrust": {"force": "N"},
+    "clock_offset": {"time": "s", "channel": ""}, "heading_offset": {"angle": "deg"},
+    "wind_direction_offset": {"angle": "deg"}, "yaw_rate_bias": {"value": "deg/s"},
+    "yaw_rate_scale": {"value": "1"}, "wind_speed_scale": {"value": "1"},
+    "antenna_offset": {"x": "m", "y": "m"},
+}  # fmt: skip
+
+
+def short(case, seconds=20.0):
+    """One voyage of each campaign, and a short one."""
+    return replace(
+        case,
+        nominal=(replace(case.nominal[0], seconds=seconds),),
+        trial=(replace(case.trial[-1], seconds=seconds),),
+    )
+
+
+def test_two_thousand_draws_have_the_shares_they_should():
+    drawn = [cases.draw(seed) for seed in range(2000)]
+    outside = sum(case.verdict == "unknown" for case in drawn)
+    count = [
+        sum(len(case.causes) == n and case.verdict != "unknown" for case in drawn) for n in range(3)
+    ]
+    for found, share in zip((*count, outside), (0.2, 0.6, 0.1, 0.1), strict=True):
+        assert abs(found / 2000 - share) < 4 * math.sqrt(share * (1 - share) / 2000)
+    singles = [c.causes[0] for c in drawn if c.verdict == "named" and len(c.causes) == 1]
+    every = [cause for case in drawn for cause in case.causes]
+    for names, known in ((singles, cases.CATALOGUE), (every, cases.CATALOGUE | cases.OUTSIDE)):
+        assert {cause.name for cause in names} == set(known)
+    expected = len(singles) / len(cases.CATALOGUE)
+    for name in cases.CATALOGUE:
+        assert abs(sum(c.name == name for c in singles) - expected) < 4.5 * math.sqrt(expected)
+    logs10 = np.log10([cause.size for cause in every])
+    assert logs10.min() >= -1.0 and logs10.max() <= 0.0
+    assert np.histogram(logs10, 4, (-1, 0))[0] == pytest.approx(len(every) / 4, rel=0.15)
+    assert all(len({c.name for c in case.causes}) == len(case.causes) for case in drawn)
+
+
+@pytest.mark.parametrize("name", [*cases.CATALOGUE, *cases.OUTSIDE])
+def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
+    full, half = (cases.draw(12, cause=name, size=size) for size in (1.0, 0.5))
+    none = cases.draw(12, cause="none")
+    assert [c.name for c in full.causes] == [name] and none.causes == ()
+    said = full.causes[0].parameters
+    assert {p: said[p]["unit"] for p in SAID.get(name, {})} == SAID.get(name, {})
+    assert full.verdict == ("named" if name in cases.CATALOGUE else "unknown")
+    assert (full.ship, full.nominal, full.trial, full.ordinary) == (
+        half.ship, half.nominal, half.trial, half.ordinary
+    ) == (none.ship, none.nominal, none.trial, none.ordinary)  # fmt: skip
+    assert none.effects == none.ordinary == full.ordinary != half.effects != full.effects
+
+    columns = []
+    for case in map(short, (full, none)):
+        voyage = cases.voyage(case, replace(case.trial[0], seconds=120.0))
+        assert voyage.effects == case.ordinary  # not one of the case's legs: nothing hidden
+        sailed = sail(
+            120.0, seed=3, wind=STEADY, ship=case.ship, effects=case.effects, campaign=(0.5, 1.0)
+        )
+        series = known_ship.sensors.measure(sailed, seed=1, start=START, blemishes=Blemishes())
+        columns.append([values for one in series for values in one.columns.values()])
+    assert any(not np.array_equal(a, b) for a, b in zip(*columns, strict=True))
+
+
+def test_the_sizes_are_those_of_the_table():
+    def said(name, seed):
+        parameters = cases.draw(seed, cause=name, size=1.0).causes[0].parameters
+        return [value["value"] for value in parameters.values()]
+
+    table = {
+        "current": [(0.05, 0.18), (0, 360)], "heading_offset": [(1.5, 6)], "rudder_lag": [(1, 4)],
+        "antenna_offset": [(0.3, 1.2), (0.05, 0.3)], "rudder_delay": [(0.6, 2.0)],
+        "wind_direction_offset": [(8, 25)], "yaw_rate_bias": [(0.1, 0.5)],
+        "thrust_loss": [(0.70, 0.92)], "fouling": [(1.25, 2.0)], "thrust_drift": [(0.12, 0.35)],
+        "payload": [(20, 55), (0, 1)], "rudder_limit": [(50, 75)], "turbulence": [(4, 9)],
+        "cross_flow_drag": [(0.55, 1.45)], "tether": [(0.6, 2.0)],
+    }  # fmt: skip
+    for name, ranges in table.items():
+        for seed in range(20):
+            values = np.abs(said(name, seed)[: len(ranges)])
+            assert all(lo <= x <= hi for x, (lo, hi) in zip(values, ranges, strict=True)), name
+    either = {math.copysign(1, said("heading_offset", seed)[0]) for seed in range(20)}
+    alone = {(p == 0, s == 0) for p, s in (said("rudder_offset", seed) for seed in range(40))}
+    assert either == {-1, 1} and alone == {(True, False), (False, True), (False, False)}
+
+
+def test_a_case_is_logs_without_a_trace_and_a_key_elsewhere(tmp_path):
+    hidden = short(cases.draw(5, cause="side_thrust+heading_offset", size=1.0), 250.0)
+    plain = short(cases.draw(5, cause="none"), 250.0)
+    for case, name in ((hidden, "hidden"), (hidden, "again"), (plain, "plain")):
+        cases.write(case, tmp_path / name, tmp_path / "keys" / f"{name}.json")
+    files = {
+        name: {p.name: p.read_bytes() for p in sorted((tmp_path / name).iterdir())}
+        for name in ("hidden", "again", "plain")
+    }
+    assert set(files["hidden"]) == {"nominal_1.mcap", "trial_6.mcap"} == set(files["plain"])
+    assert files["hidden"] == files["again"]
+    assert files["hidden"]["nominal_1.mcap"] == files["plain"]["nominal_1.mcap"]
+    assert files["hidden"]["trial_6.mcap"] != files["plain"]["trial_6.mcap"]
+    described = []
+    for name in ("hidden", "plain"):
+        with open(tmp_path / name / "trial_6.mcap", "rb") as stream:
+            reader = make_reader(stream)
+            summary = reader.get_summary()
+            assert summary is not None
+            channels = [(c.topic, c.metadata) for c in summary.channels.values()]
+            schemas = [s.data for s in summary.schemas.values()]
+            records = [(m.name, m.metadata) for m in reader.iter_metadata()]
+            described.append((channels, schemas, records, list(reader.iter_attachments())))
+    assert described[0] == described[1]
+    assert described[0][2][0][1]["ship"] == Ship().name  # her own name would tell the seed
+
+    key = json.loads((tmp_path / "keys" / "hidden.json").read_text())
+    assert [c["name"] for c in key["causes"]] == ["side_thrust", "heading_offset"]
+    assert key["verdict"] == "named" and key["affected"] == ["trial_6"]
+    pulses = key["causes"][0]["parameters"]["times"]["value"]
+    sailed = cases.voyage(hidden, hidden.trial[0])
+    assert sailed.pulses and pulses == {"trial_6": [list(pulse) for pulse in sailed.pulses]}
+    empty = json.loads((tmp_path / "keys" / "plain.json").read_text())
+    assert (empty["verdict"], empty["causes"], empty["affected"]) == ("none", [], [])
+
+
+def test_a_key_never_lies_with_the_logs(tmp_path):
+    case = short(cases.draw(1))
+    for inside in ("key.json", "deep/er/key.json", "../logs/key.json"):
+        with pytest.raises(ValueError, match="elsewhere"):
+            cases.write(case, tmp_path / "logs", tmp_path / "logs" / inside)
+    assert not (tmp_path / "logs").exists()
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "mine.mcap").touch()
+    with pytest.raises(FileExistsError, match=r"mine\.mcap"):
+        cases.write(case, tmp_path / "logs", tmp_path / "key.json")
+    for wrong in ("curent", "current+current"):
+        with pytest.raises(ValueError, match=r"curent|twice"):
+            cases.draw(1, cause=wrong)
+
+
+def test_campaigns_are_as_long_as_asked_and_the_trial_comes_later():
+    long, brief = cases.draw(6), cases.draw(6, seconds=500)
+    assert [leg.seconds for leg in long.trial] == [plan.seconds for plan in PLANS]
+    assert brief.nominal == long.nominal and sum(leg.seconds for leg in brief.trial) == 500.0
+    for legs in (long.nominal, long.trial, brief.trial):
+        assert legs[0].campaign[0] == 0.0 and legs[-1].campaign[1] == 1.0
+        assert all(a.campaign[1] == b.campaign[0] for a, b in pairwise(legs))
+    assert max(leg.start for leg in long.nominal) < min(leg.start for leg in long.trial)
+    assert len({leg.seed for leg in (*long.nominal, *long.trial)}) == 12
+    assert cases.draw(6) == long != cases.draw(7)
+
+
+def test_a_bank_does_not_swallow_her():
+    case = cases.draw(0, cause="bank", size=1.0)
+    for leg in (case.trial[3], case.trial[4]):
+        voyage = cases.voyage(case, leg)
+        assert voyage.y0.max() < BANK_EAST - voyage.ship.breadth / 2
+        assert np.hypot(voyage.x0, voyage.y0).max() < 50.0
+
+
+def test_the_command_writes_a_case(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(cases, "DURATIONS", {7000: (15.0,), 500: (5.0, 5.0)})
+    folder, key = str(tmp_path / "logs"), str(tmp_path / "key.json")
+    command.main(["case", "8", folder, "--key", key, "--cause", "tether", "--seconds", "500"])
+    names = {p.name for p in (tmp_path / "logs").iterdir()}
+    assert names == {"nominal_1.mcap", "trial_1.mcap", "trial_2.mcap"}
+    told = json.loads((tmp_path / "key.json").read_text())
+    assert told["verdict"] == "unknown" and told["structure"] == {"family": "position"}
+    with pytest.raises(SystemExit):
+        command.main(["case", "8", folder, "--key", f"{folder}/key.json"])
+    assert "elsewhere" in capsys.readouterr().err
 
 
 def test_it_shares_no_code_with_shiplog_but_the_writer():

@@ -1,17 +1,49 @@
-"""`python -m pipelines.known_ship sample_logs`: write the sample logs into that folder."""
+"""Write logs of the known ship.
+
+python -m pipelines.known_ship FOLDER
+    the sample logs into that folder, such as sample_logs
+python -m pipelines.known_ship case SEED FOLDER --key KEY
+    a blind case into that folder, and what is hidden in it into the file KEY, elsewhere
+"""
 
 from __future__ import annotations
 
 import argparse
+import sys
 
+from pipelines.known_ship import cases
 from pipelines.known_ship.sample_logs import write_sample_logs
 
+PROGRAM = "python -m pipelines.known_ship"
 
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m pipelines.known_ship", description=__doc__)
-    parser.add_argument("folder", help="where the logs go, such as sample_logs")
-    write_sample_logs(parser.parse_args().folder)
+
+def main(arguments: list[str]) -> None:
+    if arguments[:1] == ["case"]:
+        _case(arguments[1:])
+        return
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", help="where the sample logs go, such as sample_logs")
+    write_sample_logs(parser.parse_args(arguments).folder)
+
+
+def _case(arguments: list[str]) -> None:
+    known = ", ".join((*cases.CATALOGUE, *cases.OUTSIDE))
+    parser = argparse.ArgumentParser(prog=f"{PROGRAM} case", epilog=f"Causes: none, {known}.")
+    parser.add_argument("seed", type=int)
+    parser.add_argument("folder", help="where nominal_1.mcap to trial_6.mcap go")
+    parser.add_argument("--key", required=True, help="the file that says what is hidden")
+    parser.add_argument("--cause", help="hide this and nothing else; two as current+fouling")
+    parser.add_argument("--size", type=float, help="1 is realistic; drawn unless given")
+    parser.add_argument("--seconds", type=int, default=7000, choices=sorted(cases.DURATIONS))
+    given = parser.parse_args(arguments)
+    try:
+        case = cases.draw(given.seed, cause=given.cause, size=given.size, seconds=given.seconds)
+        cases.write(case, given.folder, given.key)
+    except (ValueError, FileExistsError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -18,10 +18,11 @@ from dataclasses import fields
 import numpy as np
 from numba import njit
 
-from pipelines.known_ship.ship import Effects, Ship
+from pipelines.known_ship.ship import BANK_EAST, Effects, Ship
 
 STEP = 0.02  # s; logged at 0.1 s
 WATER, AIR = 998.0, 1.225  # kg/m³
+THRUSTER = 1.3  # m ahead of midship, the one nobody records
 # state: x₀ u y₀ v ψ r, measured δ_port δ_starboard n, and the rudder angles after a hidden lag
 STATES = 11
 
@@ -30,7 +31,8 @@ _FORCES = [
     "current_north", "current_east", "tether", "tether_north", "tether_east", "fouling",
     "cross_flow_drag", "thrust_loss", "rudder_force", "payload", "payload_ahead",
     "rudder_offset_port", "rudder_offset_starboard", "rudder_lag", "rudder_delay",
-    "propeller_side_force",
+    "propeller_side_force", "rudder_limit", "shallow_water", "shoal_length", "shoal_north",
+    "shoal_east", "shoal_towards", "bank", "bank_length",
 ]  # fmt: skip
 _DERIVED = ["wind_force_surge", "wind_force_sway", "wind_force_yaw", "drift_start", "drift_slope"]
 Coefficients = namedtuple("Coefficients", _SHIP)
@@ -55,22 +57,57 @@ def hidden(effects: Effects, campaign: tuple[float, float], duration: float) -> 
 
 
 @njit
-def hull(c, h, u, v, r):
+def shoal(h, north, east):
+    """0 in deep water to `shallow_water` over the crest of a shoal: (h₀/h)², h the depth here.
+
+    The bed falls off the crest as a hyperbola, h² = h₀² (1 + s²/l²) at s metres from it. What
+    grows does so by a power of draught over depth, as measured in shallow tanks (Kijima, Katsuno,
+    Nakiri & Furukawa 1990), each with a power of its own in `hull` and `rates`. The masses' own
+    gradient is left out: below 0.2 N here.
+    """
+    off = -(north - h.shoal_north) * math.sin(h.shoal_towards) + (east - h.shoal_east) * math.cos(
+        h.shoal_towards
+    )
+    return 1.0 / (1.0 + (off / h.shoal_length) ** 2)
+
+
+@njit
+def bank(c, h, east, u, psi):
+    """Suction towards the bank at y₀ = `BANK_EAST` and the moment that turns the leading end out.
+
+    Both grow with the square of the speed along the bank (Norrbin 1974) and fade with the gap as
+    1/(1 + (gap/l)³), our own; they are bounded at the wall and nothing behind it.
+    """
+    gap = BANK_EAST - 0.5 * c.breadth - east
+    if gap < -c.breadth:
+        return 0.0, 0.0, 0.0
+    cos, sin = math.cos(psi), math.sin(psi)
+    near = 1.0 / (1.0 + (max(gap, 0.0) / h.bank_length) ** 3)
+    pull = h.bank * 0.15 * 0.5 * WATER * c.length * c.draught * (u * cos) ** 2 * near
+    lead = u / math.sqrt(u * u + 1e-4)  # which end leads
+    return pull * sin, pull * cos, -0.25 * c.length * pull * cos * lead
+
+
+@njit
+def hull(c, h, u, v, r, shallow):
     """Hull force at velocity through the water, after Yoshimura, Nakao & Ishibashi (2009).
 
     Linear damping fades with |u|; cross-flow drag is integrated along the hull with a coefficient
-    that grows towards the ends, as Hooft (1994) found.
+    that grows towards the ends, as Hooft (1994) found. `shallow` is the shoal's (h₀/h)².
     """
+    crest = h.shallow_water
+    slow, damped = 1.0 + 0.3 * crest * shallow, 1.0 + 0.8 * crest * shallow
+    blocked = 1.0 + 1.2 * crest * shallow * math.sqrt(shallow)
     q = 0.5 * WATER * c.length * c.draught
     speed = math.sqrt(u * u + v * v)
     astern = 0.5 - 0.5 * u / speed if speed > 0.0 else 0.0  # 0 straight ahead, 1 straight astern
     rough = 1.0 + h.fouling
     straight = c.resistance_ahead + (c.resistance_astern - c.resistance_ahead) * astern
     lr = c.length * r
-    x = q * (-rough * straight * u * speed + c.surge_turning * v * lr)
-    y = q * (c.sway_damping * v * abs(u) + c.sway_turning * lr * u)
-    n = q * c.length * (c.yaw_drift * v * u + c.yaw_damping * lr * abs(u))
-    drag = q * c.cross_flow * (1.0 + h.cross_flow_drag)
+    x = q * (-rough * straight * slow * u * speed + c.surge_turning * v * lr)
+    y = q * (c.sway_damping * damped * v * abs(u) + c.sway_turning * lr * u)
+    n = q * c.length * (c.yaw_drift * v * u + c.yaw_damping * damped * lr * abs(u))
+    drag = q * c.cross_flow * (1.0 + h.cross_flow_drag) * blocked
     for i in range(len(STATIONS)):
         xi = STATIONS[i]
         across = v + lr * xi
@@ -175,8 +212,11 @@ def wind_force(c, h, ahead, starboard):
 
 
 @njit
-def rates(c, h, state, port, starboard, order, wind_north, wind_east, time, out):
+def rates(c, h, state, port, starboard, order, wind, push, time, out):
     """dx/dt [11] of `state` [11] into `out`; port and starboard are the rudder angles that act.
+
+    wind   [2] where the true wind comes from, north and east [m/s]
+    push   [4] side thrust [N], and accelerations that nothing explains [m/s², m/s², rad/s²]
 
     Rigid body with added mass about midship; a current moves the water that added mass and
     hull feel, and is even and steady, so that only velocity through the water accelerates.
@@ -187,7 +227,8 @@ def rates(c, h, state, port, starboard, order, wind_north, wind_east, time, out)
     vc = -h.current_north * sin + h.current_east * cos
     uw, vw = u - uc, v - vc  # through the water
 
-    x, y, n = hull(c, h, uw, vw, r)
+    shallow = shoal(h, state[0], state[2]) if h.shallow_water > 0.0 else 0.0
+    x, y, n = hull(c, h, uw, vw, r, shallow)
     thrust, inflow = propeller(c, uw, vw, r, state[8])
     weaker = (1.0 - h.thrust_loss) * (1.0 + h.drift_start + h.drift_slope * time)
     thrust *= weaker
@@ -196,7 +237,7 @@ def rates(c, h, state, port, starboard, order, wind_north, wind_east, time, out)
     n += thrust * h.propeller_side_force * c.propeller_at
     rx, ry, rn = rudders(c, h, uw, vw, r, thrust, inflow, port, starboard)
     wx, wy, wn = wind_force(
-        c, h, wind_north * cos + wind_east * sin + u, -wind_north * sin + wind_east * cos + v
+        c, h, wind[0] * cos + wind[1] * sin + u, -wind[0] * sin + wind[1] * cos + v
     )
     x, y, n = x + rx + wx, y + ry + wy, n + rn + wn
     if h.tether > 0.0:
@@ -204,11 +245,18 @@ def rates(c, h, state, port, starboard, order, wind_north, wind_east, time, out)
         pull = h.tether / math.sqrt(north * north + east * east + 1.0)  # slack near the point
         x += pull * (north * cos + east * sin)
         y += pull * (-north * sin + east * cos)
+    if h.bank > 0.0:
+        bx, by, bn = bank(c, h, state[2], uw, psi)
+        x, y, n = x + bx, y + by, n + bn
+    y += push[0]
+    n += push[0] * THRUSTER
 
     mass = c.mass + h.payload
     moment = c.mass * c.gravity_ahead + h.payload * h.payload_ahead  # m x_G
     inertia = c.inertia + h.payload * h.payload_ahead**2
-    mx, my = mass + c.added_surge, mass + c.added_sway
+    crest = h.shallow_water * shallow
+    mx, my = mass + c.added_surge, mass + c.added_sway * (1.0 + 0.7 * crest)
+    inertia += 0.2 * c.inertia * crest  # J_zz is some 0.4 of it, and grows by half
     udot = (x + my * vw * r + moment * r * r) / mx
     ya = y - mx * uw * r
     na = n - moment * uw * r
@@ -217,11 +265,11 @@ def rates(c, h, state, port, starboard, order, wind_north, wind_east, time, out)
     rdot = (my * na - moment * ya) / det
 
     out[0] = u * cos - v * sin
-    out[1] = udot + r * vc  # the current's components in body axes turn with the ship
+    out[1] = udot + push[1] + r * vc  # the current's components in body axes turn with the ship
     out[2] = u * sin + v * cos
-    out[3] = vdot - r * uc
+    out[3] = vdot + push[2] - r * uc
     out[4] = r
-    out[5] = rdot
+    out[5] = rdot + push[3]
     for i in range(2):
         wanted = (order[i] - state[6 + i]) / c.rudder_time
         out[6 + i] = min(max(wanted, -c.rudder_rate), c.rudder_rate)
@@ -243,11 +291,12 @@ def _past(track, last, state, column, steps):
 
 
 @njit
-def advance(c, h, track, start, steps, dt, order, wind):
+def advance(c, h, track, start, steps, dt, order, wind, push):
     """Runge-Kutta of fourth order: rows start+1 .. start+steps of `track` [K, 11].
 
     order   [3] what the operator has set, held: port, starboard [rad], propeller [rev/s]
     wind    [2K - 1, 2] where the true wind comes from, north and east [m/s], at half steps
+    push    [2K - 1, 4] side thrust [N] and random accelerations, at half steps
     """
     k = np.empty((4, STATES))
     state = np.empty(STATES)
@@ -262,10 +311,14 @@ def advance(c, h, track, start, steps, dt, order, wind):
                 starboard = _past(track, i, state, 10, when)
             else:
                 port, starboard = state[9], state[10]
+            port, starboard = port + h.rudder_offset_port, starboard + h.rudder_offset_starboard
+            if h.rudder_limit > 0.0:
+                port = min(max(port, -h.rudder_limit), h.rudder_limit)
+                starboard = min(max(starboard, -h.rudder_limit), h.rudder_limit)
             half = 2 * i + int(2.0 * part)
             rates(
-                c, h, state, port + h.rudder_offset_port, starboard + h.rudder_offset_starboard,
-                order, wind[half, 0], wind[half, 1], (i + part) * dt, k[stage],
+                c, h, state, port, starboard, order, wind[half], push[half], (i + part) * dt,
+                k[stage],
             )  # fmt: skip
         for j in range(STATES):
             track[i + 1, j] = track[i, j] + dt / 6.0 * (

@@ -21,6 +21,7 @@ from shiplog.logs.write import Series, write_log
 
 DATUM = (34.82, 135.52)  # deg, near Inukai Pond, Osaka University
 MILLISECOND = 1_000_000  # ns
+COLOUR_TIMES = (1.0, 5.0)  # s, within which coloured noise fades
 TICK = (
     2**20
 )  # ns, of the recorder's and the sensors' clocks; round in binary, so that zstd packs it
@@ -122,8 +123,24 @@ class _Sight:
         """[N] of standard deviation `sigma`; the share `slow` of its variance lasts `memory` s."""
         rng = self.stream(f"{name} noise")
         step = float(np.mean(np.diff(times))) if len(times) > 1 else 1.0
-        coloured = ornstein_uhlenbeck(rng, len(times), step, memory, sigma * np.sqrt(slow))
-        return coloured + sigma * np.sqrt(1.0 - slow) * rng.standard_normal(len(times))
+        drifting = ornstein_uhlenbeck(rng, len(times), step, memory, sigma * np.sqrt(slow))
+        quick = rng.standard_normal(len(times))
+        share = self.effects.coloured
+        if share > 0.0:
+            rng = self.stream(f"{name} colour")
+            fades = rng.uniform(*COLOUR_TIMES)
+            colour = ornstein_uhlenbeck(rng, len(times), step, fades, np.sqrt(share))
+            quick = np.sqrt(1.0 - share) * quick + colour
+        return drifting + sigma * np.sqrt(1.0 - slow) * quick
+
+    def _misstamped(self, instrument: Instrument, count: int) -> np.ndarray:
+        """[N] ns between the instant measured and its stamp; too little to change their order."""
+        jitter = self.effects.clock_jitter
+        if jitter == 0.0:
+            return np.zeros(count, np.int64)
+        off = jitter * self.stream(f"{instrument.name} stamp").standard_normal(count)
+        off = np.clip(off, -0.45 / instrument.rate, 0.45 / instrument.rate)
+        return np.round(off * 1e3).astype(np.int64) * MILLISECOND
 
     def series(
         self,
@@ -138,6 +155,7 @@ class _Sight:
         stamp = self.zero + np.round(times * 1e3).astype(np.int64) * MILLISECOND
         queue = self.stream(f"{instrument.name} queue").exponential(instrument.queue, len(times))
         arrival = stamp + ((instrument.latency + np.minimum(queue, 0.012)) * 1e9).astype(np.int64)
+        stamp = stamp + self._misstamped(instrument, len(times))
         return Series(
             topic, schema, stamp, columns,
             log_time=arrival // TICK * TICK, publish_time=stamp // TICK * TICK,

@@ -88,6 +88,7 @@ LIMITS = {  # the paper's table of actuator limits: rad, rad, rev/s
     "propeller": (0.0, 12.5),
 }
 ANTENNA = (0.3, 0.0)  # m ahead of midship and to starboard, as the profile has it
+BANK_EAST = 40.0  # m; a charted vertical bank stands along the line y₀ = 40 m
 _BUILT = frozenset({  # what a yard keeps: a varied ship has another hull form, not another length
     "name", "length", "breadth", "draught", "block_coefficient", "diameter", "propeller_at",
     "rudder_at", "rudder_aside", "rudder_span", "rudder_area", "rudder_rate",
@@ -123,6 +124,14 @@ class Effects:
     tether: float = 0.0  # N towards a point, outside the catalogue
     tether_north: float = 0.0  # m
     tether_east: float = 0.0
+    shallow_water: float = 0.0  # strength of what a shoal that no chart shows does to the hull
+    shoal_length: float = 5.0  # m, half-width of its flanks
+    shoal_north: float = 0.0  # m, a point its crest passes through
+    shoal_east: float = 0.0
+    shoal_towards: float = 0.0  # rad, which way the crest runs, clockwise from north
+    bank: float = 0.0  # strength of the bank at `BANK_EAST`
+    bank_length: float = 5.0  # m off the bank at which half of its effect is left
+    turbulence: float = 0.0  # of what pushes at random: 1 is an ordinary day, 4 is outside
     # the ship
     fouling: float = 0.0  # share added to the straight resistance
     cross_flow_drag: float = 0.0  # share added to C_D
@@ -136,6 +145,8 @@ class Effects:
     rudder_lag: float = 0.0  # s, first order between measured and acting
     rudder_delay: float = 0.0  # s
     propeller_side_force: float = 0.0  # share of the thrust, to starboard, outside the catalogue
+    rudder_limit: float = 0.0  # rad, no rudder acts beyond ± this; 0 is no limit; outside too
+    side_thrust: float = 0.0  # N, the strongest pulse of a thruster that nobody records
     # the instruments
     heading_offset: float = 0.0  # rad, measured minus true
     yaw_rate_bias: float = 0.0  # rad/s, measured minus true
@@ -145,3 +156,6 @@ class Effects:
     wind_speed_scale: float = 0.0  # measured over true, less one
     # s late against the heading, by channel: position, velocity, gnss (both), yaw_rate, wind
     clock_offset: Mapping[str, float] = field(default_factory=dict)
+    # not causes but the manners of every instrument
+    coloured: float = 0.0  # share of its quick noise that fades over 1 to 5 s
+    clock_jitter: float = 0.0  # s, standard deviation of a stamp from the instant measured

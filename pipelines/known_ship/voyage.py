@@ -9,10 +9,18 @@ import numpy as np
 from pipelines.known_ship import physics
 from pipelines.known_ship.helm import Helm, Operator
 from pipelines.known_ship.ship import Effects, Ship
-from pipelines.known_ship.weather import Wind, blow
+from pipelines.known_ship.weather import GRID, Wind, blow, ornstein_uhlenbeck
 
 PERIOD = 0.1  # s
 WATCH = 1.0  # s, between two looks of the operator
+UNREST = (3e-4, 3e-4, 2e-4)  # m/s², m/s², rad/s²: what pushes a ship at random on an ordinary day
+UNREST_TIME = 4.0  # s
+PULSES = (0.375, 1.0)  # of the strongest, 1.5 to 4 N
+PULSE_TIMES = (10.0, 40.0)  # s
+QUIET = 60.0  # s, mean between two pulses
+
+# start [s], length [s], force to starboard [N]
+Pulse = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +44,7 @@ class Voyage:
     true_wind_direction: np.ndarray  # rad, from, clockwise from north
     wind_speed: np.ndarray  # m/s, apparent, at midship
     wind_angle: np.ndarray  # rad, apparent, from, clockwise from the bow, (-π, π]
+    pulses: tuple[Pulse, ...] = ()  # of the thruster that nobody records
 
 
 def sail(
@@ -60,7 +69,9 @@ def sail(
     whatever is hidden.
     """
     ship, effects = ship or Ship(), effects or Effects()
-    weather_rng, helm_rng, start_rng = (np.random.default_rng([seed, i]) for i in range(3))
+    weather_rng, helm_rng, start_rng, unrest_rng, pulse_rng = (
+        np.random.default_rng([seed, i]) for i in range(5)
+    )
     if start is None:
         x0, y0, heading = start_rng.uniform((-8.0, -8.0, -np.pi), (8.0, 8.0, np.pi))
         start = (x0, 0.0, y0, 0.0, heading, 0.0)
@@ -70,14 +81,21 @@ def sail(
     rows = round(duration_s / PERIOD) * kept
     track = np.zeros((rows + 1, physics.STATES))
     track[0, :6] = start
-    air = blow(wind, duration_s, 0.5 * step * np.arange(2 * rows + 1), weather_rng)
+    halves = 0.5 * step * np.arange(2 * rows + 1)
+    air = blow(wind, duration_s, halves, weather_rng)
+    push = np.zeros((2 * rows + 1, 4))
+    pulses = draw_pulses(effects.side_thrust, duration_s, pulse_rng)
+    for begin, length, force in pulses:
+        push[(halves >= begin) & (halves < begin + length), 0] = force
+    if effects.turbulence > 0.0:
+        push[:, 1:] = effects.turbulence * _unrest(duration_s, halves, unrest_rng)
     numbers = physics.coefficients(ship)
     hidden = physics.hidden(effects, campaign, duration_s)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
         order = np.array(steer(first * step, track[first].copy()), float)
         steps = min(watch, rows - first)
-        physics.advance(numbers, hidden, track, first, steps, step, order, air)
+        physics.advance(numbers, hidden, track, first, steps, step, order, air, push)
 
     seen = track[::kept]
     from_north, from_east = air[:: 2 * kept].T
@@ -91,5 +109,29 @@ def sail(
         rudder_port=port, rudder_starboard=starboard, propeller=speed,
         true_wind_speed=np.hypot(from_north, from_east),
         true_wind_direction=np.arctan2(from_east, from_north),
-        wind_speed=np.hypot(ahead, aside), wind_angle=np.arctan2(aside, ahead),
+        wind_speed=np.hypot(ahead, aside), wind_angle=np.arctan2(aside, ahead), pulses=pulses,
     )  # fmt: skip
+
+
+def draw_pulses(strongest: float, duration: float, rng: np.random.Generator) -> tuple[Pulse, ...]:
+    """Either way, at any time, never two at once. The same times whatever their strength."""
+    found: list[Pulse] = []
+    begin = rng.exponential(QUIET)
+    while strongest > 0.0 and begin < duration:
+        length = rng.uniform(*PULSE_TIMES)
+        force = strongest * rng.uniform(*PULSES) * rng.choice((-1.0, 1.0))
+        found.append((round(begin, 1), round(length, 1), round(float(force), 4)))
+        begin = found[-1][0] + length + 1.0 + rng.exponential(QUIET)
+    return tuple(found)
+
+
+def _unrest(duration: float, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """[K, 3] accelerations, drawn on the weather's grid: a finer step meets the same."""
+    count = int(np.ceil(duration / GRID)) + 2
+    grid = GRID * np.arange(count)
+    return np.column_stack(
+        [
+            np.interp(times, grid, ornstein_uhlenbeck(rng, count, GRID, UNREST_TIME, sigma))
+            for sigma in UNREST
+        ]
+    )
