@@ -61,9 +61,9 @@ def rudder(
     X_R = (1 - t_R) (F_T cos δ - F_N sin δ), Y_R = -(1 + a_H) (F_N cos δ + F_T sin δ),
     N_R = (x_R + a_H x_H) Y_R / (1 + a_H)
 
-    f₃, F_T and f_i are ours, without effect in the MMG. A fish-tail blade (Schilling, VecTwin) turns the jet
-    until it leaves along its chord; by the balance of momentum J (Rankine) its force is then
-    J sin α across and J (1 - cos α) along the chord. Of two blades, the one turned inboard works
+    f₃, F_T and f_i are ours, without effect in the MMG. A fish-tail blade (Schilling, VecTwin)
+    turns the jet until it leaves along its chord; by the balance of momentum J (Rankine) its
+    force is then J sin α across and J (1 - cos α) along the chord. Of two blades, the one turned inboard works
     beside the other: its force is f_i times that of the one turned outboard.
     """
     gamma = jnp.where(v + blade.ahead * r >= 0.0, p["rudder.gamma_p"], p["rudder.gamma_n"])
