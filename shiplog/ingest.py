@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 
-from shiplog import align, channels, midship, quality
+from shiplog import align, channels, midship, parity, quality
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.findings import VoyageReport
@@ -76,7 +76,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *grid.findings),
+        findings=(*reading.health.findings, *grid.findings, *parity.findings(table, profile)),
     )
     return Voyage(report.name, profile, reading.contents, table, report, datum)
 

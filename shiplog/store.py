@@ -27,7 +27,7 @@ from shiplog.findings import CONTRACT, VoyageReport
 from shiplog.ingest import Voyage
 from shiplog.profile import Profile
 
-INGEST_VERSION = 1  # raised when the same log would become another table
+INGEST_VERSION = 2  # raised when the same log would become another table or report
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"units", "findings"},
     {"profile", "config", "logs", "comparison"},
     {"align", "midship", "quality", "draft"},
-    {"grid", "table"},
+    {"grid", "table", "parity", "parity_fit"},
     {"ingest"},
     {"store", "windows"},
     {"models"},

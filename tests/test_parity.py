@@ -1,0 +1,254 @@
+"""Faults of one sensor that another shows: hidden by known_ship or by hand, found and sized."""
+
+import itertools
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+import sailing
+
+from pipelines.known_ship import Effects, Wind, sail, write_voyage
+from shiplog import parity, profile
+from shiplog.channels import Quality
+from shiplog.ingest import ingest
+
+SAMPLES = Path(__file__).parent.parent / "sample_logs"
+DEGREE = np.pi / 180.0
+VECTWIN = profile.load("esso-vectwin")
+BODY = sailing.profile(
+    sailing.PROFILE.replace('kind = "sog_cog"', 'kind = "body"')
+    .replace('units = ["kn", "deg"]', 'unit = "m/s"')
+    .replace("lever_arm_m = [0.7, -0.2]", "lever_arm_m = [0.0, 0.0]")
+)
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory):
+    """A voyage of the known ship through log and ingest: its parity findings, by kind."""
+    folder, number = tmp_path_factory.mktemp("parity"), itertools.count()
+
+    def build(seed, seconds=900.0, **effects):
+        voyage = sail(seconds, seed=seed, wind=Wind(2.0, 1.0), effects=Effects(**effects))
+        path = folder / f"{next(number)}.mcap"
+        write_voyage(path, voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
+        return said(ingest(path, VECTWIN).report)
+
+    return build
+
+
+def said(report):
+    return {(f.kind, f.channel): f for f in report.findings if f.kind in KINDS}
+
+
+KINDS = {"clock_offset", "heading_offset", "antenna_offset", "yaw_rate_bias", "yaw_rate_scale",
+         "velocity_scale"}  # fmt: skip
+
+
+def holds(finding, truth):
+    """Within twice the half width of the 90 % interval: 3.3 standard deviations, so that a seed
+    need not be a lucky one. That the interval itself is honest, `coverage` tests over many."""
+    assert finding.low < finding.value < finding.high
+    return abs(finding.value - truth) < finding.high - finding.low
+
+
+def in_body_axes(seed, late=None, heading_offset=0.0, antenna=(0.0, 0.0), speed_scale=0.0,
+                 seconds=900.0):  # fmt: skip
+    """A table as ingest makes it of a ship whose velocity is measured in body axes."""
+    voyage = sail(seconds, seed=seed, wind=Wind(2.0, 1.0))
+    rng, t, late = np.random.default_rng([seed, 7]), voyage.time, late or {}
+
+    def seen(name, channel, sigma):
+        delay = late.get(channel, 0.0) + late.get("gnss", 0.0) * (
+            channel in ("position", "velocity")
+        )
+        true = np.interp(t - delay, t, getattr(voyage, name))
+        return true + sigma * rng.standard_normal(len(t))
+
+    turned = seen("heading", "position", 0.0)
+    c, s = np.cos(turned), np.sin(turned)
+    return pl.DataFrame({
+        "time": t,
+        "x0": seen("x0", "position", 0.015) + c * antenna[0] - s * antenna[1],
+        "y0": seen("y0", "position", 0.015) + s * antenna[0] + c * antenna[1],
+        "heading": seen("heading", "heading", 0.1 * DEGREE) + heading_offset * DEGREE,
+        "surge": (1.0 + speed_scale) * seen("surge", "velocity", 0.01),
+        "sway": (1.0 + speed_scale) * seen("sway", "velocity", 0.01),
+        "yaw_rate": seen("yaw_rate", "yaw_rate", 0.1 * DEGREE),
+        "quality": np.zeros(len(t), np.int32),
+    })  # fmt: skip
+
+
+def found(table):
+    return {(f.kind, f.channel): f for f in parity.findings(table, BODY)}
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_a_clean_sample_log_has_nothing_to_say(number):
+    assert said(ingest(SAMPLES / f"voyage_{number}.mcap", VECTWIN).report) == {}
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33])
+def test_a_fresh_clean_voyage_has_nothing_to_say(logged, seed):
+    assert logged(seed, 600.0) == {}
+
+
+def test_a_late_yaw_rate_is_told_from_its_bias_and_its_scale(logged):
+    faults = logged(
+        41, clock_offset={"yaw_rate": 0.6}, yaw_rate_bias=0.2 * DEGREE, yaw_rate_scale=0.04
+    )
+    assert holds(faults.pop(("clock_offset", "yaw_rate")), 0.6)
+    assert holds(faults.pop(("yaw_rate_bias", "yaw_rate")), 0.2)
+    assert holds(faults.pop(("yaw_rate_scale", "yaw_rate")), 1.04)
+    assert faults == {}
+
+
+@pytest.mark.parametrize(
+    ("effects", "key", "truth"),
+    [
+        ({"clock_offset": {"yaw_rate": 0.3}}, ("clock_offset", "yaw_rate"), 0.3),
+        ({"yaw_rate_bias": -0.2 * DEGREE}, ("yaw_rate_bias", "yaw_rate"), -0.2),
+        ({"yaw_rate_scale": -0.04}, ("yaw_rate_scale", "yaw_rate"), 0.96),
+        ({"clock_offset": {"velocity": 0.6}}, ("clock_offset", "velocity"), 0.6),
+        ({"clock_offset": {"position": 1.0}}, ("clock_offset", "position"), 1.0),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else "",
+)
+def test_one_hidden_fault_is_sized_and_no_other_named(logged, effects, key, truth):
+    faults = logged(42, **effects)
+    assert set(faults) == {key}
+    assert holds(faults[key], truth)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"antenna_offset": (0.3, 0.0)}, {"heading_offset": 3 * DEGREE},
+     {"clock_offset": {"gnss": 0.5}}],
+    ids=["antenna", "heading", "gnss"],
+)  # fmt: skip
+def test_velocity_over_ground_cannot_show_what_it_shares_with_the_position(logged, effects):
+    assert logged(43, **effects) == {}
+
+
+def test_the_sentence_says_how_late_and_after_what(logged):
+    sentence = logged(44, clock_offset={"yaw_rate": 0.5})["clock_offset", "yaw_rate"].sentence
+    assert sentence.startswith("The yaw rate comes 0.")
+    assert sentence.endswith(") after the heading it belongs to.")
+
+
+def test_velocity_in_body_axes_shows_a_heading_offset():
+    faults = found(in_body_axes(1, heading_offset=2.0))
+    assert set(faults) == {("heading_offset", "heading")}
+    assert holds(faults["heading_offset", "heading"], 2.0)
+
+
+@pytest.mark.parametrize("channel", ["position", "velocity", "gnss"])
+def test_velocity_in_body_axes_shows_whose_clock_is_late(channel):
+    faults = found(in_body_axes(2, late={channel: 0.5}))
+    assert set(faults) == {("clock_offset", channel)}
+    assert holds(faults["clock_offset", channel], 0.5)
+
+
+def test_a_late_yaw_rate_and_an_antenna_elsewhere_at_once():
+    faults = found(in_body_axes(3, late={"yaw_rate": 0.6}, antenna=(0.3, -0.2)))
+    assert holds(faults.pop(("clock_offset", "yaw_rate")), 0.6)
+    assert holds(faults.pop(("antenna_offset", "position ahead")), 0.3)
+    assert holds(faults.pop(("antenna_offset", "position starboard")), -0.2)
+    assert faults == {}
+
+
+def test_a_log_that_shows_too_much_speed():
+    faults = found(in_body_axes(4, speed_scale=0.04))
+    assert set(faults) == {("velocity_scale", "velocity")}
+    assert holds(faults["velocity_scale", "velocity"], 1.04)
+
+
+def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
+    """Twelve voyages, three parameters of the yaw rate each; fewer than 28 of 36 has a chance of
+    1 % where each holds with 0.9 (binomial)."""
+    truth = {"clock_offset": 0.4, "yaw_rate_scale": 1.0, "yaw_rate_bias": 0.0}
+    late, inside = Effects(clock_offset={"yaw_rate": 0.4}), []
+    for seed in range(70, 82):
+        voyage = sail(500.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
+        write_voyage(tmp_path / "a.mcap", voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
+        table = ingest(tmp_path / "a.mcap", VECTWIN).table
+        inside += [e.low <= truth[e.kind] <= e.high for e in parity.estimates(table, VECTWIN)
+                   if e.channel == "yaw_rate"]  # fmt: skip
+    assert len(inside) == 36
+    assert sum(inside) >= 28
+
+
+def test_body_velocities_without_fault_have_nothing_to_say():
+    assert found(in_body_axes(5)) == {}
+
+
+def slalom(seconds=300.0, late=0.0, bias=0.0, scale=1.0):
+    """Heading and rate in closed form; the ship lies still, and only turns."""
+    t = np.arange(0.0, seconds, 0.1)
+    frequencies, sizes = np.array([[0.11], [0.29], [0.53]]), np.array([[0.8], [0.3], [0.1]])
+    heading = (sizes * np.sin(frequencies * t)).sum(0)
+    rate = (sizes * frequencies * np.cos(frequencies * (t - late))).sum(0)
+    still = np.zeros(len(t))
+    return pl.DataFrame({
+        "time": t, "x0": still, "y0": still, "heading": heading, "surge": still, "sway": still,
+        "yaw_rate": scale * rate + bias, "quality": still.astype(np.int32),
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("late", [0.37, -0.81, 2.6])
+def test_a_delay_in_closed_form(late):
+    values = {e.kind: e.value for e in parity.estimates(slalom(late=late), BODY)
+              if e.channel == "yaw_rate"}  # fmt: skip
+    assert values["clock_offset"] == pytest.approx(late, abs=2e-3)
+    assert values["yaw_rate_scale"] == pytest.approx(1.0, abs=2e-3)
+    assert values["yaw_rate_bias"] == pytest.approx(0.0, abs=2e-3)
+
+
+def test_bias_and_scale_in_closed_form():
+    table = slalom(bias=0.01, scale=0.97)
+    values = {e.kind: e.value for e in parity.estimates(table, BODY) if e.channel == "yaw_rate"}
+    assert values["yaw_rate_scale"] == pytest.approx(0.97, abs=1e-3)
+    assert values["yaw_rate_bias"] == pytest.approx(0.01 / DEGREE, abs=2e-3)
+
+
+def test_a_steady_circle_tells_no_bias_from_a_scale(tmp_path):
+    def ingested(parts):
+        return said(ingest(sailing.write(tmp_path / "turn.mcap", parts), sailing.profile()).report)
+
+    parts = sailing.series(400.0)
+    assert ingested(parts) == {}
+    parts["/gyro"].columns["rate_degpmin"] *= 1.04
+    faults = ingested(parts)
+    assert {kind for kind, _ in faults} <= {"yaw_rate_scale", "yaw_rate_bias"}
+    assert len(faults) < 2
+
+
+def test_gaps_spikes_and_held_values_are_no_delay():
+    table = in_body_axes(6, late={"yaw_rate": 0.5})
+    marks, heading = table["quality"].to_numpy().copy(), table["heading"].to_numpy().copy()
+    heading[1000:1030] = np.nan
+    marks[1000:1030] = int(Quality.GAP)
+    heading[2000:2003] += 1.0
+    marks[2000:2003] = int(Quality.SPIKE)
+    heading[3000:3020] = heading[3000]
+    marks[3000:3020] = int(Quality.HELD)
+    faults = found(
+        table.with_columns(quality=marks, heading=heading).with_columns(
+            pl.col("heading").fill_nan(None)
+        )
+    )
+    assert set(faults) == {("clock_offset", "yaw_rate")}
+    assert holds(faults["clock_offset", "yaw_rate"], 0.5)
+
+
+def test_too_short_a_voyage_says_nothing():
+    assert parity.estimates(in_body_axes(7, seconds=40.0), BODY) == []
+
+
+def test_eight_hours_take_seconds():
+    hours = pl.concat([in_body_axes(8, late={"yaw_rate": 0.5})] * 32)
+    began = time.perf_counter()
+    assert ("clock_offset", "yaw_rate") in found(hours)
+    assert time.perf_counter() - began < 15.0  # 2 s on an idle machine
