@@ -52,7 +52,7 @@ def trials(folder: Path, out: Path, seeds: int) -> str:
     refit = physics(store, out / "refit", split)
     folds = physics(store, out / "folds", Split(training=every, validation=()))
     held = pl.read_parquet(folds / "cross_validation.parquet").filter(held_out="voyages")
-    start, found = (float(held[name].mean()) for name in ("start", "loss"))  # type: ignore[arg-type]
+    start, found = (float(held[name].mean()) for name in ("start", "loss"))  # type: ignore[arg-type]  # polars types a mean as anything
     test = losses([published, refit], store, split.test)
     lines = [
         "Wakita's split, six test files:", "", relative(test), "",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import polars as pl
 
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
-from pipelines.split import choose_physical_split, plan, refuse_shared_rows
+from pipelines.split import choose_physical_split, plan, refuse_shared_rows, say
 from shiplog import band, identifiability, identify, report, residual, runs, table, windows
 from shiplog import seeds as streams
 from shiplog.config import Config
@@ -27,6 +27,7 @@ from shiplog.profile import Profile
 from shiplog.runs import Run
 from shiplog.sensitivity import Series, Simulator, losses, rollout, series
 from shiplog.store import Store
+from shiplog.windows import AUGMENTATIONS
 
 log = logging.getLogger(__name__)
 
@@ -85,8 +86,14 @@ def identify_run(
         said = _keep(run, ready)
         return run.finish(provenance(store, split, began)), said
 
+    kept: dict[bytes, Identified] = {}
+
     def refit(part: Series) -> Identified:
-        return _physics(ready, part)
+        """The physics without some windows: asked for again by every strength of a network."""
+        key = part.weight.tobytes()
+        if key not in kept:
+            kept[key] = _physics(ready, part)
+        return kept[key]
 
     found = refit(ready.data)
     before = losses(ready.model, ready.start.values, ready.data)
@@ -115,7 +122,7 @@ def identify_run(
     validated = by_voyage
     for seed in config.seeds:
         if config.model == "hybrid":
-            sentence, validated = _hybrid(run, ready, found, by_voyage, held, seed)
+            sentence, validated = _hybrid(run, ready, refit, by_voyage, held, seed)
             said.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
@@ -238,13 +245,13 @@ def _physics(ready: Prepared, part: Series) -> Identified:
 def _hybrid(
     run: Run,
     ready: Prepared,
-    found: Identified,
+    refit: Callable[[Series], Identified],
     by_voyage: CrossValidated | None,
     held: pl.DataFrame,
     seed: int,
 ) -> tuple[str, CrossValidated | None]:
     """Choose how much the network may say on voyages it has not seen, then fit it on all."""
-    settings = run.config.physics
+    settings, found = run.config.physics, refit(ready.data)
 
     def fitted(part: Series, physics: Identified, strength: float) -> tuple[Simulator, Identified]:
         model, done = residual.fit(
@@ -260,7 +267,7 @@ def _hybrid(
         judged[0.0].append(by_voyage.loss)
         for strength in settings.strengths:
             one = cross_validate(
-                lambda part, s=strength: fitted(part, _physics(ready, part), s)[0],
+                lambda part, s=strength: fitted(part, refit(part), s)[0],
                 ready.data, ready.voyages, settings.folds,
             )  # fmt: skip
             assert one is not None
@@ -290,7 +297,7 @@ def _hybrid(
             f"Network of strength {best:g}: L {whole[best].mean():.0f} on {len(whole[best])} "
             f"held-out windows, physics alone {whole[0.0].mean():.0f}."
         )
-    net = simulator.model.residual  # type: ignore[attr-defined]
+    net = simulator.model.residual  # type: ignore[attr-defined]  # of a Hybrid, as `fitted` made it
     fixed = {n: getattr(net, n) for n in ("mean", "std", "bound", "anchors", "radius", "limit")}
     save(run, seed, ready, simulator, done, fixed)
     return f"Seed {seed}: {said}", validated.get(best)
@@ -381,12 +388,14 @@ def identify_command(
     if model == "mmg" and seeds > 1:
         log.info("an identification draws nothing: one seed stands for all")
         seeds = 1
+    if AUGMENTATIONS[data].copies:
+        raise RunError(
+            f"--data {data} is of noisy copies, which an identification has no use for.",
+            hint="choose ref, sli2, sli10 or d-ref.",
+        )
     store = Store(store_path)
     split = choose_physical_split(store, voyages, validation, data, window)
-    log.info(
-        "split by %s: training %s; validation %s; test %s",
-        split.chosen_by, listed(split.training), listed(split.validation), listed(split.test),
-    )  # fmt: skip
+    say(split)
     config = Config.model_validate(
         {
             "model": model,

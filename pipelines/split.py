@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 
 import polars as pl
@@ -9,9 +10,11 @@ import polars as pl
 from pipelines.prepare import seconds
 from shiplog import table, windows
 from shiplog.config import Split
-from shiplog.exceptions import StoreError
+from shiplog.exceptions import StoreError, listed
 from shiplog.store import Store
 from shiplog.windows import AUGMENTATIONS
+
+log = logging.getLogger(__name__)
 
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
@@ -109,6 +112,17 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     return Split(
         **{side: tuple(members) for side, members in sides.items()},
         chosen_by="whole voyages dealt out in order of time",
+    )
+
+
+def say(split: Split) -> None:
+    """What was chosen, on the progress log."""
+    log.info(
+        "split by %s: training %s; validation %s; test %s",
+        split.chosen_by,
+        listed(split.training),
+        listed(split.validation),
+        listed(split.test),
     )
 
 

@@ -18,7 +18,7 @@ import torch
 
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
-from pipelines.split import choose_split, plan, refuse_shared_rows
+from pipelines.split import choose_split, plan, refuse_shared_rows, say
 from shiplog import band, engine, runs, seeds, train, windows
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed, nearest
@@ -182,13 +182,7 @@ def train_command(
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
-    log.info(
-        "split by %s: training %s; validation %s; test %s",
-        split.chosen_by,
-        listed(split.training),
-        listed(split.validation),
-        listed(split.test),
-    )
+    say(split)
     config = Config.model_validate(
         {
             "model": model,

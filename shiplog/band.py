@@ -41,7 +41,7 @@ def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float =
              2005) with each voyage one observation, since what one voyage brings (her wind, her
              water) errs in all of her windows; with few voyages no further than MOST.
 
-    Rollouts that diverged count as outside of any band and widen it no further.
+    Rollouts that diverged are left out: no band would hold them.
     """
     good = (np.abs(error) < 1e6).all((1, 2))
     if not good.any():

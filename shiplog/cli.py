@@ -283,6 +283,16 @@ def train(
         )
         _answer(found.text, found.content, json_to)
         return
+    for option, given in (
+        ("--no-fit", not fit),
+        ("--parameters", parameters),
+        ("--without", without),
+        ("--free", free),
+    ):
+        if given:
+            raise ShiplogError(
+                f"{option} says nothing to a network.", hint="it goes with --model mmg or hybrid."
+            )
     answer = train_command(
         store,
         out,

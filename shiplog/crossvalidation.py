@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
-from shiplog.sensitivity import Series, Simulator, rollout, spread
+from shiplog.sensitivity import Series, Simulator, pick, rollout, spread, state_losses
 
 FOLDS = 5
 WORKERS = 2  # fits at a time; compiled rollouts leave Python's lock
@@ -60,9 +59,7 @@ def cross_validate(
         found = fit(data._replace(weight=np.where(held, 0.0, data.weight)))
         states = rollout(found.model, found.theta, data)
         own = np.zeros_like(states)
-        unsure = np.where(held)[0]
-        chosen = Series(*(values[unsure] for values in data))
-        own[unsure] = spread(found.model, found.theta, found.covariance, chosen)
+        own[held] = spread(found.model, found.theta, found.covariance, pick(data, held))
         return states, own
 
     with ThreadPoolExecutor(WORKERS) as pool:
@@ -70,10 +67,4 @@ def cross_validate(
     states, own = np.empty_like(data.measured), np.zeros_like(data.measured)
     for held, (simulated, unsure) in zip(parts, results, strict=True):
         states[held], own[held] = simulated[held], unsure[held]
-    rows = list(VELOCITY_IN_STATE)
-    error = (states[..., rows] - data.measured[..., rows]) * np.array(VELOCITY_WEIGHTS)
-    with np.errstate(over="ignore", invalid="ignore"):
-        loss = (data.steps[..., None] * error**2).sum((1, 2))
-    return CrossValidated(
-        np.array(list(groups)), states, own, np.where(np.isfinite(loss), loss, np.inf)
-    )
+    return CrossValidated(np.array(list(groups)), states, own, state_losses(states, data))

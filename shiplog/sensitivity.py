@@ -287,7 +287,12 @@ def normal(
 
 def losses(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
     """L of each window [N], infinite where the rollout diverges."""
-    error = rollout(model, theta, data)[..., VELOCITY] - data.measured[..., VELOCITY]
+    return state_losses(rollout(model, theta, data), data)
+
+
+def state_losses(states: np.ndarray, data: Series) -> np.ndarray:
+    """The same of states [N, I, 6] that are simulated already."""
+    error = states[..., VELOCITY] - data.measured[..., VELOCITY]
     with np.errstate(over="ignore", invalid="ignore"):
         each = (data.steps[..., None] * (error * np.array(VELOCITY_WEIGHTS)) ** 2).sum((1, 2))
     return np.where(np.isfinite(each), each, np.inf)

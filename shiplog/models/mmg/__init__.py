@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import jax
 
-jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
+from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
+from shiplog.models.mmg.model import MMG
+from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning
 
-from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of  # noqa: E402
-from shiplog.models.mmg.model import MMG  # noqa: E402
-from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning  # noqa: E402
+jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
 __all__ = [
     "MMG",
