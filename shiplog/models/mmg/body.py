@@ -25,10 +25,15 @@ def accelerations(
     (m + m_y) v̇ + (m + m_x) u r + x_G m ṙ = Y
     (I + J + x_G² m) ṙ + x_G m (v̇ + u r) = N
     """
-    m, x_g = g.mass, g.x_g
+    m, moment = g.mass, g.x_g * g.mass
     m_x, m_y, yaw = masses(p, g)
-    surge = (force[..., 0] + (m + m_y) * v * r + x_g * m * r * r) / (m + m_x)
-    a, b, c = m + m_y, x_g * m, yaw + x_g**2 * m
+    c = yaw + g.x_g**2 * m
+    if "load.mass" in p:  # a load that stands at moment/mass; smooth where there is none
+        load, turning = p["load.mass"], p["load.moment"]
+        m, moment = m + load, moment + turning
+        c = c + turning**2 * load / (load**2 + 1e-6 * g.mass**2)
+    surge = (force[..., 0] + (m + m_y) * v * r + moment * r * r) / (m + m_x)
+    a, b = m + m_y, moment
     across = force[..., 1] - (m + m_x) * u * r
     turning = force[..., 2] - b * u * r
     determinant = a * c - b * b

@@ -39,7 +39,13 @@ class MMG:
         actuator   [..., A]   the profile's order [rad, rev/s or 1]
         true_wind  [..., 2]   where it comes from, along x₀ and y₀ [m/s]
         """
-        g, p = self.geometry, named(self.names, theta)
+        return self.forces_of(named(self.names, theta), state, actuator, true_wind)
+
+    def forces_of(
+        self, p: Mapping[str, Array], state: Array, actuator: Array, true_wind: Array
+    ) -> dict[str, Array]:
+        """The same of coefficients by name."""
+        g = self.geometry
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
         found = {"hull": hull.hull(p, g, u, v, r)}
         screws = [_screw(p, g, s, u, v, r, actuator) for s in g.propellers]
@@ -57,8 +63,13 @@ class MMG:
 
     def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3] in m/s² and rad/s²; arguments as for `forces`."""
-        force = total(self.forces(theta, state, actuator, true_wind).values())
-        p = named(self.names, theta)
+        return self.acceleration_of(named(self.names, theta), state, actuator, true_wind)
+
+    def acceleration_of(
+        self, p: Mapping[str, Array], state: Array, actuator: Array, true_wind: Array
+    ) -> Array:
+        """The same of coefficients by name; "load.mass" and "load.moment" [kg, kg m] may join."""
+        force = total(self.forces_of(p, state, actuator, true_wind).values())
         u, v, r = state[..., 1], state[..., 3], state[..., 5]
         return body.accelerations(p, self.geometry, u, v, r, force)
 

@@ -1,0 +1,182 @@
+"""What a cause is: a name, a story, numbers that are zero where it is absent, and a hook.
+
+A cause stands around any dynamic model. It may say what the instruments should have shown and
+what the actuators really did (`read`), how the water moves (`water`), which coefficients of the
+ship are others (`coefficients`), or which force is there besides (`force`). All numbers zero is
+the model as it was, exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from shiplog.profile import Profile
+from shiplog.record import Record
+
+DEGREE = math.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a cause, in SI; zero where the cause is absent.
+
+    prior      its realistic size
+    least      below this it is there but does not matter: a trace
+    of         "speed", "length", "mass": prior and least are shares of the ship's
+    low, high  beyond, it means nothing
+    """
+
+    name: str
+    unit: str
+    prior: float
+    least: float
+    of: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a cause knows of ship and place, besides its numbers.
+
+    scale   "speed" (root mean square of the campaigns, m/s), "length" (m), "mass" (kg) and
+            "moment", their product
+    places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
+    """
+
+    profile: Profile
+    scale: Mapping[str, float]
+    places: np.ndarray
+    spacing: float
+
+    def prior(self, parameter: Parameter) -> float:
+        return parameter.prior * self.scale.get(parameter.of, 1.0)
+
+    def least(self, parameter: Parameter) -> float:
+        return parameter.least * self.scale.get(parameter.of, 1.0)
+
+    def bounds(self, parameter: Parameter) -> tuple[float, float]:
+        by = self.scale.get(parameter.of, 1.0)
+        return parameter.low * by, parameter.high * by
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One of the contract's parameters, from fitted numbers."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    def as_json(self) -> dict:
+        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Frozen and hashable: a model extended by causes is compiled once."""
+
+    name: ClassVar[str]
+    kind: ClassVar[str]  # environment, ship or sensor
+    story: ClassVar[str]
+    equation: ClassVar[str]  # what it adds to the equations of motion or of the instruments
+    parameters: ClassVar[tuple[Parameter, ...]]
+    separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
+    absorbed: ClassVar[bool] = False  # by any model that is fitted to the affected data
+    moves: ClassVar[bool] = True  # False where only a reading is wrong, not the motion
+    user: ClassVar[bool] = False
+
+    @property
+    def label(self) -> str:
+        """Unique in the catalogue: the name, and what of it where there are several."""
+        return self.name
+
+    @property
+    def count(self) -> int:
+        return len(self.parameters)
+
+    def on(self, setting: Setting) -> Cause:
+        """The cause as this ship has it: one rudder has one offset, two have two."""
+        return self
+
+    def missing(self, setting: Setting) -> str | None:
+        """Why it cannot be tested on this ship; None where it can."""
+        return None
+
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        """Numbers that the force needs and nobody fits."""
+        return {}
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        """[count] realistic size of each number."""
+        return np.array([setting.prior(p) for p in self.parameters])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        both = [setting.bounds(p) for p in self.parameters]
+        return np.array([b[0] for b in both]), np.array([b[1] for b in both])
+
+    # --- hooks ---
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        """What was, of what was recorded: sensors put right, actuators as they acted."""
+        return record
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        """The numbers whose `read` undoes this one's: what the instruments will show."""
+        return -p
+
+    def water(self, p: Any) -> tuple[Any, Any] | None:
+        """Velocity of the water along x₀ and y₀ [m/s]."""
+        return None
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        """The ship's coefficients with the cause in them. `share`: of the campaign, 0 to 1."""
+        return c
+
+    def force(self, p: Any, state: Any, at: dict) -> Any | None:
+        """X, Y, N [..., 3] at midship besides the ship's own [N, N, N m]."""
+        return None
+
+    # --- words ---
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        """The contract's parameters and units, of numbers [..., count]."""
+        return {
+            q.name: (p[..., i] / _unit(q.unit), q.unit) for i, q in enumerate(self.parameters)
+        }
+
+    def told(self, p: np.ndarray, covariance: np.ndarray, draws: int = 4000) -> dict[str, Shown]:
+        """The contract's parameters with 90 % intervals."""
+        rng = np.random.default_rng(0)
+        root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(p)))
+        many = self.shown(p + rng.standard_normal((draws, len(p))) @ root.T)
+        found = {}
+        for name, (value, unit) in self.shown(np.asarray(p, dtype=float)).items():
+            spread = many[name][0] - value
+            if unit == "deg":
+                spread = (spread + 180.0) % 360.0 - 180.0
+            low, high = np.quantile(spread, (0.05, 0.95))
+            middle = float(value)
+            found[name] = Shown(
+                middle, middle + min(float(low), 0.0), middle + max(float(high), 0.0), unit
+            )
+        return found
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        said = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in shown.items())
+        return f"{self.story} {said}."
+
+    def practical(self, p: np.ndarray, setting: Setting) -> bool:
+        """Whether any of its numbers is large enough to matter."""
+        least = np.array([setting.least(q) for q in self.parameters])
+        return bool((np.abs(p) >= least).any())
+
+
+def _unit(unit: str) -> float:
+    return {"deg": DEGREE, "deg/s": DEGREE}.get(unit, 1.0)

@@ -1,0 +1,200 @@
+"""Causes in the instruments: what they show is not what was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shiplog.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.record import Record, reduced, sighted
+
+
+@dataclass(frozen=True)
+class HeadingOffset(Cause):
+    name = "heading_offset"
+    kind = "sensor"
+    story = "The compass stands beside the ship's axis."
+    equation = "ψ_measured = ψ {angle:+.2f} deg"
+    parameters = (Parameter("angle", "deg", np.radians(3.5), np.radians(0.25)),)
+    separated_by = {
+        "current": "one full slow turn, or the same course out and back",
+        "rudder_offset": "hover and coasting with the screw stopped: the rudders' offset vanishes",
+    }
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = sighted(record)
+        return reduced(record, replace(seen, heading=seen.heading - p[0]))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."
+
+
+@dataclass(frozen=True)
+class YawRateBias(Cause):
+    name = "yaw_rate_bias"
+    kind = "sensor"
+    story = "The gyro shows a turn where there is none."
+    equation = "r_measured = r {value:+.3f} deg/s"
+    parameters = (Parameter("value", "deg/s", np.radians(0.3), np.radians(0.01)),)
+    separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
+    moves = False
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = sighted(record)
+        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate - p[0]))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The yaw rate shows {shown['value'].value:+.3f} deg/s too much."
+
+
+@dataclass(frozen=True)
+class YawRateScale(Cause):
+    name = "yaw_rate_scale"
+    kind = "sensor"
+    story = "The gyro shows more or less than the ship turns."
+    equation = "r_measured = {value:.3f} r"
+    parameters = (Parameter("value", "1", 0.065, 0.003, low=-0.9),)
+    separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
+    moves = False
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = sighted(record)
+        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate / (1.0 + p[0])))
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        return -p / (1.0 + p)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"value": (1.0 + p[..., 0], "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The yaw rate shows {shown['value'].value:.3f} times what the ship turns."
+
+
+@dataclass(frozen=True)
+class ClockOffset(Cause):
+    """One channel is late against the heading; `gnss` is position and velocity together."""
+
+    channel: str = "gnss"
+
+    name = "clock_offset"
+    kind = "sensor"
+    story = "A channel's clock is off."
+    equation = "measured(t) = true(t - {time:.2f} s)"
+    parameters = (Parameter("time", "s", 0.8, 0.04, low=-5.0, high=5.0),)
+    separated_by = {
+        "antenna_offset": "spin on the spot against straight acceleration",
+        "clock_offset": "hard acceleration on a straight course",
+    }
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self.channel}"
+
+    def missing(self, setting: Setting) -> str | None:
+        if self.channel == "wind" and not setting.profile.has_wind:
+            return "no wind is recorded"
+        if self.channel == "yaw_rate" and setting.profile.sensors.yaw_rate is None:
+            return "no yaw rate is recorded"
+        return None
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        late = float(p[0])
+        if self.channel == "wind":
+            return replace(record, wind=record.later(record.wind, late))
+        seen = sighted(record)
+        if self.channel in ("position", "gnss"):
+            seen = replace(seen, position=record.later(seen.position, late))
+        if self.channel in ("velocity", "gnss"):
+            seen = replace(seen, velocity=record.later(seen.velocity, late))
+        if self.channel == "yaw_rate":
+            seen = replace(seen, yaw_rate=record.later(seen.yaw_rate, late))
+        return reduced(record, seen)
+
+    def told(self, p: np.ndarray, covariance: np.ndarray, draws: int = 4000) -> dict:
+        return super().told(p, covariance, draws)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        late = shown["time"].value
+        what = {"gnss": "position and velocity", "yaw_rate": "the yaw rate"}.get(
+            self.channel, f"the {self.channel}"
+        )
+        what = what[0].upper() + what[1:]
+        ending = "" if self.channel == "gnss" else "s"
+        return (
+            f"{what} come{ending} {abs(late):.2f} s {'after' if late > 0 else 'before'} the "
+            "heading."
+        )
+
+
+@dataclass(frozen=True)
+class AntennaOffset(Cause):
+    name = "antenna_offset"
+    kind = "sensor"
+    story = "The antenna stands elsewhere than the profile has it."
+    equation = "antenna at profile + ({x:+.2f}, {y:+.2f}) m"
+    parameters = (
+        Parameter("x", "m", 0.25, 0.015, of="length"),
+        Parameter("y", "m", 0.1, 0.015, of="length"),
+    )
+    separated_by = {"clock_offset": "spin on the spot against straight acceleration"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return reduced(record, sighted(record), (float(p[0]), float(p[1])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        x, y = shown["x"].value, shown["y"].value
+        return (
+            f"The antenna is {abs(x):.2f} m {'ahead' if x >= 0 else 'astern'} and {abs(y):.2f} m "
+            f"to {'starboard' if y >= 0 else 'port'} of where the profile has it."
+        )
+
+
+@dataclass(frozen=True)
+class WindDirectionOffset(Cause):
+    name = "wind_direction_offset"
+    kind = "sensor"
+    story = "The anemometer is turned on its mast."
+    equation = "γ_measured = γ_A {angle:+.1f} deg"
+    parameters = (Parameter("angle", "deg", np.radians(15.0), np.radians(1.5)),)
+    separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if setting.profile.has_wind else "no wind is recorded"
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        c, s = np.cos(p[0]), np.sin(p[0])
+        ahead, starboard = record.wind[:, 0], record.wind[:, 1]
+        turned = np.stack((c * ahead + s * starboard, c * starboard - s * ahead), -1)
+        return replace(record, wind=turned)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The wind's direction shows {shown['angle'].value:+.1f} deg too much."
+
+
+@dataclass(frozen=True)
+class WindSpeedScale(Cause):
+    name = "wind_speed_scale"
+    kind = "sensor"
+    story = "The anemometer shows more or less than blows."
+    equation = "U_measured = {value:.2f} U_A"
+    parameters = (Parameter("value", "1", 0.22, 0.02, low=-0.9),)
+    separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
+    absorbed = True
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if setting.profile.has_wind else "no wind is recorded"
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return replace(record, wind=record.wind / (1.0 + p[0]))
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        return -p / (1.0 + p)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"value": (1.0 + p[..., 0], "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The wind speed shows {shown['value'].value:.2f} times what blows."

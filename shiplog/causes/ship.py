@@ -1,0 +1,298 @@
+"""Causes in the ship herself: hull, load, screws, rudders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from shiplog.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.profile import Profile
+from shiplog.record import Record
+
+THRUST = ("propeller.k0", "propeller.k1", "propeller.k2", "propeller.c3", "propeller.c6",
+          "propeller.c7", "thruster.ahead", "thruster.astern")  # fmt: skip
+
+
+def _times(c: dict, names: tuple[str, ...], factor: Any) -> dict:
+    return c | {name: c[name] * factor for name in names if name in c}
+
+
+def _columns(profile: Profile, kind: str) -> list[int]:
+    return [i for i, a in enumerate(profile.actuators) if a.kind == kind]
+
+
+@dataclass(frozen=True)
+class _Factor(Cause):
+    """Coefficients times one factor."""
+
+    scaled: ClassVar[tuple[str, ...]]
+    kind = "ship"
+    parameters = (Parameter("factor", "1", 0.4, 0.04, low=-1.0),)
+    absorbed = True
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _times(c, self.scaled, 1.0 + p[0])
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"factor": (1.0 + p[..., 0], "1")}
+
+
+@dataclass(frozen=True)
+class Fouling(_Factor):
+    name = "fouling"
+    story = "The hull has grown rough."
+    equation = "X'₀·{factor:.2f}"
+    scaled = ("hull.x_0f", "hull.x_0a")
+    parameters = (Parameter("factor", "1", 0.6, 0.06, low=-1.0),)
+    separated_by = {
+        "thrust_loss": "bollard pull (high revolutions at rest) against coasting (screw stopped)"
+    }
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The hull resists {shown['factor'].value:.2f} times as much as it did."
+
+
+@dataclass(frozen=True)
+class CrossFlowDrag(_Factor):
+    name = "cross_flow_drag"
+    story = "The hull resists being pushed sideways otherwise than the model has it."
+    equation = "C_D·{factor:.2f}"
+    scaled = ("hull.c_d",)
+    parameters = (Parameter("factor", "1", 0.35, 0.03, low=-1.0),)
+    separated_by = {
+        "shallow_water": "the same manoeuvre at two places",
+        "payload": "step of the screw from rest (inertia) against a pure decay of sway",
+    }
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"Cross-flow drag is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class RudderForce(_Factor):
+    name = "rudder_force"
+    story = "The rudders are stronger or weaker than the model has them."
+    equation = "F_N, F_T·{factor:.2f}"
+    scaled = ("rudder.f_alpha", "rudder.f_t")
+    parameters = (Parameter("factor", "1", 0.2, 0.02, low=-1.0),)
+    separated_by = {"thrust_loss": "steady speed on a straight course, rudders amidships"}
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if _columns(setting.profile, "rudder") else "the ship has no rudder"
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The rudders' force is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class ThrustLoss(_Factor):
+    name = "thrust_loss"
+    story = "The screw pushes less than it did."
+    equation = "K_T·{factor:.2f}"
+    scaled = THRUST
+    parameters = (Parameter("factor", "1", 0.2, 0.02, low=-1.0),)
+    separated_by = {
+        "fouling": "bollard pull (high revolutions at rest) against coasting (screw stopped)",
+        "payload": "step of the screw from rest (inertia) against steady speed",
+        "thrust_drift": "the same run at the beginning and at the end",
+    }
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if _screws(setting.profile) else "the ship has no screw or thruster"
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The thrust is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class ThrustDrift(Cause):
+    name = "thrust_drift"
+    kind = "ship"
+    story = "The screw pushes less from voyage to voyage."
+    equation = "K_T·(1 {slope:+.2f} · share of the campaign)"
+    parameters = (Parameter("slope", "1", 0.25, 0.025, low=-1.0),)
+    separated_by = {"thrust_loss": "the same run at the beginning and at the end"}
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if _screws(setting.profile) else "the ship has no screw or thruster"
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _times(c, THRUST, 1.0 + p[0] * share)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return (
+            f"The thrust changes by {100.0 * shown['slope'].value:+.0f} % from the beginning of "
+            "the campaign to its end."
+        )
+
+
+def _screws(profile: Profile) -> list[int]:
+    return _columns(profile, "propeller") + _columns(profile, "thruster")
+
+
+@dataclass(frozen=True)
+class Payload(Cause):
+    """A load on board: mass, and with it inertia, where it stands. Her draught stays."""
+
+    name = "payload"
+    kind = "ship"
+    story = "The ship carries a load."
+    equation = "m + {mass:.1f} kg at {position:+.2f} m"
+    parameters = (
+        Parameter("mass", "kg", 0.15, 0.015, of="mass", low=-0.5),
+        Parameter("moment", "kg m", 0.04, 0.004, of="moment"),
+    )
+    separated_by = {
+        "thrust_loss": "step of the screw from rest (inertia) against steady speed",
+        "cross_flow_drag": "step of the screw from rest (inertia) against a pure decay of sway",
+    }
+    absorbed = True
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return c | {"load.mass": p[0], "load.moment": p[1]}
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        mass = p[..., 0]
+        return {
+            "mass": (mass, "kg"),
+            "position": (p[..., 1] / np.where(np.abs(mass) > 1e-9, mass, 1.0), "m"),
+        }
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        at = shown["position"].value
+        return (
+            f"A load of {shown['mass'].value:.3g} kg, {abs(at):.2f} m "
+            f"{'ahead of' if at >= 0 else 'abaft'} midship."
+        )
+
+
+@dataclass(frozen=True)
+class _OnRudders(Cause):
+    kind = "ship"
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if _columns(setting.profile, "rudder") else "the ship has no rudder"
+
+    def _with(self, record: Record, acting: np.ndarray) -> Record:
+        actuator = record.actuator.copy()
+        actuator[:, _columns(record.profile, "rudder")] = acting
+        return replace(record, actuator=actuator)
+
+    def _recorded(self, record: Record) -> np.ndarray:
+        return record.actuator[:, _columns(record.profile, "rudder")]
+
+
+@dataclass(frozen=True)
+class RudderOffset(_OnRudders):
+    """Up to two groups of rudders: those to port of the centreline, and the others."""
+
+    groups: tuple[str, ...] = ("port", "starboard")
+
+    name = "rudder_offset"
+    story = "The rudders stand beside where they are recorded."
+    equation = "δ = δ_recorded + offset"
+    parameters = ()
+    separated_by = {
+        "heading_offset": "hover and coasting with the screw stopped: the offset then vanishes"
+    }
+
+    @property
+    def count(self) -> int:
+        return len(self.groups)
+
+    def on(self, setting: Setting) -> Cause:
+        columns = _columns(setting.profile, "rudder")
+        aside = [setting.profile.actuators[i].position_m[1] for i in columns]
+        paired = min(aside, default=0.0) < 0.0 < max(aside, default=0.0)
+        return RudderOffset(("port", "starboard") if paired else ("angle",))
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.full(self.count, np.radians(5.0))
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(self.count, -np.radians(40.0)), np.full(self.count, np.radians(40.0))
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        columns = _columns(record.profile, "rudder")
+        if self.count == 1:
+            each = np.full(len(columns), p[0])
+        else:
+            aside = [record.profile.actuators[i].position_m[1] for i in columns]
+            each = np.array([p[0] if y < 0.0 else p[1] for y in aside])
+        return self._with(record, self._recorded(record) + each)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {name: (np.degrees(p[..., i]), "deg") for i, name in enumerate(self.groups)}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        said = " and ".join(
+            (f"{name} rudder " if self.count > 1 else "") + f"{v.value:+.1f} deg"
+            for name, v in shown.items()
+        )
+        return f"The rudders stand {said} off what is recorded."
+
+    def practical(self, p: np.ndarray, setting: Setting) -> bool:
+        return bool(np.abs(p).max() > np.radians(0.3))
+
+
+@dataclass(frozen=True)
+class RudderLag(_OnRudders):
+    name = "rudder_lag"
+    story = "The rudders follow what is recorded with a lag of the first order."
+    equation = "T δ̇ = δ_recorded - δ,  T = {time:.2f} s"
+    parameters = (Parameter("time", "s", 2.0, 0.1, low=0.0, high=20.0),)
+    separated_by = {"rudder_delay": "rudder doublets of 2 to 4 s at constant revolutions"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The rudders follow their record with a lag of {shown['time'].value:.2f} s."
+
+
+def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
+    """First-order lag of values [n, k] that go straight from row to row, exactly.
+
+    A negative time is the first-order lead, which a derivative about zero needs.
+    """
+    rate = np.gradient(values, record.step, axis=0)
+    starts = record.starts
+    rate[starts] = 0.0
+    if abs(time) < 0.5 * record.step:
+        return values - time * rate
+    if time < 0.0:
+        return values - time * rate
+    from scipy.signal import lfilter
+
+    decay = np.exp(-record.step / time)
+    # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact
+    b1 = 1.0 - time / record.step * (1.0 - decay)
+    b0 = 1.0 - decay - b1
+    out = np.empty_like(values)
+    at = np.append(np.flatnonzero(starts), len(values))
+    for a, b in zip(at[:-1], at[1:], strict=True):
+        x = values[a:b]
+        if len(x) == 0:
+            continue
+        # begins in balance with its first row
+        state = (x[:1] - b1 * x[:1]).copy()
+        out[a:b] = lfilter([b1, b0], [1.0, -decay], x, axis=0, zi=state)[0]
+    return out
+
+
+@dataclass(frozen=True)
+class RudderDelay(_OnRudders):
+    name = "rudder_delay"
+    story = "The rudders act later than they are recorded."
+    equation = "δ(t) = δ_recorded(t - {time:.2f} s)"
+    parameters = (Parameter("time", "s", 1.3, 0.1, low=0.0, high=10.0),)
+    separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return self._with(record, record.later(self._recorded(record), -float(p[0])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The rudders act {shown['time'].value:.2f} s later than they are recorded."

@@ -1,0 +1,142 @@
+"""What the segments say of every hypothesis at once: algebra on one pass of sensitivities.
+
+    e_s = Z_s z_s + J_s d + ε,  ε ~ N(0, R),  z = (start, acceleration at the knots)
+
+The start is free, the acceleration is what no model of this ship explains: an Ornstein-Uhlenbeck
+process whose size is learned where the model was made (Kennedy & O'Hagan 2001). Both are
+eliminated segment by segment; what is left of all data is one small matrix over [e | J].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shiplog.segments import KNOT, Linear
+
+LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
+
+
+@dataclass(frozen=True)
+class Unrest:
+    """Sizes of what is random.
+
+    noise   [6]  of one observation (2 s), channels.STATE
+    push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
+    time         s over which that stays
+    start   [6]  how free the initial state is
+    """
+
+    noise: np.ndarray
+    push: np.ndarray
+    time: float
+    start: np.ndarray
+
+    def louder(self, factor: float) -> Unrest:
+        return replace(self, push=self.push * factor)
+
+    def precision(self, knots: int) -> tuple[np.ndarray, float]:
+        """Of z [Z, Z], and its log determinant."""
+        at = np.arange(knots) * KNOT
+        kernel = np.exp(-np.abs(at[:, None] - at) / self.time) + 1e-9 * np.eye(knots)
+        inverse = np.linalg.inv(kernel)
+        size = 6 + 3 * knots
+        whole = np.zeros((size, size))
+        whole[:6, :6] = np.diag(self.start**-2.0)
+        for channel in range(3):
+            part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
+            whole[part, part] = inverse / self.push[channel] ** 2
+        _, of_kernel = np.linalg.slogdet(kernel)
+        logdet = -2.0 * np.log(self.start).sum() - 3.0 * of_kernel
+        logdet -= 2.0 * knots * np.log(self.push).sum()
+        return whole, float(logdet)
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Products of one pass under one noise R; what depends on the push alone comes after.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J]
+    zd      [S, Z, 1 + C]
+    zz      [S, Z, Z]
+    logdet  of R, over the observations used
+    """
+
+    dd: np.ndarray
+    zd: np.ndarray
+    zz: np.ndarray
+    logdet: float
+    knots: int
+
+
+def weighed(linear: Linear, noise: np.ndarray, columns: np.ndarray | None = None) -> Weighed:
+    """`columns`: [S, B, 6, C], where not the linearisation's own."""
+    count = len(linear.e)
+    j = linear.j if columns is None else columns
+    weight = np.where(linear.cut.used, 1.0 / noise, 0.0)[..., None]
+    d = (np.concatenate((linear.e[..., None], j), -1) * weight).reshape(count, -1, 1 + j.shape[-1])
+    z = (linear.z * weight).reshape(count, -1, linear.z.shape[-1])
+    zt = np.swapaxes(z, 1, 2)
+    used = linear.cut.used
+    logdet = 2.0 * float((used * np.log(noise)).sum())
+    return Weighed(np.swapaxes(d, 1, 2) @ d, zt @ d, zt @ z, logdet, (z.shape[-1] - 6) // 3)
+
+
+@dataclass(frozen=True)
+class Gram:
+    """[e | J]ᵀ C⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and log |C| of all."""
+
+    each: np.ndarray
+    logdet: float
+
+    @property
+    def total(self) -> np.ndarray:
+        return self.each.sum(0)
+
+
+def gram(weighed: Weighed, unrest: Unrest) -> Gram:
+    """Start and acceleration eliminated (Woodbury)."""
+    prior, logdet = unrest.precision(weighed.knots)
+    inner = weighed.zz + prior
+    root = np.linalg.cholesky(inner)
+    solved = np.linalg.solve(root, weighed.zd)
+    each = weighed.dd - np.swapaxes(solved, 1, 2) @ solved
+    of_inner = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
+    return Gram(each, weighed.logdet - logdet * len(weighed.zz) + float(of_inner))
+
+
+def learnt(
+    linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12, shrink: float = 1.0
+) -> Unrest:
+    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977).
+
+    d   [C] the numbers of the columns
+    """
+    left = linear.e - linear.j @ d
+    count, size = len(left), linear.z.shape[-1]
+    knots = (size - 6) // 3
+    used = linear.cut.used
+    flat = linear.z.reshape(count, -1, size)
+    for _ in range(rounds):
+        weight = np.where(used, unrest.noise**-2.0, 0.0).reshape(count, -1)
+        prior, _ = unrest.precision(knots)
+        zt = np.swapaxes(flat * weight[..., None], 1, 2)
+        covariance = np.linalg.inv(zt @ flat + prior)
+        z = (covariance @ (zt @ left.reshape(count, -1, 1)))[..., 0]
+        gap = left - (flat @ z[..., None])[..., 0].reshape(left.shape)
+        spread = np.einsum("snz,szy,sny->sn", flat, covariance, flat).reshape(left.shape)
+        squares = np.where(used, gap**2 + spread, 0.0).sum((0, 1))
+        noise = np.maximum(np.sqrt(squares / np.maximum(used.sum((0, 1)), 1)), LEAST)
+        at = np.arange(knots) * KNOT
+        kernel = np.exp(-np.abs(at[:, None] - at) / unrest.time) + 1e-9 * np.eye(knots)
+        inverse = np.linalg.inv(kernel)
+        push = np.empty(3)
+        for channel in range(3):
+            part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
+            own = z[:, part]
+            second = np.einsum("si,ij,sj->", own, inverse, own)
+            second += np.einsum("ij,sji->", inverse, covariance[:, part, part])
+            push[channel] = np.sqrt(second / (count * knots))
+        unrest = replace(unrest, noise=noise, push=push)
+    return unrest

@@ -1,0 +1,109 @@
+"""A dynamic model and the causes that were found to be missing in it.
+
+Coefficients are those of an MMG. Around a model that has none (a network), the same change of an
+MMG of the ship's sizes is added to what the model says: ν̇ = f + [g(c') - g(c)].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from shiplog.causes.base import Cause
+from shiplog.models.mmg import body
+from shiplog.models.mmg.model import MMG, named
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["base", "constants", "stand_in_values"],
+    meta_fields=["causes", "stand_in"],
+)
+@dataclass(frozen=True)
+class Extended:
+    """θ is the base's, then the causes' numbers, one cause after another.
+
+    base             any physical model; MMG itself or one with the same protocol
+    stand_in         an MMG of the ship, whose coefficients the causes change
+    stand_in_values  [P'] its coefficients where the base is no MMG
+    constants        what the causes' forces need and nobody fits
+
+    Its actuators carry one column more than the ship's: the share of the campaign, 0 to 1.
+    """
+
+    base: Any
+    causes: tuple[Cause, ...]
+    stand_in: MMG
+    stand_in_values: np.ndarray | Array
+    constants: Mapping[str, np.ndarray | Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (
+            *self.base.names,
+            *(f"{c.label}.{i}" for c in self.causes for i in range(c.count)),
+        )
+
+    @property
+    def substeps(self) -> int:
+        return self.base.substeps
+
+    def numbers(self, theta: Array) -> list[tuple[Array, ...]]:
+        """Of each cause."""
+        at, found = len(self.base.names), []
+        parts = jax.lax.split(theta, [1] * len(theta))
+        for cause in self.causes:
+            found.append(tuple(part[0] for part in parts[at : at + cause.count]))
+            at += cause.count
+        return found
+
+    def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
+        """ν̇ [..., 3] over ground; arguments as for MMG.acceleration."""
+        count = len(self.base.names)
+        values = theta[:count]
+        numbers = self.numbers(theta)
+        share, actuator = actuator[..., -1], actuator[..., :-1]
+        north = east = jnp.zeros(())
+        for cause, p in zip(self.causes, numbers, strict=True):
+            water = cause.water(p)
+            if water is not None:
+                north, east = north + water[0], east + water[1]
+        cos, sin = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
+        ahead, starboard = cos * north + sin * east, cos * east - sin * north
+        x0, u, y0, v, heading, r = (state[..., i] for i in range(6))
+        wet = jnp.stack((x0, u - ahead, y0, v - starboard, heading, r), -1)
+        wind = true_wind + jnp.stack((north, east), -1)
+        before = named(
+            self.stand_in.names, values if isinstance(self.base, MMG) else self.stand_in_values
+        )
+        after = before
+        for cause, p in zip(self.causes, numbers, strict=True):
+            after = cause.coefficients(after, p, wet, share, self.constants)
+        if isinstance(self.base, MMG):
+            acceleration = self.base.acceleration_of(after, wet, actuator, wind)
+        else:
+            acceleration = self.base.acceleration(values, wet, actuator, wind)
+            if after is not before:
+                acceleration = acceleration + (
+                    self.stand_in.acceleration_of(after, wet, actuator, wind)
+                    - self.stand_in.acceleration_of(before, wet, actuator, wind)
+                )
+        forces = [
+            cause.force(p, wet, self.constants)
+            for cause, p in zip(self.causes, numbers, strict=True)
+        ]
+        forces = [f for f in forces if f is not None]
+        if forces:
+            at_rest = jnp.zeros_like(u)
+            acceleration = acceleration + body.accelerations(
+                after, self.stand_in.geometry, at_rest, at_rest, at_rest, sum(forces[1:], forces[0])
+            )
+        turning = jnp.stack((r * starboard, -r * ahead, jnp.zeros_like(r)), -1)
+        return acceleration + turning

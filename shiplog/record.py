@@ -1,0 +1,198 @@
+"""Voyages at 10 Hz as the diagnosis reads them: rows of arrays, unbroken stretches, what was seen.
+
+A rollout of 1 Hz averages knows an instant to half a second; a delay of a rudder or of a clock is
+smaller than that. So the diagnosis reads the recorded rows themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+
+from shiplog import channels, midship
+from shiplog.align import RATE_HZ
+from shiplog.channels import Quality
+from shiplog.profile import Profile
+from shiplog.quality import stretches
+
+STEP_S = 1.0 / RATE_HZ
+FILLED = 20  # rows: a shorter gap is bridged for the inputs, and not scored
+
+
+@dataclass(frozen=True)
+class Record:
+    """Rows [n] of several voyages one after another, SI.
+
+    names      voyages; `voyage` [n] counts in them
+    time       [n]     s into the voyage
+    share      [n]     of the campaign's running time, 0 to 1
+    starts     [n]     bool: begins an unbroken stretch
+    seen       [n]     bool: measured; the other rows are bridged
+    state      [n, 6]  channels.STATE at midship, heading unwrapped within a stretch
+    actuator   [n, A]
+    wind       [n, 2]  apparent wind, where it comes from: ahead and to starboard [m/s]
+    """
+
+    profile: Profile
+    names: tuple[str, ...]
+    voyage: np.ndarray
+    time: np.ndarray
+    share: np.ndarray
+    starts: np.ndarray
+    seen: np.ndarray
+    state: np.ndarray
+    actuator: np.ndarray
+    wind: np.ndarray
+    step: float = STEP_S
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def seconds(self) -> float:
+        return float(self.seen.sum()) * self.step
+
+    @property
+    def firsts(self) -> np.ndarray:
+        """[n] the row at which each row's stretch begins."""
+        at = np.flatnonzero(self.starts)
+        return np.repeat(at, np.diff(np.append(at, len(self))))
+
+    @property
+    def lasts(self) -> np.ndarray:
+        """[n] the row at which each row's stretch ends."""
+        at = np.flatnonzero(self.starts)
+        lengths = np.diff(np.append(at, len(self)))
+        return np.repeat(at + lengths - 1, lengths)
+
+    def later(self, values: np.ndarray, seconds: float) -> np.ndarray:
+        """Values [n, ...] as they stand `seconds` later; at the ends of a stretch they stay."""
+        if seconds == 0.0:
+            return values
+        rows = np.arange(len(self)) + seconds / self.step
+        rows = np.clip(rows, self.firsts, self.lasts)
+        low = np.minimum(rows.astype(int), self.lasts)
+        high = np.minimum(low + 1, self.lasts)
+        part = (rows - low).reshape(-1, *[1] * (values.ndim - 1))
+        return values[low] * (1.0 - part) + values[high] * part
+
+    @property
+    def true_wind(self) -> np.ndarray:
+        """[n, 2] where the wind over ground comes from, along x₀ and y₀ [m/s]."""
+        c, s = np.cos(self.state[:, 4]), np.sin(self.state[:, 4])
+        ahead = self.wind[:, 0] - self.state[:, 1]
+        starboard = self.wind[:, 1] - self.state[:, 3]
+        return np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+
+    def pick(self, voyages: Sequence[str]) -> Record:
+        """The rows of these voyages, shares of the campaign as they were."""
+        keep = np.isin(self.voyage, [self.names.index(v) for v in voyages])
+        arrays = {
+            name: getattr(self, name)[keep]
+            for name in ("voyage", "time", "share", "starts", "seen", "state", "actuator", "wind")
+        }
+        return replace(self, **arrays)
+
+
+def read(tables: Sequence[pl.DataFrame], names: Sequence[str], profile: Profile) -> Record:
+    """Voyages' 10 Hz tables, in order of their time, as one record."""
+    order = np.argsort([t["time"][0].timestamp() for t in tables], kind="stable")
+    parts = [_voyage(tables[i], profile) for i in order]
+    lengths = [len(p["time"]) for p in parts]
+    whole = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
+    voyage = np.repeat(np.arange(len(parts)), lengths)
+    share = (np.arange(sum(lengths)) + 0.5) / max(sum(lengths), 1)
+    return Record(
+        profile=profile, names=tuple(names[i] for i in order), voyage=voyage, share=share, **whole
+    )
+
+
+def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
+    mark = table["quality"].to_numpy()
+    time = table["time"].to_physical().to_numpy()
+    names = [*(c.name for c in channels.STATE), *profile.actuator_names, *profile.wind_names]
+    values = table.select(pl.col(names).cast(pl.Float64).fill_null(np.nan)).to_numpy().copy()
+    seen = ((mark & int(channels.UNUSABLE)) == 0) & np.isfinite(values).all(1)
+    starts = (mark & int(Quality.JUMP)) != 0
+    keep = seen.copy()
+    for a, b in stretches(~seen):
+        keep[a : b + 1] = b - a < FILLED and a > 0 and b < len(seen) - 1
+    count = len(profile.actuator_names)
+    angles = [4, *(6 + i for i, a in enumerate(profile.actuators) if a.kind == "azimuth")]
+    if profile.has_wind:
+        speed, angle = values[:, 6 + count].copy(), values[:, 7 + count].copy()
+        values[:, 6 + count], values[:, 7 + count] = speed * np.cos(angle), speed * np.sin(angle)
+    rows = np.flatnonzero(keep)
+    begins = np.diff(rows, prepend=-2) != 1
+    begins |= starts[rows]
+    known = np.flatnonzero(seen)
+    for column in angles:
+        values[known, column] = np.unwrap(values[known, column])
+    filled = np.stack(
+        [np.interp(rows, known, values[known, i]) for i in range(values.shape[1])], axis=1
+    ) if len(known) else values[rows]  # fmt: skip
+    wind = filled[:, 6 + count :] if profile.has_wind else np.zeros((len(rows), 2))
+    return {
+        "time": (time[rows] - time[0]) * 1e-9 if len(time) else time[rows].astype(float),
+        "starts": begins,
+        "seen": seen[rows],
+        "state": filled[:, :6],
+        "actuator": filled[:, 6 : 6 + count],
+        "wind": wind,
+    }
+
+
+# --- instruments: ingest's way to midship, undone and done again ----------------------------------
+
+
+@dataclass(frozen=True)
+class Sighted:
+    """What the instruments saw: position of the antenna over ground, its velocity [n, 2] (in body
+    axes or over ground, as the profile says), heading and yaw rate [n]."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    heading: np.ndarray
+    yaw_rate: np.ndarray
+
+
+def sighted(record: Record) -> Sighted:
+    sensors = record.profile.sensors
+    state = record.state
+    heading, yaw_rate = state[:, 4], state[:, 5]
+    ahead, aside = sensors.position.lever_arm_m
+    position = midship.position_at_midship(state[:, [0, 2]], heading, (-ahead, -aside))
+    ahead, aside = sensors.velocity.lever_arm_m
+    velocity = midship.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
+    if sensors.kind("velocity") != "body":
+        velocity = midship.to_body(velocity, -heading)
+    return Sighted(position, velocity, heading, yaw_rate)
+
+
+def reduced(
+    record: Record,
+    seen: Sighted,
+    moved: tuple[float, float] = (0.0, 0.0),
+) -> Record:
+    """The record of these sights. `moved`: the antenna, from where the profile has it [m]."""
+    sensors = record.profile.sensors
+    arm = np.array(sensors.position.lever_arm_m)
+    of_velocity = np.array(sensors.velocity.lever_arm_m)
+    shared = bool(np.array_equal(arm, of_velocity))
+    position = midship.position_at_midship(seen.position, seen.heading, tuple(arm + moved))
+    velocity = seen.velocity
+    if sensors.kind("velocity") != "body":
+        velocity = midship.to_body(velocity, seen.heading)
+    velocity = midship.velocity_at_midship(
+        velocity, seen.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
+    )
+    state = np.stack(
+        (
+            position[:, 0], velocity[:, 0], position[:, 1], velocity[:, 1],
+            seen.heading, seen.yaw_rate,
+        ), -1,
+    )  # fmt: skip
+    return replace(record, state=state)

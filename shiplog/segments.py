@@ -1,0 +1,372 @@
+"""Short rollouts along the measured path, and how everything that could be wrong bends them.
+
+A free rollout of a minute loses the path of a ship that turns easily, and its derivatives are
+then of another voyage. So each segment of 30 s is first pulled onto what was measured, by its
+initial state and a slowly varying acceleration; around that path the simulation is linear in all
+that follows: y ≈ y* + Z (z - z*) + J d.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from shiplog.record import Record
+from shiplog.sensitivity import Physical, rate
+
+jax.config.update("jax_enable_x64", True)
+
+SECONDS = 30.0
+BIN = 2.0  # s that one observation averages
+KNOT = 2.0  # s between knots of the acceleration
+NODE_ROWS = 2  # rows of the record to a step of the integration
+CHUNK = 64  # segments at a time
+
+
+@dataclass(frozen=True)
+class Cut:
+    """S segments cut from one record.
+
+    rows    [S]            first row of each
+    y       [S, B, 6]      what was measured, averaged over bins
+    used    [S, B, 6]      bool
+    driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' nodes
+    voyage  [S]
+    """
+
+    rows: np.ndarray
+    y: np.ndarray
+    used: np.ndarray
+    driven: np.ndarray
+    voyage: np.ndarray
+    step: float
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What is the same for every segment: nodes, bins, knots."""
+
+    step: float  # s between rows
+    rows: int  # of a segment, less one
+    nodes: int
+    bins: int
+    knots: int
+
+    @property
+    def weights(self) -> np.ndarray:
+        """[K, J] hat functions of the knots at the nodes."""
+        at = np.arange(self.nodes) * self.step * NODE_ROWS / KNOT
+        return np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
+
+
+def grid(record: Record) -> Grid:
+    rows = round(SECONDS / record.step)
+    return Grid(
+        record.step, rows, rows // NODE_ROWS + 1, round(SECONDS / BIN), round(SECONDS / KNOT) + 1
+    )
+
+
+def begins(record: Record) -> np.ndarray:
+    """Rows at which segments begin: end to end in every unbroken stretch."""
+    size = grid(record).rows
+    at = np.append(np.flatnonzero(record.starts), len(record))
+    found = [
+        np.arange(a, b - size, size) for a, b in zip(at[:-1], at[1:], strict=True) if b - a > size
+    ]
+    return np.concatenate(found) if found else np.zeros(0, dtype=int)
+
+
+def cut(record: Record, rows: np.ndarray) -> Cut:
+    """The segments that begin at these rows of a record (as recorded, or put right)."""
+    g = grid(record)
+    share = record.share[:, None]
+    driven = np.concatenate((record.actuator, share, record.true_wind), 1)
+    driven = _smooth(record, driven)
+    nodes = rows[:, None] + NODE_ROWS * np.arange(g.nodes)
+    per = round(BIN / record.step)
+    weight = np.ones(per + 1)
+    weight[[0, -1]] = 0.5
+    every = rows[:, None, None] + per * np.arange(g.bins)[:, None] + np.arange(per + 1)
+    y = np.einsum("sbrc,r->sbc", record.state[every], weight / weight.sum())
+    seen = record.seen[every].mean(-1) > 0.5
+    used = np.repeat(seen[..., None], 6, axis=-1)
+    return Cut(rows, y, used, driven[nodes], record.voyage[rows], record.step * NODE_ROWS)
+
+
+def _smooth(record: Record, values: np.ndarray) -> np.ndarray:
+    """¼ ½ ¼: what lies between two nodes counts too."""
+    at = np.arange(len(values))
+    before = np.maximum(at - 1, record.firsts)
+    after = np.minimum(at + 1, record.lasts)
+    return 0.25 * values[before] + 0.5 * values + 0.25 * values[after]
+
+
+# --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
+
+
+def _ab2(values: Array, before: Array, first) -> Array:
+    return jnp.where(first, values, 1.5 * values - 0.5 * before)
+
+
+@jax.jit
+def _path(model, theta, start, push, driven, step):
+    """States [S, K, 6] at the nodes, accelerations `push` [S, K, 3] added."""
+
+    def advance(carry, along):
+        state, before, first = carry
+        now, extra = along
+        slope = rate(model, theta, state, now[..., :-2], now[..., -2:])
+        slope = slope.at[..., jnp.array([1, 3, 5])].add(extra)
+        state_next = state + step * _ab2(slope, before, first)
+        return (state_next, slope, False), state
+
+    along = (jnp.moveaxis(driven, 1, 0), jnp.moveaxis(push, 1, 0))
+    _, states = jax.lax.scan(advance, (start, jnp.zeros_like(start), True), along)
+    return jnp.moveaxis(states, 0, 1)
+
+
+@partial(jax.jit, static_argnames=("coefficients",))
+def _slopes(model, theta, states, driven, coefficients):
+    """∂ν̇ by state [S, K, 3, 6], by what drives [S, K, 3, D] and by θ [S, K, 3, P or 0]."""
+    by = (0, 1, 2) if coefficients else (0, 1)
+
+    def one(state, now, values):
+        return model.acceleration(values, state, now[:-2], now[-2:])
+
+    def each(state, now):
+        return jax.jacrev(one, argnums=by)(state, now, theta)
+
+    found = jax.vmap(jax.vmap(each))(states, driven)
+    return found if coefficients else (*found, None)
+
+
+@partial(jax.jit, static_argnames=("bins", "coefficients"))
+def _linear(model, theta, start, push, driven, moved, hats, step, bins, coefficients):
+    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P + Q)]: start, knots, θ, what drives.
+
+    moved   [S, K, D, Q]  how what drives changes with each of Q numbers
+    """
+    states = _path(model, theta, start, push, driven, step)
+    by_state, by_driven, by_theta = _slopes(model, theta, states, driven, coefficients)
+    count, nodes = states.shape[:2]
+    knots = hats.shape[1]
+    per = (nodes - 1) // bins
+
+    def forcing(k):
+        """[S, 3, C] of node k."""
+        hat = jnp.zeros((3, 3 * knots))
+        for channel in range(3):
+            hat = hat.at[channel, channel * knots : (channel + 1) * knots].set(hats[k])
+        parts = [jnp.zeros((count, 3, 6)), jnp.broadcast_to(hat, (count, 3, 3 * knots))]
+        if coefficients:
+            parts.append(by_theta[:, k])
+            parts.append(jnp.einsum("sad,sdq->saq", by_driven[:, k], moved[:, k]))
+        return jnp.concatenate(parts, -1)
+
+    def slope(k, now):
+        """d(columns)/dt [S, 6, C]."""
+        state = states[:, k]
+        c, s = jnp.cos(state[:, 4, None]), jnp.sin(state[:, 4, None])
+        u, v = state[:, 1, None], state[:, 3, None]
+        du, dv, dpsi, dr = (now[:, i] for i in (1, 3, 4, 5))
+        motion = by_state[:, k] @ now + forcing(k)
+        return jnp.stack(
+            (
+                c * du - s * dv - (s * u + c * v) * dpsi, motion[:, 0],
+                s * du + c * dv + (c * u - s * v) * dpsi, motion[:, 1],
+                dr, motion[:, 2],
+            ), 1,
+        )  # fmt: skip
+
+    width = 6 + 3 * knots + (by_theta.shape[-1] + moved.shape[-1] if coefficients else 0)
+    first = jnp.broadcast_to(jnp.eye(6, width), (count, 6, width))
+
+    def within(i, carry):
+        now, before, total, at = carry
+        change = slope(at, now)
+        after = now + step * _ab2(change, before, at == 0)
+        return after, change, total + 0.5 * (now + after), at + 1
+
+    def bin_(carry, _):
+        now, before, at = carry
+        now, before, total, at = jax.lax.fori_loop(
+            0, per, within, (now, before, jnp.zeros_like(now), at)
+        )
+        return (now, before, at), total / per
+
+    _, columns = jax.lax.scan(bin_, (first, jnp.zeros_like(first), 0), None, length=bins)
+    whole = states.reshape(count, nodes, 6)
+    pairs = 0.5 * (whole[:, 1:] + whole[:, :-1])
+    y = pairs.reshape(count, bins, per, 6).mean(2)
+    return y, jnp.moveaxis(columns, 0, 1)
+
+
+# --- in numpy: one record, in flat memory ---------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where each segment was linearised: start [S, 6] and knots [S, 3, J] of acceleration."""
+
+    start: np.ndarray
+    push: np.ndarray
+
+    def at_nodes(self, g: Grid) -> np.ndarray:
+        return np.einsum("scj,kj->skc", self.push, g.weights)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Segments linearised: residual = Z z + J d + noise.
+
+    e   [S, B, 6]       measured less simulated, with the path's own z put back
+    z   [S, B, 6, Z]    by initial state (6) and knots (3J)
+    j   [S, B, 6, C]    by θ
+    """
+
+    cut: Cut
+    path: Path
+    e: np.ndarray
+    z: np.ndarray
+    j: np.ndarray
+
+    def pick(self, keep: np.ndarray) -> Linear:
+        """Some of the segments."""
+        chosen = replace(
+            self.cut,
+            **{n: getattr(self.cut, n)[keep] for n in ("rows", "y", "used", "driven", "voyage")},
+        )
+        path = Path(self.path.start[keep], self.path.push[keep])
+        return Linear(chosen, path, self.e[keep], self.z[keep], self.j[keep])
+
+
+@dataclass(frozen=True)
+class Wide:
+    """How freely a path may be pulled: noise of one observation [6], of the start [6], and of
+    the acceleration's knots [3]."""
+
+    noise: np.ndarray
+    start: np.ndarray
+    push: np.ndarray
+
+
+def first_path(model: Physical, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
+    """From the measured path itself: its acceleration less the model's."""
+    y = segments.y
+    centre = (np.arange(g.bins) + 0.5) * BIN
+    knots = np.arange(g.knots) * KNOT
+    velocity = y[..., [1, 3, 5]]
+    change = np.diff(velocity, axis=1) / BIN
+    at = 0.5 * (centre[1:] + centre[:-1])
+    accelerated = _resampled(at, change, knots)
+    states = _resampled(centre, y, knots)
+    per = round(KNOT / (g.step * NODE_ROWS))
+    driven = segments.driven[:, ::per]
+    said = np.asarray(_accelerations(model, theta, states, driven))
+    start = y[:, 0] - 0.5 * BIN * (y[:, 1] - y[:, 0]) / BIN
+    return Path(start, np.moveaxis(accelerated - said, -1, 1))
+
+
+@jax.jit
+def _accelerations(model, theta, states, driven):
+    return model.acceleration(theta, states, driven[..., :-2], driven[..., -2:])
+
+
+def _resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Linear in between, constant beyond; values [S, n, c] at times [n]."""
+    right = np.clip(np.searchsorted(at, wanted), 1, len(at) - 1)
+    part = np.clip((wanted - at[right - 1]) / (at[right] - at[right - 1]), 0.0, 1.0)
+    left = values[:, right - 1]
+    return left + part[:, None] * (values[:, right] - left)
+
+
+def pulled(
+    model: Physical,
+    theta: np.ndarray,
+    segments: Cut,
+    g: Grid,
+    wide: Wide,
+    path: Path | None = None,
+    rounds: int = 2,
+) -> Path:
+    """Each segment's path onto what was measured: Gauss-Newton in start and knots."""
+    path = path or first_path(model, theta, segments, g)
+    size = 6 + 3 * g.knots
+    prior = np.concatenate((wide.start, np.repeat(wide.push, g.knots)))
+    weight = np.where(segments.used, 1.0 / wide.noise, 0.0)
+    for _ in range(rounds):
+        y, z = _run(model, theta, segments, path, g)
+        scaled = (z * weight[..., None]).reshape(len(z), -1, size)
+        gap = ((segments.y - y) * weight).reshape(len(y), -1)
+        known = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
+        # the start is free about where it stands, the knots about zero
+        normal = np.einsum("sij,sik->sjk", scaled, scaled) + np.diag(prior**-2.0)
+        pull = np.einsum("sij,si->sj", scaled, gap) - known * prior**-2.0
+        step = np.linalg.solve(normal, pull[..., None])[..., 0]
+        path = Path(
+            path.start + step[:, :6], path.push + step[:, 6:].reshape(len(y), 3, g.knots)
+        )
+    return path
+
+
+def linear(
+    model: Physical,
+    theta: np.ndarray,
+    segments: Cut,
+    g: Grid,
+    path: Path,
+    moved: np.ndarray,
+    shown: np.ndarray,
+) -> Linear:
+    """Around a path, by all of θ, of which the last Q are causes' numbers.
+
+    moved   [S, K, D, Q]  how those change what drives, where a cause reads otherwise
+    shown   [S, B, 6, Q]  how they change what was measured
+    """
+    y, columns = _run(model, theta, segments, path, g, moved)
+    size = 6 + 3 * g.knots
+    read = moved.shape[-1]
+    z, j = columns[..., :size], columns[..., size : size + len(theta)].copy()
+    j[..., len(theta) - read :] += columns[..., size + len(theta) :] - shown
+    at = np.concatenate(
+        (np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1
+    )  # the start is free: its own value is its mean
+    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, at)
+    return Linear(segments, path, e, z, j)
+
+
+def _run(model, theta, segments, path, g, moved=None):
+    """Chunk by chunk, padded: one compilation serves all."""
+    hats = g.weights
+    coefficients = moved is not None
+    push = path.at_nodes(g)
+    ys, columns = [], []
+    for at in range(0, len(segments), CHUNK):
+        part = slice(at, at + CHUNK)
+        lack = CHUNK - len(segments.rows[part])
+
+        def filled(values, lack=lack):
+            if not lack:
+                return values
+            return np.concatenate((values, np.repeat(values[-1:], lack, axis=0)))
+
+        driven = filled(segments.driven[part])
+        how = (
+            filled(moved[part]) if moved is not None else np.zeros((CHUNK, *driven.shape[1:], 0))
+        )
+        y, c = _linear(
+            model, theta, filled(path.start[part]), filled(push[part]), driven, how, hats,
+            segments.step, g.bins, coefficients,
+        )  # fmt: skip
+        keep = CHUNK - lack
+        ys.append(np.asarray(y)[:keep])
+        columns.append(np.asarray(c)[:keep])
+    return np.concatenate(ys), np.concatenate(columns)
