@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import polars as pl
 
+from shiplog import parity, report, table
 from shiplog import profile as profiles
-from shiplog import report, table
 from shiplog.exceptions import ProfileError, ShiplogError, listed
-from shiplog.findings import VoyageReport
+from shiplog.findings import Finding, VoyageReport
 from shiplog.ingest import ingest
 from shiplog.logs.check import check
 from shiplog.logs.read import Contents, contents
@@ -39,8 +39,13 @@ class Ingested:
         )
 
 
-def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ingested:
-    """Each log into the store; one that cannot be taken does not stop the others."""
+def ingest_logs(
+    paths: Sequence[Path], profile: str | None, store: Store, correct: bool = False
+) -> Ingested:
+    """Each log into the store; one that cannot be taken does not stop the others.
+
+    correct  put right what the sensors say of each other beyond doubt
+    """
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
@@ -53,11 +58,15 @@ def ingest_logs(paths: Sequence[Path], profile: str | None, store: Store) -> Ing
                 said.add(profile_of.source)
                 for line in report.estimated(profile_of):
                     log.info(line)
-            if store.holds(path.stem, found.sha256, profile_of):
+            if store.holds(path.stem, found.sha256, profile_of, correct):
                 reports.append(store.report(path.stem))
                 log.info("%s: unchanged", path.stem)
                 continue
             voyage = ingest(path, profile_of)
+            if correct:
+                from shiplog.correct import corrected  # with the causes comes JAX, in a second
+
+                voyage = corrected(voyage)
             state = store.add(voyage)
         except ShiplogError as error:
             refused[str(path)] = error
@@ -110,13 +119,26 @@ def expand(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def check_logs(paths: Sequence[Path]) -> Ingested:
-    """The health of each log by itself; nothing is stored."""
+def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
+    """The health of each log by itself, and of its sensors by each other; nothing is stored."""
+    chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
     for path in expand(paths):
         try:
-            reports.append(check(path))
+            health = check(path)
         except ShiplogError as error:
             refused[str(path)] = error
+            continue
+        reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
     return Ingested(reports, refused)
+
+
+def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
+    """What ingest would say of the sensors against each other; nothing where it would refuse."""
+    try:
+        voyage = ingest(path, chosen or fitting_profile(contents(path)))
+    except ShiplogError as error:
+        log.info("%s: sensors not held against each other: %s", path.stem, error.message)
+        return []
+    return parity.findings(voyage.estimates, voyage.table.height, voyage.profile)

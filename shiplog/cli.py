@@ -108,14 +108,15 @@ def demo(
 
 
 @app.command()
-def check(logs: Logs, json_to: JsonOption = None) -> None:
-    """Health of logs without ingesting them: what is readable, lost, late, out of order.
+def check(logs: Logs, profile: ProfileOption = None, json_to: JsonOption = None) -> None:
+    """Health of logs without ingesting them: what is readable, lost, late, out of order, and
+    where a profile fits, which sensors disagree.
 
     Example: shiplog check sample_logs/voyage_1.mcap
     """
     from pipelines.prepare import check_logs
 
-    checked = check_logs(logs)
+    checked = check_logs(logs, profile)
     _answer(_reports(checked.reports), report.voyages_json(checked.reports), json_to)
     _leave(checked)
 
@@ -125,6 +126,10 @@ def ingest(
     logs: Logs,
     profile: ProfileOption = None,
     store: StoreOption = STORE,
+    correct: Annotated[
+        bool,
+        typer.Option("--correct", help="Put right what the sensors say of each other for certain."),
+    ] = False,
     json_to: JsonOption = None,
 ) -> None:
     """Logs into the store: aligned, reduced to midship, faults marked. Idempotent by content.
@@ -134,7 +139,7 @@ def ingest(
     from pipelines.prepare import expand, ingest_logs
     from shiplog.store import Store
 
-    done = ingest_logs(expand(logs), profile, Store(store))
+    done = ingest_logs(expand(logs), profile, Store(store), correct)
     _answer(_reports(done.reports), report.voyages_json(done.reports), json_to)
     _leave(done)
 

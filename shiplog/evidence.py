@@ -10,6 +10,7 @@ eliminated segment by segment; what is left of all data is one small matrix over
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -90,9 +91,14 @@ class Gram:
     each: np.ndarray
     logdet: float
 
-    @property
+    @cached_property
     def total(self) -> np.ndarray:
         return self.each.sum(0)
+
+    def scaled(self, unit: np.ndarray) -> Gram:
+        """Of numbers in these units [C]: matrices of numbers that differ by 1e6 do not invert."""
+        by = np.concatenate(([1.0], unit))
+        return Gram(self.each * np.outer(by, by), self.logdet)
 
 
 def gram(weighed: Weighed, unrest: Unrest) -> Gram:
@@ -107,7 +113,7 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
 
 
 def learnt(
-    linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12, shrink: float = 1.0
+    linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12
 ) -> Unrest:
     """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977).
 

@@ -18,6 +18,7 @@ from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.findings import VoyageReport
 from shiplog.grid import Grid, mark_gaps, mark_holds, mark_jumps
 from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.parity import Estimate
 from shiplog.profile import Actuator, Profile, Sensor, Source
 
 
@@ -31,6 +32,8 @@ class Voyage:
     table: pl.DataFrame  # time, the profile's columns, quality
     report: VoyageReport
     datum: tuple[float, float] | None  # latitude, longitude [deg] of x0 = y0 = 0
+    estimates: tuple[Estimate, ...]  # what the sensors say of each other
+    corrected: tuple[Estimate, ...] | None = None  # of them, what was put right; None: not asked
 
 
 def ingest(path, profile: Profile) -> Voyage:
@@ -70,15 +73,17 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
+    estimates = tuple(parity.estimates(table, profile))
+    said = parity.findings(estimates, table.height, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,
         messages_read=reading.health.messages_read,
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *grid.findings, *parity.findings(table, profile)),
+        findings=(*reading.health.findings, *grid.findings, *said),
     )
-    return Voyage(report.name, profile, reading.contents, table, report, datum)
+    return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
 
 
 def _span(base: np.ndarray, sampled: list[align.Samples]) -> tuple[int, int]:

@@ -17,7 +17,7 @@ velocity are not of one antenna. What ingest did with the heading is undone firs
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -38,6 +38,7 @@ CHUNK = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
 MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
 SURE = 2.0  # half intervals that a value must be away from none, to be said
+CERTAIN = 4.0  # the same, to be put right where that is asked for
 
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
@@ -59,12 +60,25 @@ class Estimate:
     none: float  # the value that is no fault: 0, or 1 for a scale
     least: float  # practical size
     unit: str
+    rival: str = ""  # the channel that may be at fault instead: only the two together are known
 
     @property
     def notable(self) -> bool:
         """Well off none, and large enough to matter."""
-        away = abs(self.value - self.none)
-        return away > self.least and away > SURE * 0.5 * (self.high - self.low)
+        return self._off > self.least and self._off > SURE * self._half
+
+    @property
+    def certain(self) -> bool:
+        """Beyond doubt, and no doubt about which instrument it is."""
+        return self.notable and self._off > CERTAIN * self._half and not self.rival
+
+    @property
+    def _off(self) -> float:
+        return abs(self.value - self.none)
+
+    @property
+    def _half(self) -> float:
+        return 0.5 * (self.high - self.low)
 
 
 @dataclass(frozen=True)
@@ -81,21 +95,21 @@ class Motion:
         return Motion(*(getattr(self, f.name)[:rows] for f in fields(self)))
 
 
-def findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
-    """What is notable, in the contract's words. `table` is one voyage at 10 Hz."""
-    end = round((table.height - 1) * STEP_S, 3)
+def findings(found: Sequence[Estimate], rows: int, profile: Profile) -> list[Finding]:
+    """What is notable of a voyage of so many rows, in the contract's words."""
+    end = round((rows - 1) * STEP_S, 3)
     return [
         Finding(
             e.kind, e.channel, _sentence(e, profile), start_s=0.0, end_s=end,
             value=round(e.value, 5), low=round(e.low, 5), high=round(e.high, 5), unit=e.unit,
         )
-        for e in estimates(table, profile)
+        for e in found
         if e.notable
     ]  # fmt: skip
 
 
 def estimates(table: pl.DataFrame, profile: Profile) -> list[Estimate]:
-    """All that the voyage's manoeuvres let be estimated, notable or not."""
+    """All that the voyage's manoeuvres let be estimated, notable or not: one voyage at 10 Hz."""
     motion = measured(table, profile)
     return [*_of_yaw_rate(motion, profile), *_of_velocity(motion, profile)]
 
@@ -238,7 +252,7 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
     found = _solved(motion, problem, (TAU_P, TAU_V))
     if found is None:
         return
-    yield from _gnss_clocks(found, _separable(profile))
+    yield from _gnss_clocks(found, profile)
     if body:
         value, low, high = (v / DEGREE for v in found.interval(OFFSET))
         yield Estimate("heading_offset", "heading", value, low, high, 0.0, HEADING_DEG, "deg")
@@ -249,14 +263,15 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
         yield Estimate("antenna_offset", channel, value, low, high, 0.0, least, "m")
 
 
-def _gnss_clocks(found: Fit, separable: bool) -> Iterator[Estimate]:
-    """Delays of position and velocity; as one of `gnss` where both are late by the same."""
-    if not separable:  # only their difference is known: the later of the two is named
-        late = found.interval(TAU_V)
-        if late[0] >= 0:
-            yield _clock("velocity", *late)
-        else:
-            yield _clock("position", -late[0], -late[2], -late[1])
+def _gnss_clocks(found: Fit, profile: Profile) -> Iterator[Estimate]:
+    """Delays of position and velocity; as one of `gnss` where both are late by the same.
+
+    Velocities that were turned by the heading when they were recorded keep its turns and not their
+    own time: they look punctual, and the position early by what they are late. No profile tells
+    them from a log's own, so of body velocities only the time between the two is said to be off.
+    """
+    if not _separable(profile):
+        yield _later_of_two(*found.interval(TAU_V))
         return
     position, velocity = (
         _clock("position", *found.interval(TAU_P)), _clock("velocity", *found.interval(TAU_V)),
@@ -267,12 +282,25 @@ def _gnss_clocks(found: Fit, separable: bool) -> Iterator[Estimate]:
     value = 0.5 * (position.value + velocity.value)
     together = _clock("gnss", value, value - half, value + half)
     apart = found.quantile * math.sqrt(difference @ both @ difference)
-    same = abs(position.value - velocity.value) < max(CLOCK_S, SURE * apart)
-    if together.notable and same:
+    late = velocity.value - position.value
+    if together.notable and abs(late) < max(CLOCK_S, SURE * apart):
         yield together
-    else:
+    elif not _in_body_axes(profile):
         yield position
         yield velocity
+    elif velocity.notable:
+        yield velocity
+        if position.notable:
+            yield _clock("position", -late, -late - apart, -late + apart, rival="velocity")
+    else:
+        yield _later_of_two(late, late - apart, late + apart)
+
+
+def _later_of_two(late: float, low: float, high: float) -> Estimate:
+    """Of position and velocity, from how late the velocity is against the position."""
+    if late >= 0:
+        return _clock("velocity", late, low, high, rival="position")
+    return _clock("position", -late, -high, -low, rival="velocity")
 
 
 def _scale(kind: str, channel: str, beyond: tuple[float, float, float]) -> Estimate:
@@ -281,8 +309,8 @@ def _scale(kind: str, channel: str, beyond: tuple[float, float, float]) -> Estim
     return Estimate(kind, channel, value, low, high, 1.0, SCALE, "1")
 
 
-def _clock(channel: str, value: float, low: float, high: float) -> Estimate:
-    return Estimate("clock_offset", channel, value, low, high, 0.0, CLOCK_S, "s")
+def _clock(channel: str, value: float, low: float, high: float, rival: str = "") -> Estimate:
+    return Estimate("clock_offset", channel, value, low, high, 0.0, CLOCK_S, "s", rival)
 
 
 def _solved(
@@ -346,10 +374,10 @@ def _clock_sentence(e: Estimate, when: str, profile: Profile) -> str:
     if e.channel == "gnss":
         return f"Position and velocity come {when} the heading they belong to."
     name = e.channel.replace("_", " ")
-    if e.channel == "yaw_rate" or _separable(profile):
+    if not e.rival:
         return f"The {name} comes {when} the heading it belongs to."
-    other = "velocity" if e.channel == "position" else "position"
+    turned = " where the velocities were turned by the heading when recorded"
     return (
-        f"The {name} comes {when} the {other} it belongs to; which of the two keeps the heading's "
-        "time they cannot say."
+        f"The {name} comes {when} the {e.rival} it belongs to; which of the two keeps the "
+        f"heading's time they cannot say{turned if _in_body_axes(profile) else ''}."
     )

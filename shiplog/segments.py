@@ -61,6 +61,10 @@ class Grid:
     knots: int
 
     @property
+    def seconds(self) -> float:
+        return self.rows * self.step
+
+    @property
     def weights(self) -> np.ndarray:
         """[K, J] hat functions of the knots at the nodes."""
         at = np.arange(self.nodes) * self.step * NODE_ROWS / KNOT
@@ -266,8 +270,8 @@ def first_path(model: Physical, theta: np.ndarray, segments: Cut, g: Grid) -> Pa
     velocity = y[..., [1, 3, 5]]
     change = np.diff(velocity, axis=1) / BIN
     at = 0.5 * (centre[1:] + centre[:-1])
-    accelerated = _resampled(at, change, knots)
-    states = _resampled(centre, y, knots)
+    accelerated = resampled(at, change, knots)
+    states = resampled(centre, y, knots)
     per = round(KNOT / (g.step * NODE_ROWS))
     driven = segments.driven[:, ::per]
     said = np.asarray(_accelerations(model, theta, states, driven))
@@ -280,7 +284,7 @@ def _accelerations(model, theta, states, driven):
     return model.acceleration(theta, states, driven[..., :-2], driven[..., -2:])
 
 
-def _resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Linear in between, constant beyond; values [S, n, c] at times [n]."""
     right = np.clip(np.searchsorted(at, wanted), 1, len(at) - 1)
     part = np.clip((wanted - at[right - 1]) / (at[right] - at[right - 1]), 0.0, 1.0)

@@ -2,10 +2,11 @@
 
     store/catalogue.parquet               one row a voyage, made again from the folders
     store/voyage=<name>/table.parquet     10 Hz, zstd
-    store/voyage=<name>/voyage.json       ship, profile, source hash, report
+    store/voyage=<name>/voyage.json       ship, profile, source hash, report, what was put right
 
 A voyage is written beside its place and renamed when whole. The same log through the same profile
-is recognised by its content and left alone; another log under a taken name is refused.
+is recognised by its content and left alone; another log under a taken name is refused. What was
+put right is part of that: the same log ingested without is the table as it was measured.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from shiplog.findings import CONTRACT, VoyageReport
 from shiplog.ingest import Voyage
 from shiplog.profile import Profile
 
-INGEST_VERSION = 2  # raised when the same log would become another table or report
+CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
+INGEST_VERSION = 3  # raised when the same log would become another table or report
 
 
 @dataclass(frozen=True)
@@ -84,12 +86,13 @@ class Store:
         return list(chosen)
 
     def add(self, voyage: Voyage) -> str:
-        """Take a voyage: "added", "unchanged" or "replaced" (same log, other profile).
+        """Take a voyage: "added", "unchanged" or "replaced" (same log, otherwise ingested).
 
         Raises StoreError where the name is taken by another log; the store is then as it was.
         """
         folder = self._folder(voyage.name)
-        fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile)
+        asked = voyage.corrected is not None
+        fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked)
         state = "added"
         if folder.is_dir():
             facts = _facts(folder)
@@ -123,10 +126,12 @@ class Store:
         self._write_catalogue()
         return state
 
-    def holds(self, name: str, sha256: str, profile: Profile) -> bool:
-        """Whether this very log, read through this very profile, is here already."""
+    def holds(self, name: str, sha256: str, profile: Profile, correct: bool = False) -> bool:
+        """Whether this very log, read through this very profile, is here already, and was put
+        right if that is asked for."""
         folder = self._folder(name)
-        return folder.is_dir() and _facts(folder)["fingerprint"] == fingerprint_of(sha256, profile)
+        fingerprint = fingerprint_of(sha256, profile, correct)
+        return folder.is_dir() and _facts(folder)["fingerprint"] == fingerprint
 
     def report(self, name: str) -> VoyageReport:
         """What was found when this voyage was ingested."""
@@ -190,9 +195,10 @@ class Store:
         partial.replace(self.path / "catalogue.parquet")
 
 
-def fingerprint_of(sha256: str, profile: Profile) -> str:
+def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     """Identity of a table: the log's content, the profile's meaning, and how it was ingested."""
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
+    text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -216,5 +222,6 @@ def _describe(voyage: Voyage, fingerprint: str) -> dict:
         "datum": voyage.datum,
         "profile": voyage.profile.model_dump(mode="json"),
         "profile_source": voyage.profile.source,
+        "corrected": [{key: getattr(e, key) for key in CORRECTED} for e in voyage.corrected or ()],
         "report": voyage.report.as_json(),
     }

@@ -207,6 +207,32 @@ def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(tmp_path
     assert code == 3 and "truncated" in said
 
 
+def test_check_says_why_sensors_were_not_held_against_each_other(logs, tmp_path, caplog):
+    """It is no error: the health of the log is said all the same."""
+    caplog.set_level("INFO")
+    strange = sailing.write(tmp_path / "turn.mcap")
+    for arguments, why in (
+        (("check", strange), "No shipped profile fits turn.mcap"),
+        (("check", logs / "trip_1.mcap", "--profile", "blueboat"), "trip_1.mcap has no topic"),
+    ):
+        caplog.clear()
+        code, said, _ = call(*arguments)
+        assert code == 0 and "messages read, 0 lost" in said
+        (line,) = [r.getMessage() for r in caplog.records]
+        assert "sensors not held against each other" in line and why in line
+
+
+def test_check_takes_a_profile_and_says_where_there_is_none(logs, tmp_path, caplog):
+    caplog.set_level("INFO")
+    path = sailing.write(tmp_path / "turn.mcap", sailing.series(400.0))
+    mine = tmp_path / "mine.toml"
+    mine.write_text(sailing.PROFILE)
+    code, _, _ = call("check", path, "--profile", mine)
+    assert code == 0 and not caplog.records
+    code, _, said = call("check", path, "--profile", "esso-vectwn")
+    assert code == 1 and "did you mean 'esso-vectwin'" in said
+
+
 def test_tables_become_logs_and_come_back_as_they_were(tmp_path):
     t = np.arange(0.0, 30.0, 0.1)
     table = pl.DataFrame(

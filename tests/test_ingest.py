@@ -103,6 +103,33 @@ def test_a_dropout_is_a_gap_of_that_channel_with_its_times(voyage):
     assert done.table["x0"].null_count() == 0
 
 
+def jittered(sigma, seconds=300.0):
+    """The circle with stamps beside the instants measured, by less than half a period."""
+    rng = np.random.default_rng(1)
+    off = {t: sigma * rng.standard_normal(len(s.time)) for t, s in sailing.series(seconds).items()}
+    return {
+        topic: replace(one, time=one.time + (off[topic].clip(-0.045, 0.045) * 1e9).astype(np.int64))
+        for topic, one in sailing.series(seconds).items()
+    }
+
+
+@pytest.mark.parametrize("sigma", [0.015, 0.03])
+def test_stamps_that_jitter_are_no_gaps(voyage, sigma):
+    parts = jittered(sigma)
+    assert (np.diff(parts["/velocity"].time) > 150_000_000).sum() > 10
+    assert [f for f in voyage(parts).report.findings if f.kind == "gap"] == []
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.015])
+@pytest.mark.parametrize("lost", [[1000], [1000, 1004, 1300], [3, 2997]])
+def test_a_lost_message_is_a_gap_whatever_the_jitter(voyage, sigma, lost):
+    parts = jittered(sigma)
+    told = kept(parts, "/velocity", ~np.isin(np.arange(len(parts["/velocity"].time)), lost))
+    gaps = [f for f in voyage(told).report.findings if f.kind == "gap"]
+    assert {f.channel for f in gaps} == {"velocity"}
+    assert [f.start_s for f in gaps] == pytest.approx([0.1 * i for i in lost], abs=0.25)
+
+
 def test_a_spike_is_marked_and_left_as_it_is(voyage):
     parts = sailing.series()
     x = parts["/position"].columns["x_m"].copy()

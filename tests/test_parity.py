@@ -11,7 +11,7 @@ import pytest
 import sailing
 
 from pipelines.known_ship import Effects, Wind, sail, write_voyage
-from shiplog import parity, profile
+from shiplog import midship, parity, profile
 from shiplog.channels import Quality
 from shiplog.ingest import ingest
 
@@ -82,7 +82,8 @@ def in_body_axes(seed, late=None, heading_offset=0.0, antenna=(0.0, 0.0), speed_
 
 
 def found(table):
-    return {(f.kind, f.channel): f for f in parity.findings(table, BODY)}
+    estimates = parity.estimates(table, BODY)
+    return {(f.kind, f.channel): f for f in parity.findings(estimates, table.height, BODY)}
 
 
 @pytest.mark.parametrize("number", range(1, 7))
@@ -149,6 +150,27 @@ def test_velocity_in_body_axes_shows_whose_clock_is_late(channel):
     faults = found(in_body_axes(2, late={channel: 0.5}))
     assert set(faults) == {("clock_offset", channel)}
     assert holds(faults["clock_offset", channel], 0.5)
+
+
+def turned_when_recorded(seed, late):
+    """Body velocities as an estimator gives them: a late GNSS velocity, turned by the heading."""
+    voyage, table = sail(900.0, seed=seed, wind=Wind(2.0, 1.0)), in_body_axes(seed)
+    earth = midship.to_body(np.stack((voyage.surge, voyage.sway), 1), -voyage.heading)
+    t = voyage.time
+    earth = np.stack([np.interp(t - late, t, column) for column in earth.T], 1)
+    body = midship.to_body(earth, table["heading"].to_numpy())
+    return table.with_columns(surge=body[:, 0], sway=body[:, 1])
+
+
+@pytest.mark.parametrize("late", [0.9, -0.9])
+def test_velocities_turned_by_the_heading_do_not_say_which_of_two_clocks_is_off(late):
+    """A velocity that is late by 0.9 s looks as a position that is early by it."""
+    faults = found(turned_when_recorded(3, late))
+    channel = "velocity" if late > 0 else "position"
+    assert set(faults) == {("clock_offset", channel)}
+    assert holds(faults["clock_offset", channel], 0.9)
+    sentence = faults["clock_offset", channel].sentence
+    assert "cannot say where the velocities were turned by the heading when recorded" in sentence
 
 
 def test_a_late_yaw_rate_and_an_antenna_elsewhere_at_once():

@@ -101,6 +101,11 @@ class Cause:
     def count(self) -> int:
         return len(self.parameters)
 
+    @property
+    def reads(self) -> bool:
+        """Whether it changes what was recorded, and not the ship's motion."""
+        return type(self).read is not Cause.read
+
     def on(self, setting: Setting) -> Cause:
         """The cause as this ship has it: one rudder has one offset, two have two."""
         return self

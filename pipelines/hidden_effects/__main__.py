@@ -1,0 +1,89 @@
+"""Hide, diagnose, score.
+
+python -m pipelines.hidden_effects fixed --out DIR
+    twelve seeds; what is hidden is drawn by the seed
+python -m pipelines.hidden_effects nightly --out DIR [--count 200] [--first-seed 30000]
+    the same with other seeds; shift the block monthly, and never tune on it
+python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
+    count cases for each row of the goals' table; multiples of 21 meet every cause equally often
+python -m pipelines.hidden_effects score DIR
+    the tables again, of what is there by now
+
+Interrupted, give the same command again and it goes on; with a larger --count it grows. Exit
+code 3: a case has no verdict.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipelines.hidden_effects import plan, run, score, suites, tables
+from pipelines.hidden_effects.run import Settings
+from shiplog.exceptions import ShiplogError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    given = _parser().parse_args(arguments)
+    logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.INFO)
+    try:
+        if given.what != "score":
+            _run(given)
+        found = score.read(given.out)
+    except ShiplogError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("stopped; what was finished is kept", file=sys.stderr)
+        return 130
+    print(tables.text(found))
+    return 3 if found.unmade or any(a.word == run.FAILED for a in found.answers) else 0
+
+
+def _run(given: argparse.Namespace) -> None:
+    command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
+    settings = Settings(
+        jobs=given.jobs, keep=given.keep, share=given.share, limit=given.limit, shiplog=command
+    )
+    planned = suites.plan(given.what, given.first_seed, given.count)
+    run.run(given.out, plan.save(given.out, planned), settings)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m pipelines.hidden_effects",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(dest="what", required=True)
+    for name, (first, count) in suites.SUITES.items():
+        suite = commands.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+        suite.add_argument("--out", type=Path, required=True, help="one folder, one test")
+        suite.add_argument("--jobs", type=_positive, default=1, help="ships at a time")
+        suite.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
+        suite.add_argument(
+            "--share", action="store_true", help="train once a ship, not once a case"
+        )
+        suite.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
+        suite.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
+        suite.set_defaults(first_seed=None, count=None)
+        if name != "fixed":
+            suite.add_argument("--first-seed", type=int, default=first, help="of the block")
+            suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
+    scored = commands.add_parser("score", help="the tables of what is there by now")
+    scored.add_argument("out", type=Path)
+    return parser
+
+
+def _positive(word: str) -> int:
+    if (number := int(word)) < 1:
+        raise argparse.ArgumentTypeError(f"{word} is not positive")
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main())

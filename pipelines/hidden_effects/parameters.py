@@ -1,0 +1,128 @@
+"""How far the parameters of a named cause are from what was hidden, and whether its intervals
+contain that. Names and units are the contract's, section 6."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+Values = Mapping[str, Any]  # name → {"value", "unit"} and, as said, "low" and "high"
+
+PRECISE = (  # median error within 3 %; of the others within 10 %
+    "current", "heading_offset", "antenna_offset", "rudder_offset", "rudder_lag", "rudder_delay",
+    "clock_offset",
+)  # fmt: skip
+# Listed, and in no goal: their forms differ on purpose between simulator and diagnosis. A shoal is
+# a line there and a map of bumps here, a bank's reach is drawn there and fixed here, a thruster
+# pulses there and one figure cannot say so.
+OTHER_FORM = ("shallow_water", "bank", "side_thrust")
+FACTORS = (  # new over old: 1 is none, and the error is a share of what was added
+    "wind_force", "fouling", "cross_flow_drag", "thrust_loss", "rudder_force", "yaw_rate_scale",
+    "wind_speed_scale",
+)  # fmt: skip
+BEARINGS = ("heading_offset", "wind_direction_offset")
+CLOCKS = {"gnss": ("position", "velocity")}  # one clock for both; any other channel has its own
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """error: 0.02 is 2 %, None where there is nothing to compare; covered: an entry an interval."""
+
+    error: float | None
+    covered: tuple[bool, ...]
+
+
+def compare(name: str, truth: Values, said: Values) -> Comparison:
+    """The error is that of the vector: |said - true| over |true - none|."""
+    if not any(parameter in said for parameter in truth):
+        return Comparison(None, ())
+    if name in OTHER_FORM:  # only what both of them have
+        truth = {parameter: value for parameter, value in truth.items() if parameter in said}
+    none = 1.0 if name in FACTORS else 0.0
+    away, size = VECTORS.get(name, _plain)(truth, said, none)
+    return Comparison(away / size if size > 0.0 else None, _covered(name, truth, said))
+
+
+def _plain(truth: Values, said: Values, none: float) -> tuple[float, float]:
+    """A parameter that is not said is one that is not there."""
+    true = [(parameter, float(_value(truth, parameter, none))) for parameter in truth]
+    away = math.hypot(*(float(_value(said, p, none)) - v for p, v in true))
+    return away, math.hypot(*(v - none for _, v in true))
+
+
+def _current(truth: Values, said: Values, none: float) -> tuple[float, float]:
+    true, found = (
+        _turned(_value(p, "speed", 0.0), _value(p, "direction", 0.0)) for p in (truth, said)
+    )
+    return abs(found - true), abs(true)
+
+
+def _turned(length: float, degrees: float) -> complex:
+    return length * complex(math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
+
+
+def _bearing(truth: Values, said: Values, none: float) -> tuple[float, float]:
+    true = _value(truth, "angle", 0.0)
+    return abs(_wrapped(_value(said, "angle", 0.0) - true)), abs(_wrapped(true))
+
+
+def _wrapped(degrees: float) -> float:
+    return (degrees + 180.0) % 360.0 - 180.0
+
+
+def _payload(truth: Values, said: Values, none: float) -> tuple[float, float]:
+    """kg and kg m over a lever of 1 m, the largest there is: beside 30 kg, 1 m would not count."""
+    (mass, moment), (found, turning) = (
+        (m, m * _value(p, "position", 0.0)) for p in (truth, said) for m in [_value(p, "mass", 0.0)]
+    )
+    return math.hypot(found - mass, turning - moment), math.hypot(mass, moment)
+
+
+def _clock(truth: Values, said: Values, none: float) -> tuple[float, float]:
+    """One number a channel: the right time on the wrong channel is wrong."""
+    true, found = _late(truth, truth), _late(said, truth)
+    away = [found.get(c, 0.0) - true.get(c, 0.0) for c in true.keys() | found.keys()]
+    return math.hypot(*away), math.hypot(*true.values())
+
+
+def _late(parameters: Values, otherwise: Values) -> dict[str, float]:
+    return dict.fromkeys(_channels(parameters, otherwise), float(_value(parameters, "time", 0.0)))
+
+
+def _channels(parameters: Values, otherwise: Values) -> tuple[str, ...]:
+    channel = _value(parameters, "channel", _value(otherwise, "channel", ""))
+    return CLOCKS.get(channel, (channel,))
+
+
+VECTORS: dict[str, Callable[[Values, Values, float], tuple[float, float]]] = {
+    "current": _current, "payload": _payload, "clock_offset": _clock,
+    **dict.fromkeys(BEARINGS, _bearing),
+}  # fmt: skip
+
+
+def _covered(name: str, truth: Values, said: Values) -> tuple[bool, ...]:
+    """For every parameter of the key that is said with an interval, whether it lies within."""
+    found = []
+    for parameter, one in truth.items():
+        interval = said.get(parameter)
+        if not isinstance(interval, Mapping) or parameter == "channel":
+            continue
+        low, high, true = interval.get("low"), interval.get("high"), one["value"]
+        if low is None or high is None or not isinstance(true, int | float):
+            continue
+        # 359 to 361 deg contains 0, 360 and 1
+        above = (true - low) % 360.0 if one["unit"] == "deg" else true - low
+        within = 0.0 <= above <= high - low
+        if name == "clock_offset":
+            within = within and _channels(said, truth) == _channels(truth, truth)
+        found.append(bool(within))
+    return tuple(found)
+
+
+def _value(parameters: Values, name: str, otherwise: Any) -> Any:
+    """The value, wrapped or bare, of one that may be missing or null."""
+    found = parameters.get(name)
+    found = found.get("value") if isinstance(found, Mapping) else found
+    return otherwise if found is None else found

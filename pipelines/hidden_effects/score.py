@@ -1,0 +1,190 @@
+"""Verdicts against keys. A key is opened only where the verdict was sealed before and is
+unchanged since."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pipelines.hidden_effects import parameters, plan
+from pipelines.hidden_effects.parameters import Comparison
+from pipelines.hidden_effects.plan import Planned
+from shiplog.exceptions import ShiplogError
+
+Z_90 = 1.6449  # both sides of the normal distribution
+BINS = 10
+
+
+class Sealed(ShiplogError):
+    """The key stays shut: the verdict was not sealed, or is not the one that was."""
+
+
+def open_key(folder: Path, key: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Verdict and key. Raises Sealed before the key is touched."""
+    seal = folder / "verdict.sha256"
+    if not seal.exists():
+        raise Sealed(
+            f"{folder} has no verdict.sha256: the key {key} is not opened.",
+            hint="run the case to its end first.",
+        )
+    verdict = (folder / "verdict.json").read_bytes()
+    if hashlib.sha256(verdict).hexdigest() != (seal.read_text(encoding="utf-8").split() or [""])[0]:
+        raise Sealed(
+            f"{folder}/verdict.json is not what was sealed: the key {key} is not opened.",
+            hint="remove the case's folder and run the suite again.",
+        )
+    return json.loads(verdict), json.loads(key.read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was hidden in one case, and what was said of it."""
+
+    planned: Planned
+    verdict: dict[str, Any]
+    key: dict[str, Any]
+    steps: list[dict[str, Any]]
+
+    @property
+    def word(self) -> str:
+        return str(self.verdict.get("verdict"))
+
+    @cached_property
+    def hidden(self) -> tuple[str, ...]:
+        return tuple(cause["name"] for cause in self.key["causes"])
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """Causes in the order said; a clock of two channels is one name."""
+        if self.word != "named":
+            return ()
+        return tuple(dict.fromkeys(_name(cause["name"]) for cause in self.said))
+
+    @property
+    def said(self) -> list[dict[str, Any]]:
+        return self.verdict.get("causes") or []
+
+    @property
+    def kind(self) -> str:
+        """none, one, two, or outside the catalogue."""
+        if self.key["verdict"] == "unknown":
+            return "outside"
+        return ("none", "one", "two")[min(len(self.hidden), 2)]
+
+    @property
+    def size(self) -> float:
+        """Of the smallest thing hidden; 1 is realistic."""
+        return min((cause["size"] for cause in self.key["causes"]), default=math.nan)
+
+    @property
+    def family(self) -> str | None:
+        return (self.verdict.get("structure") or {}).get("family")
+
+    @property
+    def right(self) -> bool:
+        """All of it and nothing else; of what no cause has a name for, its family."""
+        if self.kind == "none":
+            return self.word == "none"
+        if self.kind == "outside":
+            return self.word == "unknown" and self.family == self.key["structure"]["family"]
+        return set(self.named) == set(self.hidden)
+
+    @property
+    def misnamed(self) -> bool:
+        """A cause is named that is not there."""
+        return not set(self.named) <= set(self.hidden)
+
+    @cached_property
+    def compared(self) -> dict[str, Comparison]:
+        """Hidden causes that were named, whatever else was."""
+        said = {_name(cause["name"]): cause for cause in reversed(self.said)}  # the first counts
+        return {
+            one["name"]: parameters.compare(
+                one["name"], one["parameters"], said[one["name"]].get("parameters") or {}
+            )
+            for one in self.key["causes"]
+            if one["name"] in self.named
+        }
+
+    @property
+    def belief(self) -> tuple[float, bool] | None:
+        """The probability of the answer given, and whether that is right.
+
+        Of a named verdict its first cause; otherwise the first of the ranking, which may be a
+        cause, `none` or `unknown`. None where no probability was given.
+        """
+        first = next(iter(self.said if self.named else self.verdict.get("ranking") or ()), {})
+        if first.get("probability") is None:
+            return None
+        name = _name(first["name"])
+        truths = {"none": ("none",), "outside": ("unknown",)}.get(self.kind, self.hidden)
+        return float(first["probability"]), name in truths
+
+    @property
+    def recovered(self) -> float | None:
+        """Of the error cut that the true term reaches, the share that the named one does.
+
+        `gain.oracle` is that reduction. A diagnosis cannot know it and need not give it; only a
+        scorer that fits the hidden term could, and this one does not.
+        """
+        gain = self.verdict.get("gain") or {}
+        oracle, reduction = gain.get("oracle"), gain.get("reduction")
+        return reduction / oracle if oracle and reduction is not None else None
+
+    def step(self, name: str) -> dict[str, Any] | None:
+        """One that went to its end."""
+        return next((s for s in self.steps if s["step"] == name and s["rc"] in (0, 3)), None)
+
+
+def _name(label: str) -> str:
+    """`clock_offset:wind` and `unknown:position` are a name and what of it."""
+    return label.partition(":")[0]
+
+
+@dataclass(frozen=True)
+class Score:
+    suite: str
+    answers: tuple[Answer, ...]
+    pending: tuple[Planned, ...]  # not run to the end yet
+    unmade: tuple[Planned, ...]  # the simulator failed: there is neither log nor key
+
+
+def read(out: Path) -> Score:
+    """Open the key of every sealed case. Raises Sealed where a verdict was changed."""
+    planned = plan.load(out)
+    answers, pending, unmade = [], [], []
+    for one in planned.cases:
+        folder, key = plan.case_folder(out, one), plan.key_path(out, one)
+        if not (folder / "verdict.sha256").exists():
+            pending.append(one)
+            continue
+        steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
+        if steps[0]["rc"] != 0:
+            unmade.append(one)
+        else:
+            answers.append(Answer(one, *open_key(folder, key), steps))
+    return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """90 % interval of a share (Wilson 1927)."""
+    share, z2 = hits / count, Z_90**2
+    middle = share + z2 / (2 * count)
+    half = Z_90 * math.sqrt(share * (1 - share) / count + z2 / (4 * count**2))
+    low, high = ((middle + sign * half) / (1 + z2 / count) for sign in (-1, 1))
+    return (0.0 if hits == 0 else low), (1.0 if hits == count else high)
+
+
+def calibration(beliefs: Iterable[tuple[float, bool]]) -> float:
+    """Expected calibration error: |mean probability - share right|, a bin weighs what it holds."""
+    bins: list[list[tuple[float, bool]]] = [[] for _ in range(BINS)]
+    for probability, right in beliefs:
+        bins[min(int(probability * BINS), BINS - 1)].append((probability, right))
+    apart = sum(abs(sum(p - right for p, right in one)) for one in bins)
+    return apart / sum(map(len, bins))

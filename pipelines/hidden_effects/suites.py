@@ -1,0 +1,55 @@
+"""The suites: which seeds, and what is hidden in each. All of a case follows from its seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipelines.hidden_effects.plan import Plan, Planned
+from pipelines.known_ship.cases import CATALOGUE, OUTSIDE
+
+Rule = Callable[[int, int], str]  # seed, number in the row → cause
+
+
+def _pair(seed: int, number: int) -> str:
+    """Two different names of the catalogue, drawn evenly by the seed; no pair is left out."""
+    names = tuple(CATALOGUE)
+    drawn = np.random.default_rng([seed, *b"two at once"]).choice(len(names), 2, replace=False)
+    return "+".join(names[i] for i in sorted(drawn))
+
+
+RULES: dict[str, Rule] = {
+    "none": lambda seed, number: "none",
+    "one": lambda seed, number: tuple(CATALOGUE)[number % len(CATALOGUE)],  # each equally often
+    "two": _pair,
+    "outside": lambda seed, number: tuple(OUTSIDE)[number % len(OUTSIDE)],
+}
+GOALS: tuple[tuple[str, float | None, int], ...] = (  # rule, size, seconds of the trial
+    ("one", 1.0, 7000),
+    ("one", 0.3, 7000),
+    ("one", 1.0, 500),
+    ("none", None, 7000),
+    ("outside", 1.0, 7000),
+    ("two", 1.0, 7000),
+)
+SUITES = {  # name → (first seed, cases; of `goals`: of each row)
+    "fixed": (1001, 12),  # the first twelve after 1000, and none, one, two, outside all occur
+    "nightly": (30000, 200),  # never tuned on: shift the block monthly
+    "goals": (20000, 20),
+}
+
+
+def plan(suite: str, first_seed: int | None = None, count: int | None = None) -> Plan:
+    """The rows of `goals` share their seeds: the same ships, weather and noise in each."""
+    first, number = SUITES[suite]
+    first = first if first_seed is None else first_seed
+    number = number if count is None else count
+    seeds = range(first, first + number)
+    if suite != "goals":
+        return Plan(suite, first, tuple(Planned(str(s), s, None, None, 7000) for s in seeds))
+    return Plan(suite, first, tuple(
+        Planned(f"{seed}-{row}", seed, RULES[rule](seed, seed - first), size, seconds)
+        for seed in seeds
+        for row, (rule, size, seconds) in enumerate(GOALS, 1)
+    ))  # fmt: skip

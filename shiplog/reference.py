@@ -1,0 +1,264 @@
+"""The campaign that the model was made on, as the diagnosis sees it: what is usual for this ship.
+
+Coefficients and the numbers of every cause are learned here together, each held to its plausible
+spread. What the model gets wrong everywhere then stands in them already; a diagnosis asks only
+for what changed. One campaign makes the next one's coefficients look surer than they are, so what
+it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from shiplog import evidence, segments
+from shiplog.causes import Cause, Setting
+from shiplog.evidence import Gram, Unrest
+from shiplog.models.extended import Extended
+from shiplog.record import Record
+from shiplog.segments import Cut, Grid, Linear, Path, Wide
+
+ROUNDS = 8  # of moving the coefficients to where they are linearised
+FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
+NEAR = 0.3  # plausible spreads that need no further round
+STEP = 0.02  # of a cause's size, to see how it changes what is read
+KAPPAS = (2.0, 4.0, 8.0, 16.0, 32.0)
+USUAL_KAPPA = 11.0  # DIAGNOSIS: one campaign's coefficients are some 3.3 times too sure
+UNREST_TIME = 4.0  # s
+HELD = 1e8  # information that leaves a number where it is
+
+
+@dataclass(frozen=True)
+class Start:
+    """Coefficients of the base [P]: those of the run, what was known of them before any data,
+    and their range."""
+
+    begin: np.ndarray
+    values: np.ndarray
+    spread: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the numbers stand for: the base's P coefficients, then each cause's own.
+
+    unit [C]   plausible spread of a coefficient, realistic size of a cause's number
+    """
+
+    base: int
+    causes: tuple[Cause, ...]
+    unit: np.ndarray
+
+    @cached_property
+    def of(self) -> dict[str, np.ndarray]:
+        """Cause's label → its columns."""
+        found, at = {}, self.base
+        for cause in self.causes:
+            found[cause.label] = np.arange(at, at + cause.count)
+            at += cause.count
+        return found
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """[C] how surely each is as it stands, before any data, in units: a cause that is only
+        another value of coefficients has no usual size of its own."""
+        whole = np.ones(len(self.unit))
+        for cause in self.causes:
+            if cause.absorbed:
+                whole[self.of[cause.label]] = HELD
+        return whole
+
+    def numbers(self, given: dict[str, np.ndarray]) -> np.ndarray:
+        """[C - P] with those of some causes, zero for the others."""
+        whole = np.zeros(len(self.unit))
+        for label, values in given.items():
+            whole[self.of[label]] = values
+        return whole[self.base :]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """θ that all is linearised about, and what the nominal campaign says around it.
+
+    information  [C, C]  and pull [C], in units of `columns.unit`, prior included, κ applied
+    nominal      None where the model was made on the very data that are diagnosed
+    """
+
+    model: Extended
+    setting: Setting
+    theta: np.ndarray
+    columns: Columns
+    unrest: Unrest
+    wide: Wide
+    information: np.ndarray
+    pull: np.ndarray
+    kappa: float
+    nominal: Linear | None
+    grams: Gram | None
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """[C] what is usual, in units."""
+        return np.linalg.solve(self.information, self.pull)
+
+    @cached_property
+    def usual(self) -> np.ndarray:
+        """[P] coefficients."""
+        base = self.columns.base
+        return self.theta + self.mean[:base] * self.columns.unit[:base]
+
+
+def wide_of(setting: Setting) -> Wide:
+    """How far a path may be pulled, from what a ship of this size and speed does in seconds."""
+    speed, length = setting.scale["speed"], setting.scale["length"]
+    turn = speed / length
+    at, going, angle, turning = 0.3 * length, speed, 0.3, turn
+    said = setting.profile.sensors.noise
+    unsaid = {  # for a sensor whose accuracy nobody states
+        "position": 0.005 * length, "velocity": 0.03 * speed,
+        "heading": 0.003, "yaw_rate": 0.03 * turn,
+    }  # fmt: skip
+    of = {name: said(name) or least for name, least in unsaid.items()}
+    noise = np.array([of[n] for n in ("position", "velocity") * 2 + ("heading", "yaw_rate")])
+    return Wide(
+        noise, np.array([at, going, at, going, angle, turning]),
+        np.array([0.1 * speed, 0.1 * speed, 0.1 * turn]),
+    )  # fmt: skip
+
+
+def learn(
+    model: Extended, setting: Setting, start: Start, record: Record, kappa: float | None = None
+) -> Reference:
+    """From the nominal campaign. κ is chosen on its own voyages unless given."""
+    columns = columns_of(model, setting, start)
+    wide, g = wide_of(setting), segments.grid(record)
+    rows = segments.begins(record)
+    cut, moved, shown = read(model, setting, record, rows)
+    base, unit = columns.base, columns.unit
+    theta = np.clip(start.begin, start.low, start.high)
+    unrest = Unrest(wide.noise, 0.04 * wide.push, UNREST_TIME, wide.start)
+    path: Path | None = None
+    for round_ in range(ROUNDS + 1):
+        whole = np.concatenate((theta, np.zeros(len(unit) - base)))
+        path = segments.pulled(model, whole, cut, g, wide, path, rounds=1 if path else 2)
+        linear = segments.linear(model, whole, cut, g, path, moved, shown)
+        prior = np.zeros(len(unit))
+        prior[:base] = (start.values - theta) / unit[:base]
+        for again in range(3):
+            grams = evidence.gram(evidence.weighed(linear, unrest.noise), unrest).scaled(unit)
+            found = np.linalg.solve(
+                grams.total[1:, 1:] + np.diag(columns.known), grams.total[1:, 0] + prior
+            )
+            if again < 2:
+                unrest = evidence.learnt(linear, found * unit, unrest, rounds=4)
+        far = float(np.abs(found[:base]).max(initial=0.0))
+        if round_ == ROUNDS or far < NEAR:
+            break
+        moved_to = theta + found[:base] * unit[:base] * min(1.0, FARTHEST / far)
+        edge = 1e-6 * (start.high - start.low)
+        edge = np.where(np.isfinite(edge), edge, 0.0)
+        theta = np.clip(moved_to, start.low + edge, start.high - edge)
+    chosen = kappa or inflation(grams.each, linear.cut.voyage, prior, columns.known)
+    information = grams.total[1:, 1:] / chosen + np.diag(columns.known)
+    return Reference(
+        model, setting, theta, columns, unrest, wide, information,
+        grams.total[1:, 0] / chosen + prior, chosen, linear, grams,
+    )  # fmt: skip
+
+
+def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
+    sizes = [cause.sizes(setting) for cause in model.causes]
+    return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
+
+
+def inflation(
+    each: np.ndarray, voyage: np.ndarray, prior: np.ndarray, known: np.ndarray
+) -> float:
+    """κ that predicts each voyage best from the others; never less than is usual.
+
+    each [S, 1 + C, 1 + C], voyage [S], prior and its information [C]: all in units
+    """
+    names = np.unique(voyage)
+    if len(names) < 3:
+        return USUAL_KAPPA
+    of = {v: each[voyage == v].sum(0) for v in names}
+    total = each.sum(0)
+    said = []
+    for kappa in KAPPAS:
+        score = 0.0
+        for left in of.values():
+            rest = total - left
+            before = rest[1:, 1:] / kappa + np.diag(known)
+            score += marginal(left, before, rest[1:, 0] / kappa + prior)
+        said.append(score)
+    return max(USUAL_KAPPA, KAPPAS[int(np.argmax(said))])
+
+
+def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
+    """Log likelihood of [e | J] with its numbers integrated out, up to what no number changes."""
+    both = gram[1:, 1:] + information
+    towards = gram[1:, 0] + pull
+    square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
+    square -= towards @ np.linalg.solve(both, towards)
+    return -0.5 * float(
+        square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1]
+    )
+
+
+# --- what causes read otherwise -------------------------------------------------------------------
+
+
+def corrected(
+    causes: Sequence[Cause], record: Record, columns: Columns, numbers: dict[str, np.ndarray]
+) -> Record:
+    """The record as those causes' numbers have it, in the catalogue's order."""
+    for cause in causes:
+        values = numbers.get(cause.label)
+        if values is not None and np.any(values != 0.0):
+            record = cause.read(record, values)
+    return record
+
+
+def read(
+    model: Extended,
+    setting: Setting,
+    record: Record,
+    rows: np.ndarray,
+    numbers: dict[str, np.ndarray] | None = None,
+    known: tuple[np.ndarray, np.ndarray] | None = None,
+) -> tuple[Cut, np.ndarray, np.ndarray]:
+    """Segments as read with `numbers`, and how each cause's numbers change them.
+
+    known   the changes at other numbers: then only those of causes in `numbers` are made again
+    """
+    given = numbers or {}
+    sizes = {c.label: c.sizes(setting) for c in model.causes}
+    columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
+    base = segments.cut(corrected(model.causes, record, columns, given), rows)
+    count = len(columns.unit)
+    if known is None:
+        moved = np.zeros((*base.driven.shape, count))
+        shown = np.zeros((*base.y.shape, count))
+    else:
+        moved, shown = known[0].copy(), known[1].copy()
+    for cause in model.causes:
+        if not cause.reads or (known is not None and cause.label not in given):
+            continue
+        here = given.get(cause.label, np.zeros(cause.count))
+        for i, column in enumerate(columns.of[cause.label]):
+            step = np.zeros(cause.count)
+            step[i] = STEP * sizes[cause.label][i]
+            more, less = (
+                segments.cut(
+                    corrected(model.causes, record, columns, given | {cause.label: here + s}), rows
+                )
+                for s in (step, -step)
+            )
+            moved[..., column] = (more.driven - less.driven) / (2.0 * step[i])
+            shown[..., column] = (more.y - less.y) / (2.0 * step[i])
+    return base, moved, shown

@@ -1,0 +1,128 @@
+"""Unknown structures: accelerations that depend on something, whatever the cause may be.
+
+Smooth functions of position, heading, time, motion, controls or wind, as weighted random Fourier
+features (Rahimi & Recht 2007). They stand beside the causes on one scale of evidence: what no
+cause of the catalogue explains, but a map of the pond does, is unknown and depends on position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.record import Record
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, Linear, resampled
+
+FAMILIES = ("position", "heading", "time", "motion", "controls", "wind")
+FEATURES = 20
+SIZES = (1.0, 3.0, 9.0)  # of the accelerations, in units of the ordinary unrest
+
+
+@dataclass(frozen=True)
+class Knots:
+    """What went on at the knots of S segments.
+
+    state   [S, J, 6]
+    driven  [S, J, A + 3]  actuators, share of the campaign, true wind
+    """
+
+    state: np.ndarray
+    driven: np.ndarray
+
+
+def at_knots(segments: Cut, g: Grid) -> Knots:
+    centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
+    every = round(KNOT / (g.step * NODE_ROWS))
+    state = resampled(centre, segments.y, np.arange(g.knots) * KNOT)
+    return Knots(state, segments.driven[:, ::every])
+
+
+@dataclass(frozen=True)
+class Basis:
+    """One family's features, the same for both campaigns.
+
+    middle, width  [n]     of the variables
+    frequency      [n, F]  and phase [F]
+    """
+
+    family: str
+    middle: np.ndarray
+    width: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    def features(self, knots: Knots) -> np.ndarray:
+        """[S, J, 3, W]: acceleration of each weight, of unit size."""
+        z = (_variables(self.family, knots) - self.middle) / self.width
+        waves = np.sqrt(2.0 / len(self.phase)) * np.cos(z @ self.frequency + self.phase)
+        count = waves.shape[-1]
+        out = np.zeros((*waves.shape[:2], 3, 3 * count))
+        for channel in range(3):
+            out[..., channel, channel * count : (channel + 1) * count] = waves
+        if self.family != "position":
+            return out
+        # what pulls towards a place pulls along the earth's axes
+        c, s = np.cos(knots.state[..., 4]), np.sin(knots.state[..., 4])
+        north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
+        out[..., 0, :] = c[..., None] * north + s[..., None] * east
+        out[..., 1, :] = c[..., None] * east - s[..., None] * north
+        return out
+
+
+def basis(family: str, record: Record, *campaigns: Knots) -> Basis | None:
+    """None where the campaigns hold nothing of the family, such as no wind."""
+    if family == "wind" and not record.profile.has_wind:
+        return None
+    z = np.concatenate([_variables(family, k).reshape(-1, _count(family, k)) for k in campaigns])
+    middle, width = z.mean(0), z.std(0)
+    if not (width > 1e-9).any():
+        return None
+    width = np.where(width > 1e-9, width, 1.0)
+    rng = np.random.default_rng([len(family), *family.encode()])
+    count = z.shape[1]
+    if family == "heading":  # harmonics of one angle: cosine and sine come from the phase
+        order = np.arange(FEATURES) // 2 % 3 + 1
+        return Basis(
+            family, np.zeros(1), np.ones(1), order[None].astype(float),
+            np.where(np.arange(FEATURES) % 2, -0.5 * np.pi, 0.0),
+        )  # fmt: skip
+    frequency = rng.standard_normal((count, FEATURES)) / np.sqrt(max(count / 2.0, 1.0))
+    return Basis(family, middle, width, frequency, rng.uniform(0.0, 2.0 * np.pi, FEATURES))
+
+
+def _variables(family: str, knots: Knots) -> np.ndarray:
+    state, driven = knots.state, knots.driven
+    if family == "position":
+        return state[..., [0, 2]]
+    if family == "heading":
+        return state[..., [4]]
+    if family == "time":
+        return driven[..., [-3]]
+    if family == "motion":
+        return state[..., [1, 3, 5]]
+    if family == "controls":
+        return driven[..., :-3]
+    c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+    north, east = driven[..., -2], driven[..., -1]
+    return np.stack(
+        (c * north + s * east + state[..., 1], c * east - s * north + state[..., 3]), -1
+    )
+
+
+def _count(family: str, knots: Knots) -> int:
+    return {"position": 2, "heading": 1, "time": 1, "motion": 3, "wind": 2}.get(
+        family, knots.driven.shape[-1] - 3
+    )
+
+
+def columns(linear: Linear, features: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """[S, B, 6, W]: how each weight bends the observations; `push` [3] is the unit of size."""
+    knots = features.shape[1]
+    z = linear.z[..., 6:].reshape(*linear.e.shape, 3, knots)
+    scaled = features * push[:, None]
+    count, bins, six = linear.e.shape
+    flat = z.reshape(count, bins * six, 3 * knots)
+    return (flat @ np.moveaxis(scaled, 2, 1).reshape(count, 3 * knots, -1)).reshape(
+        count, bins, six, -1
+    )

@@ -1,0 +1,211 @@
+"""What is certain is put right by what was hidden, said, and undone by ingesting again."""
+
+import json
+from datetime import UTC, datetime
+
+import numpy as np
+import polars as pl
+import pytest
+from test_cli import call
+from test_parity import BODY, DEGREE, VECTWIN, in_body_axes
+
+from pipelines.known_ship import Effects, Wind, cases, sail, write_voyage
+from shiplog import parity
+from shiplog.channels import UNUSABLE, Quality
+from shiplog.correct import corrected, put_right
+from shiplog.ingest import ingest
+from shiplog.parity import Estimate
+from shiplog.store import Store
+
+
+def certain(table):
+    return [e for e in parity.estimates(table, BODY) if e.certain]
+
+
+def left(table, profile=BODY):
+    return {(e.kind, e.channel) for e in parity.estimates(table, profile) if e.notable}
+
+
+def late(channel, seconds):
+    return Estimate("clock_offset", channel, seconds, seconds, seconds, 0.0, 0.05, "s")
+
+
+@pytest.mark.parametrize(
+    ("effects", "columns", "near"),
+    [
+        ({"heading_offset": 2.0}, ["heading"], 0.1 * DEGREE),
+        ({"speed_scale": 0.04}, ["surge", "sway"], 0.003),
+        ({"antenna": (0.3, -0.2)}, ["x0", "y0"], 0.03),
+    ],
+    ids=["heading", "speed", "antenna"],
+)
+def test_a_table_becomes_the_one_without_the_fault(effects, columns, near):
+    clean, faulty = in_body_axes(1, seconds=500.0), in_body_axes(1, seconds=500.0, **effects)
+    faults = certain(faulty)
+    fixed, gaps = put_right(faulty, BODY, faults)
+    assert {e.kind for e in faults} and left(fixed) == set() and gaps == []
+    for name in columns:
+        assert fixed[name].to_numpy() == pytest.approx(clean[name].to_numpy(), abs=near)
+    others = [c for c in clean.columns if c not in columns]
+    assert fixed.select(others).to_numpy() == pytest.approx(clean.select(others).to_numpy())
+
+
+def test_a_late_yaw_rate_comes_when_the_ship_turned():
+    true = sail(500.0, seed=3, wind=Wind(2.0, 1.0)).yaw_rate
+    faulty = in_body_axes(3, late={"yaw_rate": 0.6}, seconds=500.0)
+    fixed, gaps = put_right(faulty, BODY, certain(faulty))
+
+    def error(table):
+        return float(np.nanstd(table["yaw_rate"].fill_null(np.nan).to_numpy() - true))
+
+    noise = 0.1 * DEGREE
+    assert error(fixed) < noise < 0.8 * error(faulty)
+    assert ("clock_offset", "yaw_rate") not in left(fixed)
+    assert fixed.height == faulty.height and fixed["time"].equals(faulty["time"])
+    (gap,) = [f for f in gaps if f.channel == "yaw_rate"]
+    assert gap.value == pytest.approx(0.6, abs=0.1) and gap.end_s == pytest.approx(500.1, abs=0.01)
+    assert fixed["yaw_rate"].null_count() == round(gap.value / 0.1)
+
+
+@pytest.mark.parametrize(("channel", "columns"), [
+    ("velocity", ["surge", "sway"]), ("position", ["x0", "y0"]),
+    ("gnss", ["x0", "y0", "surge", "sway"]), ("yaw_rate", ["yaw_rate"]),
+])  # fmt: skip
+def test_a_clock_moves_its_own_channel_and_no_other(channel, columns):
+    count = 200
+    line = pl.DataFrame(
+        {"time": 0.1 * np.arange(count)}
+        | {c: c0 + 0.3 * np.arange(count) for c, c0 in
+           (("x0", 1.0), ("surge", 2.0), ("y0", 3.0), ("sway", 4.0), ("yaw_rate", 5.0))}
+        | {"heading": np.zeros(count), "quality": np.zeros(count, np.int32)}
+    )  # fmt: skip
+    fixed, _ = put_right(line, BODY, [late(channel, 0.5)])
+    for name in ("x0", "surge", "y0", "sway", "yaw_rate"):
+        steps = 5 if name in columns else 0
+        assert fixed[name].to_numpy()[:190] == pytest.approx(line[name].to_numpy()[:190]
+                                                             + 0.3 * steps)  # fmt: skip
+
+
+def test_no_data_stays_as_it_was_and_is_fetched_for_no_other_row():
+    table = in_body_axes(3, seconds=100.0)
+    marks, x0 = table["quality"].to_numpy().copy(), table["x0"].to_numpy().copy()
+    marks[100:110], x0[100:110] = int(Quality.GAP), np.nan
+    marks[300], x0[300] = int(Quality.SPIKE), 99.0
+    marks[500] = int(Quality.LIMITS)  # of an actuator: the position there is as good as any
+    marks[700], x0[700:] = int(Quality.JUMP), x0[700:] + 6.0
+    table = table.with_columns(quality=marks, x0=x0).with_columns(pl.col("x0").fill_nan(None))
+    fixed, _ = put_right(table, BODY, [late("position", 0.45)])
+    unusable = pl.Series((marks & int(UNUSABLE)) != 0)
+    assert fixed.filter(unusable).equals(table.filter(unusable))
+    became = np.flatnonzero((fixed["quality"].to_numpy() & int(Quality.GAP)) & ~marks)
+    fetched = (range(95, 100), range(105, 110), (295, 296), range(695, 700), range(996, 1001))
+    assert became.tolist() == [i for rows in fetched for i in rows if not unusable[i]]
+    assert fixed["x0"].null_count() == 10 + len(became)
+    step = (fixed["x0"] - table["x0"]).abs().to_numpy()
+    assert np.nanmax(np.delete(step, [300])) < 1.0  # nothing of the spike, nothing across the jump
+
+
+def test_only_the_beyond_doubt_is_certain():
+    def estimate(half, rival=""):
+        return Estimate("clock_offset", "velocity", 0.4, 0.4 - half, 0.4 + half, 0.0, 0.05, "s",
+                        rival)  # fmt: skip
+
+    assert estimate(0.15).notable and not estimate(0.15).certain
+    assert estimate(0.09).certain
+    assert estimate(0.01, "position").notable and not estimate(0.01, "position").certain
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_a_case_hides_in_the_gyro_is_gone(tmp_path, seed):
+    case = cases.draw(seed, cause="yaw_rate_bias+yaw_rate_scale", size=1.0, seconds=500)
+    leg = case.trial[0]
+    write_voyage(tmp_path / "t.mcap", cases.voyage(case, leg), seed=leg.seed, start=leg.start)
+    found = ingest(tmp_path / "t.mcap", VECTWIN)
+    fixed = corrected(found)
+    truth = {cause.name: cause.parameters["value"]["value"] for cause in case.causes}
+    assert {e.kind for e in fixed.corrected or ()} == set(truth)
+    for e in fixed.corrected or ():
+        assert abs(e.value - truth[e.kind]) < e.high - e.low  # twice the half of 90 %
+    assert left(found.table, VECTWIN) >= {(kind, "yaw_rate") for kind in truth}
+    assert left(fixed.table, VECTWIN) == set()
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A yaw rate that is late and biased, and a velocity whose clock differs from the position's:
+    of one antenna, so that which of the two is late nobody can say."""
+    path = tmp_path_factory.mktemp("hidden") / "trip.mcap"
+    late = {"yaw_rate": 0.6, "velocity": 0.6}
+    hidden = Effects(clock_offset=late, yaw_rate_bias=0.2 * DEGREE)
+    voyage = sail(500.0, seed=42, wind=Wind(2.0, 1.0), effects=hidden)
+    write_voyage(path, voyage, seed=42, start=datetime(2026, 1, 1, tzinfo=UTC))
+    return path
+
+
+def test_ingest_corrects_on_demand_says_so_and_takes_it_back(log, tmp_path):
+    folder, before = tmp_path / "store", log.read_bytes()
+
+    def taken(*options):
+        answer = tmp_path / "answer.json"
+        code, _, _ = call("ingest", log, "--store", folder, *options, "--json", answer)
+        assert code == 0
+        (voyage,) = json.loads(answer.read_text())["voyages"]
+        facts = json.loads((folder / "voyage=trip" / "voyage.json").read_text())
+        (table,) = (t.collect() for t in Store(folder).tables(["trip"]))
+        said = {(f["kind"], f["channel"]): f for f in voyage["findings"] if f["low"] is not None}
+        return said, facts, table
+
+    said, facts, table = taken()
+    assert facts["corrected"] == []
+    assert not any("Corrected" in f["sentence"] for f in said.values())
+
+    said_then, facts_then, table_then = taken("--correct")
+    assert facts_then["fingerprint"] != facts["fingerprint"]
+    done = {(c["kind"], c["channel"]): c for c in facts_then["corrected"]}
+    assert set(done) == {("clock_offset", "yaw_rate"), ("yaw_rate_bias", "yaw_rate")}
+    assert set(done["clock_offset", "yaw_rate"]) == {
+        "kind", "channel", "value", "low", "high", "unit",
+    }  # fmt: skip
+    assert done["clock_offset", "yaw_rate"]["value"] == pytest.approx(0.6, abs=0.1)
+    assert done["yaw_rate_bias", "yaw_rate"]["value"] == pytest.approx(0.2, abs=0.02)
+    assert {key for key, f in said_then.items() if f["sentence"].endswith(" Corrected.")} == set(
+        done
+    )
+    assert set(said_then) == set(said) == {*done, ("clock_offset", "velocity")}
+    assert table_then["time"].equals(table["time"])
+    assert left(table_then, VECTWIN) == {("clock_offset", "velocity")}
+
+    assert taken("--correct")[2].equals(table_then)
+    back = taken()
+    assert back[1] == facts and back[2].equals(table)
+    assert log.read_bytes() == before
+
+
+def test_a_voyage_without_fault_is_left_as_it_is(tmp_path):
+    voyage = sail(500.0, seed=31, wind=Wind(2.0, 1.0))
+    write_voyage(tmp_path / "a.mcap", voyage, seed=31, start=datetime(2026, 1, 1, tzinfo=UTC))
+    found = ingest(tmp_path / "a.mcap", VECTWIN)
+    fixed = corrected(found)
+    assert fixed.corrected == () and fixed.table.equals(found.table)
+    assert fixed.report == found.report
+    store = Store(tmp_path / "store")
+    assert [store.add(found), store.add(fixed), store.add(fixed)] == [
+        "added", "replaced", "unchanged",
+    ]  # fmt: skip
+
+
+def test_check_says_what_ingest_says_and_stores_nothing(log, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, _ = call("check", log, "--json", tmp_path / "c.json")
+    (checked,) = json.loads((tmp_path / "c.json").read_text())["voyages"]
+    assert code == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"c.json"}
+    assert call("ingest", log, "--store", tmp_path / "s", "--json", tmp_path / "i.json")[0] == 0
+    (taken,) = json.loads((tmp_path / "i.json").read_text())["voyages"]
+
+    def parities(voyage):
+        return [f for f in voyage["findings"] if f["channel"] in ("yaw_rate", "velocity")]
+
+    assert len(parities(taken)) == 3
+    assert parities(checked) == parities(taken)
+    assert checked["rows"] == 0
