@@ -29,7 +29,7 @@ from shiplog.profile import Profile
 from shiplog.record import Record, reduced, sighted
 
 STATE = [c.name for c in channels.STATE]
-MEASURED = {"position": [0, 2], "velocity": [1, 3], "yaw_rate": [5]}  # in STATE
+MEASURED = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE
 HEADING = 4
 DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # of a channel that the mark does not name
 
@@ -96,12 +96,13 @@ def put_right(
     state[rows[rows >= 0]] = record.state[rows >= 0]
     state[:, HEADING] = midship.wrap(state[:, HEADING])
     good = (mark & int(channels.UNUSABLE)) == 0
-    gaps: list[Finding] = []
-    for name, columns in MEASURED.items():
-        lost = good & ~np.isfinite(state[:, columns]).all(axis=1)
-        mark[lost] |= int(Quality.GAP)
+    whole, gaps = good.copy(), []
+    for name, columns in MEASURED.items():  # a velocity off midship wants the yaw rate: said once
+        lost = whole & ~np.isfinite(state[:, columns]).all(axis=1)
+        whole &= ~lost
         spans = [quality.seconds(stretch) for stretch in quality.stretches(lost)]
         gaps += quality.said("gap", name, spans, "has no sample once clocks are put right")
+    mark[good & ~whole] |= int(Quality.GAP)
     state = np.where(good[:, None], state, before)
     columns = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]
     table = table.with_columns(*columns, pl.Series("quality", mark))

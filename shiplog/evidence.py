@@ -27,30 +27,37 @@ class Unrest:
     push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
     time         s over which that stays
     start   [6]  how free the initial state is
+    pulse   [3]  acceleration of one force that nobody records, and `pulse_time` [s]
     """
 
     noise: np.ndarray
     push: np.ndarray
     time: float
     start: np.ndarray
+    pulse: np.ndarray | None = None
+    pulse_time: float = 12.0
+
+    def kernel(self, knots: int) -> np.ndarray:
+        """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
+        at = np.arange(knots) * KNOT
+        apart = np.abs(at[:, None] - at)
+        own = np.exp(-apart / self.time) + 1e-9 * np.eye(knots)
+        whole = np.kron(np.diag(self.push**2), own)
+        if self.pulse is not None:
+            whole += np.kron(np.outer(self.pulse, self.pulse), np.exp(-apart / self.pulse_time))
+        return whole
 
     def louder(self, factor: float) -> Unrest:
         return replace(self, push=self.push * factor)
 
     def precision(self, knots: int) -> tuple[np.ndarray, float]:
         """Of z [Z, Z], and its log determinant."""
-        at = np.arange(knots) * KNOT
-        kernel = np.exp(-np.abs(at[:, None] - at) / self.time) + 1e-9 * np.eye(knots)
-        inverse = np.linalg.inv(kernel)
+        kernel = self.kernel(knots)
         size = 6 + 3 * knots
         whole = np.zeros((size, size))
         whole[:6, :6] = np.diag(self.start**-2.0)
-        for channel in range(3):
-            part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
-            whole[part, part] = inverse / self.push[channel] ** 2
-        _, of_kernel = np.linalg.slogdet(kernel)
-        logdet = -2.0 * np.log(self.start).sum() - 3.0 * of_kernel
-        logdet -= 2.0 * knots * np.log(self.push).sum()
+        whole[6:, 6:] = np.linalg.inv(kernel)
+        logdet = -2.0 * np.log(self.start).sum() - np.linalg.slogdet(kernel)[1]
         return whole, float(logdet)
 
 

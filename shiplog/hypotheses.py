@@ -14,14 +14,15 @@ import numpy as np
 from shiplog import evidence, segments, structure
 from shiplog.causes import Cause
 from shiplog.evidence import Gram, Weighed
+from shiplog.models.mmg import body
 from shiplog.record import Record
-from shiplog.reference import Reference, read
+from shiplog.reference import HELD, Reference, read
 from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
 QUIETER = 0.7
 ROBUST = 6.0  # segments beyond this many medians count less
-ROUNDS = 3  # of linearising again
+ROUNDS = 6  # of linearising again, at most
 REST = 0.02  # of a number's size: it rests
 
 
@@ -67,10 +68,14 @@ class Level:
 
 
 class Trial:
-    """Voyages under question, against a reference."""
+    """Voyages under question, against a reference. `unrest` grows a pulse when one is found."""
 
-    def __init__(self, reference: Reference, record: Record) -> None:
-        self.reference, self.record = reference, record
+    def __init__(
+        self, reference: Reference, record: Record, fixed: Sequence[str] = ()
+    ) -> None:
+        """`fixed`: labels of causes that the model has already, with numbers that stay."""
+        self.reference, self.record, self.fixed = reference, record, tuple(fixed)
+        self.unrest = reference.unrest
         self.grid = segments.grid(record)
         self.rows = segments.begins(record)
         self._known: tuple[np.ndarray, np.ndarray] | None = None
@@ -91,13 +96,13 @@ class Trial:
             ref.model, whole, cut, self.grid, ref.wide, path, rounds=1 if path else 2
         )
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
-        return Point(numbers, path, linear, evidence.weighed(linear, ref.unrest.noise))
+        return Point(numbers, path, linear, evidence.weighed(linear, self.unrest.noise))
 
     def robust(self, point: Point) -> None:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
         ref = self.reference
         level = self.level(point, self.quietest(point), ())
-        gram = evidence.gram(point.weighed, ref.unrest.louder(level.louder)).scaled(
+        gram = evidence.gram(point.weighed, self.unrest.louder(level.louder)).scaled(
             ref.columns.unit
         )
         d = np.concatenate(([-1.0], level.solution[: len(ref.columns.unit)]))
@@ -108,7 +113,7 @@ class Trial:
 
     def gram(self, point: Point, louder: float) -> Gram:
         ref = self.reference
-        found = evidence.gram(point.weighed, ref.unrest.louder(louder)).scaled(ref.columns.unit)
+        found = evidence.gram(point.weighed, self.unrest.louder(louder)).scaled(ref.columns.unit)
         return Gram(found.each * self.weight[:, None, None], found.logdet)
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
@@ -130,12 +135,21 @@ class Trial:
         count, more = len(pull), len(extra)
         known = np.zeros((count + more, count + more))
         known[:count, :count] = information
-        known[count:, count:] = np.eye(more)
+        known[count:, count:] = np.diag(
+            np.concatenate(
+                [np.full(len(columns.of[n]), HELD if n in self.fixed else 1.0) for n in included]
+                or [np.zeros(0)]
+            )
+        )
         # the included numbers are counted from where they were linearised
         stood = [point.numbers.get(n, np.zeros(len(columns.of[n]))) for n in included]
         units = [columns.unit[columns.of[n]] for n in included]
         before = np.concatenate(
-            [-s / u for s, u in zip(stood, units, strict=True)] or [np.zeros(0)]
+            [
+                np.zeros(len(u)) if n in self.fixed else -s / u
+                for n, s, u in zip(included, stood, units, strict=True)
+            ]
+            or [np.zeros(0)]
         )
         towards = np.concatenate((pull, before))
         both = gram[1:, 1:] + known
@@ -236,7 +250,37 @@ class Trial:
         assert point is not None
         return point, replace(base, name="+".join(included), numbers=numbers)
 
+    def without(
+        self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Numbers of the included causes from the other segments alone; `left_out` [S] bool."""
+        kept = self.weight
+        self.weight = np.where(left_out, 0.0, kept)
+        try:
+            level = self.level(point, louder, included)
+        finally:
+            self.weight = kept
+        return self._numbers(level, point, included)[0]
+
     # --- unknown structures and louder unrest ---
+
+    def acts_on(self, point: Point, found: Found) -> tuple[str, ...]:
+        """Channels in which a structure pushes by more than a third of where it pushes most."""
+        ref = self.reference
+        here = structure.at_knots(point.linear.cut, self.grid)
+        basis = structure.basis(found.name, self.record, here)
+        if basis is None:
+            return ()
+        features = basis.features(here)
+        columns = structure.columns(point.linear, features, ref.unrest.push)
+        weighed = evidence.weighed(point.linear, self.unrest.noise, columns)
+        total = (evidence.gram(weighed, self.unrest).each * self.weight[:, None, None]).sum(0)
+        weights = np.linalg.solve(
+            total[1:, 1:] + np.eye(len(total) - 1) / structure.SIZES[1] ** 2, total[1:, 0]
+        )
+        pushed = (features @ weights).std((0, 1))
+        names = np.array(["surge", "sway", "yaw_rate"])
+        return tuple(str(n) for n in names[pushed > pushed.max() / 3.0])
 
     def structures(self, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
         """Each family's evidence above the base hypothesis, less what is usual of it."""
@@ -277,7 +321,7 @@ class Trial:
         ref = self.reference
         unit = ref.columns.unit
         count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
-        gram = evidence.gram(weighed, ref.unrest.louder(louder))
+        gram = evidence.gram(weighed, self.unrest.louder(louder))
         whole = (gram.each * self.weight[:, None, None]).sum(0)
         fresh = np.eye(count + more)
         fresh[:count, :count] = ref.information
@@ -296,6 +340,59 @@ class Trial:
                 ).value
                 value -= max(usual - without, 0.0)
             yield Found(family, value, louder)
+
+    def pulses(self, point: Point, base: Found, included: Sequence[str]) -> Pulses:
+        """A force to the side that comes and goes at one place along the ship, unrecorded: its
+        accelerations go together as those of no other unrest do. Judged on what is left."""
+        ref = self.reference
+        level = self.level(point, base.louder, included)
+        d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
+        for name, values in self._numbers(level, point, included)[0].items():
+            d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)
+        left = point.weighed
+        r = np.concatenate(([1.0], -d))
+        alone = replace(
+            left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
+        )
+
+        def value(unrest: evidence.Unrest) -> float:
+            found = evidence.gram(alone, unrest)
+            return -0.5 * (float(self.weight @ found.each[:, 0, 0]) + found.logdet)
+
+        isotropic = max(value(self.unrest.louder(v)) for v in LOUDER)
+        best: Pulses | None = None
+        ship = ref.model.stand_in
+        coefficients = ref.coefficients
+        length = ref.setting.scale["length"]
+        for lever in np.linspace(-0.45, 0.45, 7) * length:
+            unit = accelerations(coefficients, ship.geometry, np.array([0.0, 1.0, lever]))
+            # in newtons that matter: from the usual unrest upwards
+            ordinary = self.unrest.push[1] / abs(unit[1])
+            for size in ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0]):
+                tried = replace(self.unrest, pulse=unit * size)
+                one = value(tried)
+                if best is None or one > best.value:
+                    best = Pulses(one, one - isotropic, float(lever), float(size), unit)
+        assert best is not None
+        return best
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """The unrecorded thruster: log likelihood, its gain over louder unrest, place [m ahead of
+    midship], root mean square force [N], and acceleration of 1 N [3]."""
+
+    value: float
+    gain: float
+    lever: float
+    force: float
+    unit: np.ndarray
+
+
+def accelerations(coefficients: Mapping, geometry, force: np.ndarray) -> np.ndarray:
+    """ν̇ [3] that a force X, Y, N makes of a ship at rest."""
+    zero = np.zeros(())
+    return np.asarray(body.accelerations(coefficients, geometry, zero, zero, zero, force))
 
 
 def _joint(known: np.ndarray, ref: Reference) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,7 @@ from shiplog import evidence, segments
 from shiplog.causes import Cause, Setting
 from shiplog.evidence import Gram, Unrest
 from shiplog.models.extended import Extended
+from shiplog.models.mmg.model import MMG
 from shiplog.record import Record
 from shiplog.segments import Cut, Grid, Linear, Path, Wide
 
@@ -111,6 +112,14 @@ class Reference:
         """[P] coefficients."""
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
+
+
+    @property
+    def coefficients(self) -> dict[str, np.ndarray]:
+        """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
+        own = isinstance(self.model.base, MMG)
+        values = self.theta if own else np.asarray(self.model.stand_in_values)
+        return dict(zip(self.model.stand_in.names, values, strict=True))
 
 
 def wide_of(setting: Setting) -> Wide:

@@ -111,18 +111,18 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
     for kind, values in (("", found.mean), ("_sd", found.sd)):
         for channel, name in enumerate(ACCELERATIONS):
             columns[name + kind] = values[:, channel][keep][order]
-    x0, surge, y0, sway, heading, yaw_rate = _around(record, record.state, rows).T
+    x0, surge, y0, sway, heading, yaw_rate = around(record, record.state, rows).T
     columns |= {
         "x0": x0, "y0": y0, "heading": np.arctan2(np.sin(heading), np.cos(heading)),
         "surge": surge, "sway": sway, "yaw_rate": yaw_rate,
     }  # fmt: skip
-    actuator, wind = _around(record, record.actuator, rows), _around(record, record.wind, rows)
+    actuator, wind = around(record, record.actuator, rows), around(record, record.wind, rows)
     columns |= dict(zip(record.profile.actuator_names, actuator.T, strict=True))
     columns |= {"wind_ahead": wind[:, 0], "wind_starboard": wind[:, 1], "share": record.share[rows]}
     return pl.DataFrame(columns)
 
 
-def _around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Means of values [n, c] over KNOT around rows [m], within the stretch: [m, c]."""
     half = round(0.5 * KNOT / record.step)
     low = np.maximum(rows - half, record.firsts[rows])

@@ -1,0 +1,252 @@
+"""From evidence to a verdict: what is named, what is not, and why.
+
+Forward selection with a backward check, on one scale of evidence with `nothing but louder
+unrest`, a thruster that nobody records, and unknown structures. A cause is named only where it
+beats them all, is large enough to matter, and did not come out of a fit that failed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shiplog.causes import Cause, Shown
+from shiplog.hypotheses import Found, Point, Pulses, Trial
+
+LEAST = 15.0  # nats that the first cause must bring
+MORE = 25.0  # that each further one must: small evidence follows large ones about
+FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
+UNKNOWN = 60.0  # nats that it must bring where no cause is named
+STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
+PULSED = 40.0  # nats that pulses must bring beyond louder unrest
+TEMPERATURE = 8.0  # nats: calibrates probabilities
+ALIKE = 8.0  # nats within which two causes cannot be told apart
+MOST = 3  # causes
+SETTLED = 3  # contenders that are linearised again
+SHARE = 0.3  # of the best one's evidence that makes a contender
+PULSES = "side_thrust"
+
+
+@dataclass(frozen=True)
+class Named:
+    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual."""
+
+    cause: Cause
+    evidence: float
+    probability: float
+    numbers: np.ndarray
+    covariance: np.ndarray
+    alike: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> dict[str, Shown]:
+        return self.cause.told(self.numbers, self.covariance)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is left and has no name."""
+
+    family: str
+    evidence: float
+    acts_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the trial says, before anything was held out.
+
+    verdict    named, none or unknown
+    named      in the order they were found
+    pulses     the unrecorded thruster, where it is one of the causes
+    rejected   label → why not
+    traces     there, but too small to matter
+    ranking    label or family → probability, of the first step
+    louder     λ that is left
+    """
+
+    verdict: str
+    named: tuple[Named, ...]
+    structure: Structure | None
+    pulses: Pulses | None
+    traces: tuple[Named, ...]
+    rejected: Mapping[str, str]
+    ranking: Mapping[str, float]
+    louder: float
+    point: Point
+    base: Found
+    nothing: Found
+    remains: tuple[Found, ...] = field(default=())
+
+
+def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Decision:
+    """`numbers`: of causes that the model has already (`Trial.fixed`)."""
+    ref = trial.reference
+    known = dict(numbers or {})
+    fixed = tuple(known)
+    catalogue = {c.label: c for c in ref.model.causes if c.label not in fixed}
+    point = trial.at(known)
+    trial.robust(point)
+    included: tuple[str, ...] = fixed
+    base, found = trial.scan(point, tuple(catalogue.values()), included)
+    nothing = base
+    rejected: dict[str, str] = {}
+    ranking: dict[str, float] = {}
+    steps: dict[str, tuple[float, tuple[str, ...]]] = {}
+    pulses: Pulses | None = None
+    structure: Structure | None = None
+    remains: list[Found] = []
+    while True:
+        first = len(included) == len(fixed)
+        wanted = LEAST if first and pulses is None else MORE
+        if pulses is None and base.louder >= 1.4:
+            tried = trial.pulses(point, base, included)
+            if tried.gain > PULSED and tried.gain > (found[0].evidence if found else 0.0):
+                pulses = tried
+                trial.unrest = replace(trial.unrest, pulse=tried.unit * tried.force)
+                base, found = trial.scan(
+                    point, [c for k, c in catalogue.items() if k not in included], included
+                )
+                continue
+        settled = _settle(trial, point, base, found, included, wanted)
+        remains = trial.structures(point, base, included)
+        strongest = max(remains, key=lambda f: f.evidence, default=None)
+        stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
+        if not ranking:
+            ranking = _ranked(settled, found, remains, wanted, stochastic)
+        best = settled[0] if settled else None
+        gain = best[1].evidence - base.evidence if best else -math.inf
+        if strongest and strongest.evidence > max(UNKNOWN, gain + FLEXIBLE):
+            structure = _structure(trial, point, strongest)
+            if best:
+                rejected[best[1].name.split("+")[-1]] = (
+                    f"a dependence on {strongest.name} that it does not have explains "
+                    f"{strongest.evidence - max(gain, 0.0):.0f} nats more"
+                )
+            break
+        if best is None or gain < wanted or len(included) - len(fixed) >= MOST:
+            break
+        point, base = best
+        label = next(n for n in base.numbers if n not in included)
+        rivals = tuple(
+            one.name.split("+")[-1]
+            for _, one in settled[1:]
+            if best[1].evidence - one.evidence < ALIKE
+        )
+        steps[label] = (gain, rivals)
+        for _, one in settled[1:]:
+            other = one.name.split("+")[-1]
+            less = best[1].evidence - one.evidence
+            rejected.setdefault(other, f"{label} explains {less:.0f} nats more")
+        included = tuple(base.numbers)
+        _, found = trial.scan(
+            point, [c for k, c in catalogue.items() if k not in included], included
+        )
+    included, point, base, dropped = _backwards(trial, included, fixed, point, base, steps)
+    for label, loss in dropped.items():
+        rejected[label] = f"without it the others explain all but {loss:.0f} nats"
+    named = _named(trial, included, fixed, base, steps, ranking)
+    traces = tuple(n for n in named if not n.cause.practical(n.numbers, ref.setting))
+    real = tuple(n for n in named if n.cause.practical(n.numbers, ref.setting))
+    stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
+    verdict = "named" if real or pulses else "none"
+    if structure is not None and not real:
+        verdict = "unknown"
+    elif verdict == "none" and stochastic > STOCHASTIC and base.louder >= 1.4:
+        verdict = "unknown"
+        structure = Structure("stochastic", stochastic, ("surge", "sway", "yaw_rate"))
+    return Decision(
+        verdict, real, structure, pulses, traces, rejected, ranking, base.louder, point, base,
+        nothing, tuple(remains),
+    )  # fmt: skip
+
+
+def _settle(trial, point, base, found, included, wanted) -> list[tuple[Point, Found]]:
+    """Contenders linearised where they are found, best first; those whose fit ran away left out."""
+    if not found or found[0].evidence < wanted:
+        return []
+    contenders = [
+        f for f in found[:SETTLED] if f.evidence > max(wanted, SHARE * found[0].evidence)
+    ]
+    if not any(f is found[0] for f in contenders):
+        contenders = [found[0]]
+    settled = []
+    for one in contenders:
+        numbers = dict(base.numbers) | dict(one.numbers)
+        at, fitted = trial.settle((*included, one.name), numbers, point.path)
+        if np.isfinite(fitted.evidence):
+            settled.append((at, fitted))
+    return sorted(settled, key=lambda pair: -pair[1].evidence)
+
+
+def _louder(trial: Trial, point: Point, base: Found, included: tuple[str, ...]) -> float:
+    """Nats that louder unrest brings over the usual one."""
+    return base.evidence - trial.level(point, 1.0, included).value
+
+
+def _ranked(settled, found, remains, wanted, stochastic) -> dict[str, float]:
+    """Probabilities of the first step, tempered; `none` holds the threshold."""
+    value = {"none": wanted}
+    value |= {f.name: f.evidence for f in found}
+    if settled:
+        base = settled[0][1].evidence - value.get(settled[0][1].name.split("+")[-1], 0.0)
+        for _, one in settled:
+            value[one.name.split("+")[-1]] = one.evidence - base
+    value |= {f"unknown:{f.name}": f.evidence - FLEXIBLE for f in remains}
+    value["unknown:stochastic"] = min(stochastic - STOCHASTIC, wanted)
+    names = list(value)
+    of = np.array([value[n] for n in names]) / TEMPERATURE
+    share = np.exp(of - of.max())
+    share /= share.sum()
+    order = np.argsort(-share)
+    return {names[i]: float(share[i]) for i in order}
+
+
+def _structure(trial: Trial, point: Point, found: Found) -> Structure:
+    acts = trial.acts_on(point, found)
+    return Structure(found.name, found.evidence, acts)
+
+
+def _backwards(trial, included, fixed, point, base, steps):
+    """Each named cause must still be missed when the others are refitted without it."""
+    dropped: dict[str, float] = {}
+    while len(included) - len(fixed) > 1:
+        losses = {}
+        for label in included[len(fixed) :]:
+            rest = tuple(n for n in included if n != label)
+            numbers = {n: base.numbers[n] for n in rest}
+            losses[label] = (base.evidence, *trial.settle(rest, numbers, point.path))
+        label = min(losses, key=lambda n: losses[n][0] - losses[n][2].evidence)
+        loss = losses[label][0] - losses[label][2].evidence
+        if loss >= LEAST:
+            break
+        dropped[label] = loss
+        steps.pop(label, None)
+        included = tuple(n for n in included if n != label)
+        point, base = losses[label][1], losses[label][2]
+    return included, point, base, dropped
+
+
+def _named(trial, included, fixed, base, steps, ranking) -> tuple[Named, ...]:
+    by = {c.label: c for c in trial.reference.model.causes}
+    found, at = [], 0
+    for label in included:
+        cause = by[label]
+        part = slice(at, at + cause.count)
+        at += cause.count
+        if label in fixed:
+            continue
+        gain, alike = steps[label]
+        first = len(found) == 0
+        odds = 1.0 / (1.0 + math.exp(min((MORE - gain) / TEMPERATURE, 50.0)))
+        probability = ranking.get(label, odds) if first else odds
+        found.append(
+            Named(
+                cause, gain, probability, np.asarray(base.numbers[label]),
+                base.covariance[part, part], alike,
+            )
+        )  # fmt: skip
+    return tuple(found)

@@ -1,0 +1,270 @@
+"""Stretches that no force of the ship can explain: pushed, caught, towed or held by hand.
+
+A balance of forces. What is left unexplained, times mass with added mass, against all that the
+ship could do: her screws at full power with the rudders turned through their slipstream, and what
+wind, hull and the model's usual misfit could add to that. A force beyond has come from outside.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from shiplog import channels, unexplained
+from shiplog.evidence import Unrest
+from shiplog.models.mmg import MMG, body
+from shiplog.models.mmg import wind as air
+from shiplog.models.mmg.model import named
+from shiplog.quality import stretches
+from shiplog.record import Record
+from shiplog.segments import KNOT, Linear
+from shiplog.unexplained import Unexplained
+
+CHANNELS = tuple(c.name for c in channels.VELOCITY)
+SURE = 3.0  # standard deviations
+USUAL = 5.0  # times the spread of what this model leaves of this ship
+GUST = 1.2  # of the measured wind speed, from whichever side is worst
+STILL = 0.05  # of full power: below, a screw stands
+RESTS = 5.0  # s that screws have stood before their jets are gone
+LEAST = 2.0  # s
+GAP = 5.0  # s: after a shorter break it is still the same event
+EDGE = 0.5  # an event begins and ends where its force passes half of the peak
+LOOSE = 0.5  # of her full acceleration: how far the knots may go before data pull them
+ANGLES = 13  # settings of a rudder that are tried
+TOWARDS = (("ahead", "astern"), ("to starboard", "to port"), ("to starboard", "to port"))
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """One event, in the channel where it is most beyond her.
+
+    peak     the largest force [N], or moment [N m] where the channel is yaw_rate
+    percent  of full thrust; of her full turning moment where the channel is yaw_rate
+    """
+
+    voyage: str
+    start_s: float
+    end_s: float
+    channel: str
+    peak: float
+    percent: float
+
+    @property
+    def sentence(self) -> str:
+        towards = TOWARDS[CHANNELS.index(self.channel)][0 if self.peak > 0.0 else 1]
+        turning = self.channel == "yaw_rate"
+        what = f"A moment of {abs(self.peak):.3g} N m" if turning else (
+            f"A force of {abs(self.peak):.3g} N"
+        )  # fmt: skip
+        full = "her full turning moment" if turning else "full thrust"
+        return (
+            f"{what} {towards} ({self.percent:.0f} % of {full}) for "
+            f"{self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of hers does that."
+        )
+
+    def as_json(self) -> dict:
+        """One of the contract's `intervals`."""
+        return {
+            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
+            "kind": "external", "sentence": self.sentence,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Along K knots, in order, X, Y [N] and N [N m] at midship.
+
+    force  [K, 3]  unexplained
+    sd     [K, 3]
+    limit  [K, 3]  what ship, wind and hull could add there, and what the model misses always
+    full   [3]     the ship's own means, at bollard
+    """
+
+    rows: np.ndarray
+    force: np.ndarray
+    sd: np.ndarray
+    limit: np.ndarray
+    full: np.ndarray
+
+
+def find(
+    linear: Linear, d: np.ndarray, unrest: Unrest, record: Record, physics: MMG, values: np.ndarray
+) -> tuple[Stretch, ...]:
+    """All events, in order of voyage and time.
+
+    linear   of a record's segments, best those of `unexplained.covering`
+    d        [C] the columns' numbers
+    physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
+    """
+    if not physics.geometry.propellers and not physics.geometry.thrusters:
+        return ()  # who knows what drives her
+    weighed = balance(linear, d, unrest, record, physics, values)
+    beyond = np.abs(weighed.force) > weighed.limit + SURE * weighed.sd
+    found = []
+    for part in _unbroken(record, weighed.rows):
+        for channel in range(3):
+            for first, last in stretches(beyond[part, channel]):
+                found.append(_event(record, weighed, part, channel, first, last))
+    return tuple(_merged(found, record.names))
+
+
+def balance(
+    linear: Linear, d: np.ndarray, unrest: Unrest, record: Record, physics: MMG, values: np.ndarray
+) -> Balance:
+    """The forces behind `find`, for a plot of them."""
+    p = named(physics.names, jnp.asarray(values))
+    g = physics.geometry
+    weigh = np.asarray(body.forces_of(p, g, jnp.eye(3))).T  # [3, 3] of ν̇
+    full = means(record, physics, values)
+    reach = np.abs(np.linalg.solve(weigh, full))
+    loose = replace(unrest, push=np.maximum(unrest.push, LOOSE * reach))
+    rows, acceleration, sd = _knots(unexplained.posterior(linear, d, loose, record))
+    force = acceleration @ weigh.T
+    doubt = np.sqrt(sd**2 @ weigh.T**2)
+    spread = 1.4826 * np.median(np.abs(force), axis=0)
+    misfit = np.sqrt(np.maximum(spread**2 - np.median(doubt, axis=0) ** 2, 0.0))
+    state = unexplained.around(record, record.state, rows)
+    actuator = unexplained.around(record, record.actuator, rows)
+    parts = physics.forces(
+        jnp.asarray(values), jnp.asarray(state), jnp.asarray(actuator), jnp.zeros((len(rows), 2))
+    )
+    limit = np.abs(np.asarray(parts["hull"])) + USUAL * misfit
+    limit += np.where(_resting(record, physics, rows)[:, None], 0.0, full)
+    if g.wind:
+        angle = np.linspace(0.0, 2.0 * math.pi, 73)
+        worst = np.abs(np.asarray(air.wind(p, g, jnp.cos(angle), jnp.sin(angle)))).max(0)
+        speed = np.linalg.norm(unexplained.around(record, record.wind, rows), axis=1)
+        limit += (GUST * speed[:, None]) ** 2 * worst
+    return Balance(rows, force, doubt, limit, full)
+
+
+def means(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:
+    """|X|, |Y|, |N| [3] that screws, rudders and thrusters could make of a ship at rest.
+
+    Unit by unit, each at its worst for each channel: more than any one setting of all of them.
+    """
+    g = physics.geometry
+    column = _ranges(record)
+    units = [
+        [s.column, *(b.column for b in g.rudders if b.behind == i)]
+        for i, s in enumerate(g.propellers)
+    ]
+    units += [[t.column, *([] if t.turned_by is None else [t.turned_by])] for t in g.thrusters]
+    total = np.zeros(3)
+    for unit in units:
+        tried = itertools.product(*(column[i] for i in unit))
+        settings = np.array(list(tried))
+        actuator = np.zeros((len(settings), g.actuators))
+        actuator[:, unit] = settings
+        rest = jnp.zeros((len(settings), 6))
+        parts = physics.forces(
+            jnp.asarray(values), rest, jnp.asarray(actuator), jnp.zeros((len(settings), 2))
+        )
+        own = sum(np.asarray(parts[k]) for k in ("propeller", "rudder", "thruster") if k in parts)
+        total += np.abs(own).max(0)
+    return total
+
+
+def _ranges(record: Record) -> list[np.ndarray]:
+    """Settings to try of each actuator: its stops, or the farthest it was seen."""
+    found = []
+    for i, actuator in enumerate(record.profile.actuators):
+        offset, factor = actuator.scale()[0]
+        far = float(np.abs(record.actuator[:, i]).max(initial=0.0))
+        low, high = (
+            sorted((limit - offset) * factor for limit in actuator.limits)
+            if actuator.limits
+            else (-far, far)
+        )
+        if actuator.kind == "azimuth":
+            low, high = -math.pi, math.pi
+        drives = actuator.kind in ("propeller", "thruster")
+        found.append(np.array([low, high]) if drives else np.linspace(low, high, ANGLES))
+    return found
+
+
+def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
+    """[K] bool: no screw has turned for RESTS."""
+    drives = [u.column for u in (*physics.geometry.propellers, *physics.geometry.thrusters)]
+    ranges = _ranges(record)
+    most = np.array([np.abs(ranges[i]).max() for i in drives])
+    power = (np.abs(record.actuator[:, drives]) / np.maximum(most, 1e-9)).max(1)
+    turned = np.concatenate(([0], np.cumsum(power > STILL)))
+    before = np.maximum(rows - round(RESTS / record.step), record.firsts[rows])
+    after = np.minimum(rows + round(0.5 * KNOT / record.step), record.lasts[rows])
+    return turned[after + 1] == turned[before]
+
+
+def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows [K] in order, means and standard deviations [K, 3], each instant once."""
+    keep = unexplained.once(found)
+    order = np.argsort(found.rows[keep])
+    mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
+    return found.rows[keep][order], mean, sd
+
+
+def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
+    """Knots that follow each other."""
+    apart = (np.diff(record.firsts[rows]) != 0) | (np.diff(record.time[rows]) > 1.5 * KNOT)
+    ends = [0, *(np.flatnonzero(apart) + 1).tolist(), len(rows)]
+    yield from (slice(a, b) for a, b in itertools.pairwise(ends))
+
+
+@dataclass(frozen=True, slots=True)
+class _Event:
+    voyage: int
+    start: float
+    end: float
+    channel: int
+    peak: float
+    full: float
+    times: float  # the limit
+
+
+def _event(
+    record: Record, weighed: Balance, part: slice, channel: int, first: int, last: int
+) -> _Event:
+    """Knots first to last of a part, and on to where the force has fallen to half."""
+    force, rows = weighed.force[part, channel], weighed.rows[part]
+    at = first + int(np.abs(force[first : last + 1]).argmax())
+    peak = float(force[at])
+    share = force / peak
+    time = record.time[rows]
+    low = np.flatnonzero(share[:first] < EDGE)
+    high = np.flatnonzero(share[last + 1 :] < EDGE) + last + 1
+
+    def crossing(outside: int, inside: int) -> float:
+        part = (share[inside] - EDGE) / (share[inside] - share[outside])
+        return float(time[inside] + part * (time[outside] - time[inside]))
+
+    start = crossing(low[-1], low[-1] + 1) if len(low) else float(time[0])
+    end = crossing(high[0], high[0] - 1) if len(high) else float(time[-1])
+    full = weighed.full[channel if channel == 2 else 0]
+    times = float((np.abs(force) / weighed.limit[part, channel])[first : last + 1].max())
+    return _Event(int(record.voyage[rows[0]]), start, end, channel, peak, float(full), times)
+
+
+def _merged(events: list[_Event], names: tuple[str, ...]) -> Iterator[Stretch]:
+    """Over channels and short breaks; what is shorter than LEAST after all is left out."""
+    events = sorted(events, key=lambda e: (e.voyage, e.start))
+    groups: list[list[_Event]] = []
+    for event in events:
+        last = groups[-1] if groups else []
+        near = last and last[0].voyage == event.voyage
+        if near and event.start - max(e.end for e in last) < GAP:
+            last.append(event)
+        else:
+            groups.append([event])
+    for group in groups:
+        worst = max(group, key=lambda e: e.times)
+        start, end = group[0].start, max(e.end for e in group)
+        if end - start >= LEAST:
+            yield Stretch(
+                names[worst.voyage], start, end, CHANNELS[worst.channel], worst.peak,
+                100.0 * abs(worst.peak) / worst.full,
+            )  # fmt: skip
