@@ -362,6 +362,35 @@ def compare(
             raise typer.Exit(LOST) from None
 
 
+@app.command()
+def diagnose(
+    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    out: Annotated[Path, typer.Option(help="Folder for the report and its pictures.")] = Path(
+        "diagnosis"
+    ),
+    extend: Annotated[
+        Path | None, typer.Option(help="Write the model with the named causes as this run.")
+    ] = None,
+    cause: Annotated[
+        list[Path] | None,
+        typer.Option("--cause", help="A Python file with causes of your own; several times."),
+    ] = None,
+    json_to: JsonOption = None,
+) -> None:
+    """What the simulation gets wrong, why, the extended model, and the gain on held-out voyages.
+
+    Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
+    """
+    from pipelines.diagnose import diagnose_command
+
+    found = diagnose_command(
+        store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
+    )
+    _answer(found.text, found.content, json_to)
+
+
 def _show(recording: Path, web: bool) -> None:
     from shiplog import viewer
 

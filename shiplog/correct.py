@@ -53,7 +53,7 @@ def _velocity_scale(record: Record, p: np.ndarray) -> Record:
     return reduced(record, replace(seen, velocity=seen.velocity / (1.0 + p[0])))
 
 
-REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order in which `parity` has them apply
+REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order of parity's equations, from outside
     ("clock_offset", "yaw_rate"): ClockOffset("yaw_rate").read,
     ("clock_offset", "gnss"): ClockOffset("gnss").read,
     ("clock_offset", "position"): ClockOffset("position").read,
@@ -69,8 +69,8 @@ REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order in which `parity` ha
 
 def corrected(voyage: Voyage) -> Voyage:
     """The voyage with what is certain put right; its findings say so. Rows and times stay."""
-    sure = {(e.kind, e.channel): e for e in voyage.estimates if e.certain}
-    done = tuple(sure[key] for key in REMEDIES if key in sure)
+    done = tuple(e for e in voyage.estimates if e.certain)
+    sure = {(e.kind, e.channel) for e in done}
     table, gaps = put_right(voyage.table, voyage.profile, done)
     said = [
         replace(f, sentence=f"{f.sentence} Corrected.") if (f.kind, f.channel) in sure else f
@@ -87,9 +87,11 @@ def put_right(
     if not faults:
         return table, []
     record, rows = _record(table, profile)
-    for e in faults:
-        size = (e.value - e.none) * units.factor(e.unit)
-        record = REMEDIES[e.kind, e.channel](record, np.array([size]))
+    found = {(e.kind, e.channel): e for e in faults}
+    for key, remedy in REMEDIES.items():
+        if e := found.get(key):
+            size = (e.value - e.none) * units.factor(e.unit)  # zero where there is no fault
+            record = remedy(record, np.array([size]))
     mark = table["quality"].to_numpy().copy()
     before = _state(table)
     state = np.full_like(before, np.nan)
@@ -97,15 +99,15 @@ def put_right(
     state[:, HEADING] = midship.wrap(state[:, HEADING])
     good = (mark & int(channels.UNUSABLE)) == 0
     whole, gaps = good.copy(), []
-    for name, columns in MEASURED.items():  # a velocity off midship wants the yaw rate: said once
+    for name, columns in MEASURED.items():  # a velocity needs its yaw rate: a row is said once
         lost = whole & ~np.isfinite(state[:, columns]).all(axis=1)
         whole &= ~lost
         spans = [quality.seconds(stretch) for stretch in quality.stretches(lost)]
         gaps += quality.said("gap", name, spans, "has no sample once clocks are put right")
     mark[good & ~whole] |= int(Quality.GAP)
     state = np.where(good[:, None], state, before)
-    columns = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]
-    table = table.with_columns(*columns, pl.Series("quality", mark))
+    put = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]
+    table = table.with_columns(*put, pl.Series("quality", mark))
     return table.with_columns(pl.col(STATE).fill_nan(None)), gaps
 
 

@@ -12,15 +12,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog import channels, unexplained
+from shiplog import channels, midship, unexplained
 from shiplog.evidence import Unrest
 from shiplog.models.mmg import MMG, body
 from shiplog.models.mmg import wind as air
 from shiplog.models.mmg.model import named
-from shiplog.quality import stretches
+from shiplog.quality import jumps, stretches
 from shiplog.record import Record
 from shiplog.segments import KNOT, Linear
 from shiplog.unexplained import Unexplained
@@ -31,6 +32,8 @@ USUAL = 5.0  # times the spread of what this model leaves of this ship
 GUST = 1.2  # of the measured wind speed, from whichever side is worst
 STILL = 0.05  # of full power: below, a screw stands
 RESTS = 5.0  # s that screws have stood before their jets are gone
+RESTING = 0.5  # of her means that stay allowed then: a thruster that nobody records
+DOUBT = 5.0  # s around a jump of position or heading, where velocities are not believed
 LEAST = 2.0  # s
 GAP = 5.0  # s: after a shorter break it is still the same event
 EDGE = 0.5  # an event begins and ends where its force passes half of the peak
@@ -105,6 +108,7 @@ def find(
         return ()  # who knows what drives her
     weighed = balance(linear, d, unrest, record, physics, values)
     beyond = np.abs(weighed.force) > weighed.limit + SURE * weighed.sd
+    beyond &= ~_contradicted(record, weighed.rows)[:, None]
     found = []
     for part in _unbroken(record, weighed.rows):
         for channel in range(3):
@@ -130,11 +134,8 @@ def balance(
     misfit = np.sqrt(np.maximum(spread**2 - np.median(doubt, axis=0) ** 2, 0.0))
     state = unexplained.around(record, record.state, rows)
     actuator = unexplained.around(record, record.actuator, rows)
-    parts = physics.forces(
-        jnp.asarray(values), jnp.asarray(state), jnp.asarray(actuator), jnp.zeros((len(rows), 2))
-    )
-    limit = np.abs(np.asarray(parts["hull"])) + USUAL * misfit
-    limit += np.where(_resting(record, physics, rows)[:, None], 0.0, full)
+    limit = np.abs(_forces(physics, values, state, actuator)["hull"]) + USUAL * misfit
+    limit += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if g.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
         worst = np.abs(np.asarray(air.wind(p, g, jnp.cos(angle), jnp.sin(angle)))).max(0)
@@ -161,13 +162,25 @@ def means(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:
         settings = np.array(list(tried))
         actuator = np.zeros((len(settings), g.actuators))
         actuator[:, unit] = settings
-        rest = jnp.zeros((len(settings), 6))
-        parts = physics.forces(
-            jnp.asarray(values), rest, jnp.asarray(actuator), jnp.zeros((len(settings), 2))
-        )
-        own = sum(np.asarray(parts[k]) for k in ("propeller", "rudder", "thruster") if k in parts)
+        parts = _forces(physics, values, np.zeros((len(settings), 6)), actuator)
+        own = sum(parts[name] for name in ("propeller", "rudder", "thruster") if name in parts)
         total += np.abs(own).max(0)
     return total
+
+
+def _forces(
+    physics: MMG, values: np.ndarray, state: np.ndarray, actuator: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Parts of MMG.forces [n, 3] in calm air."""
+    size = 1 << (len(state) - 1).bit_length()  # of few sizes, so that few are compiled
+    padded = (np.resize(v, (size, v.shape[1])) for v in (state, actuator))
+    found = _compiled(physics, values, *padded, np.zeros((size, 2)))
+    return {name: np.asarray(force)[: len(state)] for name, force in found.items()}
+
+
+@jax.jit
+def _compiled(physics, values, state, actuator, wind):
+    return physics.forces(values, state, actuator, wind)
 
 
 def _ranges(record: Record) -> list[np.ndarray]:
@@ -198,6 +211,26 @@ def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
     before = np.maximum(rows - round(RESTS / record.step), record.firsts[rows])
     after = np.minimum(rows + round(0.5 * KNOT / record.step), record.lasts[rows])
     return turned[after + 1] == turned[before]
+
+
+def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
+    """[K] bool: position or heading jumps nearby. A receiver that stood still and caught up
+    looks like a ship that was stopped and thrown."""
+    sensors = record.profile.sensors
+    state, shaken = record.state, np.zeros(len(record), dtype=bool)
+    velocity = midship.to_body(state[:, [1, 3]], -state[:, 4])
+    for a in np.flatnonzero(record.starts):
+        part = slice(a, record.lasts[a] + 1)
+        for gone, rate, noise in (
+            (state[part][:, [0, 2]], velocity[part], sensors.noise("position")),
+            (state[part, 4, None], state[part, 5, None], sensors.noise("heading")),
+        ):
+            for row, _ in jumps(gone, rate, record.seen[part], noise):
+                shaken[a + row] = True
+    near = np.concatenate(([0], np.cumsum(shaken)))
+    reach = round(DOUBT / record.step)
+    low, high = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(record) - 1)
+    return near[high + 1] > near[low]
 
 
 def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -233,17 +266,17 @@ def _event(
     force, rows = weighed.force[part, channel], weighed.rows[part]
     at = first + int(np.abs(force[first : last + 1]).argmax())
     peak = float(force[at])
-    share = force / peak
-    time = record.time[rows]
+    share, time = np.abs(force) / abs(peak), record.time[rows]
     low = np.flatnonzero(share[:first] < EDGE)
     high = np.flatnonzero(share[last + 1 :] < EDGE) + last + 1
 
-    def crossing(outside: int, inside: int) -> float:
-        part = (share[inside] - EDGE) / (share[inside] - share[outside])
-        return float(time[inside] + part * (time[outside] - time[inside]))
+    def crossing(inside: int, outside: int) -> float:
+        """When it passed EDGE; the knot inside, where that was beyond her but below EDGE."""
+        way = (share[inside] - EDGE) / (share[inside] - share[outside])
+        return float(time[inside] + max(way, 0.0) * (time[outside] - time[inside]))
 
-    start = crossing(low[-1], low[-1] + 1) if len(low) else float(time[0])
-    end = crossing(high[0], high[0] - 1) if len(high) else float(time[-1])
+    start = crossing(low[-1] + 1, low[-1]) if len(low) else float(time[0])
+    end = crossing(high[0] - 1, high[0]) if len(high) else float(time[-1])
     full = weighed.full[channel if channel == 2 else 0]
     times = float((np.abs(force) / weighed.limit[part, channel])[first : last + 1].max())
     return _Event(int(record.voyage[rows[0]]), start, end, channel, peak, float(full), times)

@@ -376,6 +376,23 @@ class Trial:
         assert best is not None
         return best
 
+    def pulse_force(self, point: Point, base: Found, pulses: Pulses) -> np.ndarray:
+        """[S, J] force of the unrecorded thruster at the knots [N], as far as the data tell."""
+        ref = self.reference
+        included = tuple(base.numbers)
+        level = self.level(point, base.louder, included)
+        d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
+        for name, values in base.numbers.items():
+            d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)
+        unrest = self.unrest.louder(base.louder)
+        z = evidence.starts_and_knots(point.linear, d, unrest)
+        knots = self.grid.knots
+        kernel = unrest.kernel(knots)
+        pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
+        share = pulse @ np.linalg.inv(kernel)
+        pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+        return pushed[:, 1] / pulses.unit[1]
+
 
 @dataclass(frozen=True)
 class Pulses:

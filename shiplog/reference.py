@@ -9,7 +9,7 @@ it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -271,3 +271,32 @@ def read(
             moved[..., column] = (more.driven - less.driven) / (2.0 * step[i])
             shown[..., column] = (more.y - less.y) / (2.0 * step[i])
     return base, moved, shown
+
+
+def places(record: Record, count: int) -> tuple[np.ndarray, float]:
+    """Points [K, 2] that cover where the ship was, and the spacing between them [m]: each the
+    farthest from those before it (Gonzalez 1985)."""
+    every = record.state[:: max(1, len(record) // 4000)][:, [0, 2]]
+    chosen = [every.mean(0)]
+    nearest = np.linalg.norm(every - chosen[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(every[int(nearest.argmax())])
+        nearest = np.minimum(nearest, np.linalg.norm(every - chosen[-1], axis=1))
+    points = np.array(chosen)
+    apart = np.linalg.norm(points[:, None] - points, axis=-1) + np.diag(np.full(count, np.inf))
+    return points, max(float(np.median(apart.min(0))), 1e-3)
+
+
+def assume(model: Extended, setting: Setting, start: Start, record: Record) -> Reference:
+    """Where no campaign shows what is usual: coefficients as free as they plausibly are, and the
+    unrest as large as it is on these very voyages."""
+    whole = learn(model, setting, start, record, kappa=USUAL_KAPPA)
+    unit = whole.columns.unit
+    information = np.diag(whole.columns.known.copy())
+    prior = np.zeros(len(unit))
+    base = whole.columns.base
+    prior[:base] = (start.values - whole.theta) / unit[:base]
+    causes = slice(base, len(unit))
+    # no cause has a usual size where nothing was usual
+    information[causes, causes] = np.eye(len(unit) - base) * HELD
+    return replace(whole, information=information, pull=prior, nominal=None, grams=None)

@@ -9,6 +9,7 @@
     <run>/seed<k>/model.safetensors  parameters.toml  identified.parquet    of physical models
     <run>/cross_validation.parquet          L of every training window by a fit without its voyage
     <run>/band.safetensors                  how far off a simulation may be
+    <run>/extension.json  extension.safetensors   causes that a diagnosis put into it
     <run>/errors.parquet  rollouts.parquet  of the latest evaluation, per window, step and seed
 
 While it is being trained a run is called <run>.partial; it is renamed when every seed is done.
@@ -20,8 +21,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -35,11 +38,19 @@ from shiplog import config as configuration
 from shiplog.band import Band
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
+from shiplog.extend import Extension, ExtendedSimulator, campaign
+from shiplog.models import mmg, network
+from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
+from shiplog.models.mmg import MMG
 from shiplog.profile import Profile
+from shiplog.record import Record
+from shiplog.reference import Start
 from shiplog.report import finite
 from shiplog.sensitivity import Simulator
 from shiplog.train import HISTORY, Progress
+
+BEND = 0.3  # standard deviations of ν̇ that a network's smooth bends may be off
 
 
 @dataclass(frozen=True)
@@ -57,6 +68,8 @@ class Run:
     @property
     def label(self) -> str:
         """How results are headed: model, data, recipe, and how the wind enters if it does."""
+        if (held := self.extension) is not None:
+            return f"{self.config.model} with {listed(c.label for c in held.causes)}"
         if self.config.physical:
             off = f", without {listed(off)}" if (off := self.config.physics.without) else ""
             how = f"identified on {self.config.data}" if self.config.physics.fit else "as given"
@@ -95,14 +108,86 @@ class Run:
     def empty_model(self) -> FeedForward:
         return FeedForward(self.shape, self.scaling())
 
-    def models(self) -> dict[int, FeedForward | Simulator]:
-        """Seed → what can be simulated: a network in float64, or physics with its numbers."""
+    def models(self) -> dict[int, FeedForward | Simulator | ExtendedSimulator]:
+        """Seed → what can be simulated: a network in float64, physics with its numbers, or
+        either with causes in it."""
         one = self.simulator if self.config.physical else self.model
+        if self.extension is not None:
+            one = self.extended
         return {seed: one(seed) for seed in self.config.seeds}
+
+    @property
+    def extension(self) -> Extension | None:
+        """The causes that a diagnosis named and put into this run; None for a plain one."""
+        path = self.path / "extension.json"
+        if not path.is_file():
+            return None
+        told = json.loads(path.read_text("utf-8"))
+        arrays = _arrays(self.path / "extension.safetensors")
+        return Extension.of(told, arrays)
+
+    def base(self) -> tuple[Any, Start, MMG, np.ndarray]:
+        """What a diagnosis bends: the plain model, its coefficients, and an MMG of the ship whose
+        coefficients causes change, with their values."""
+        ship, main, _ = mmg.geometry_of(self.profile, self.config.physics.without)
+        path = mmg.beside(self.profile.source)
+        usual = mmg.load(path, ship, self.config.physics.without) if path else None
+        usual = usual or mmg.estimated(ship, main)
+        seed = self.config.seeds[0]
+        if not self.config.physical:
+            net = network.compiled(self.model(seed))
+            count = len(net.names)
+            wide = np.full(count, BEND)
+            start = Start(np.zeros(count), np.zeros(count), wide, -10.0 * wide, 10.0 * wide)
+            return net, start, mmg.MMG(ship), usual.values
+        simulator = self.simulator(seed)
+        known = self.identified(seed)
+        count, more = len(usual.names), len(simulator.theta) - len(usual.names)
+        # a hybrid's network stays as it was trained
+        start = Start(
+            simulator.theta,
+            np.concatenate((known["start"].to_numpy(), simulator.theta[count:])),
+            np.concatenate((known["spread"].to_numpy(), np.full(more, 1e-9))),
+            np.concatenate((usual.low, np.full(more, -np.inf))),
+            np.concatenate((usual.high, np.full(more, np.inf))),
+        )
+        stand_in = mmg.MMG(ship, self.config.physics.substeps)
+        return simulator.model, start, stand_in, simulator.theta[:count]
+
+    def extended(
+        self,
+        seed: int,
+        constants: Mapping[str, np.ndarray] | None = None,
+        record: Record | None = None,
+    ) -> ExtendedSimulator:
+        """The run's model, with its extension if it has one, ready to take in causes.
+
+        constants   what further causes need; record: the campaign they are found in
+        """
+        held = self.extension
+        own = self.simulator(seed) if self.config.physical else None
+        base, start, stand_in, values = self.base()
+        if own is None:
+            base = network.compiled(self.model(seed))
+        theta = start.begin if own is None else own.theta
+        covariance = np.zeros((len(theta),) * 2) if own is None else own.covariance
+        model = Extended(base if own is None else own.model, (), stand_in, values, constants or {})
+        shares, lengths = campaign(record) if record is not None else ({}, {})
+        plain = ExtendedSimulator(model, theta, covariance, self.profile, shares, lengths)
+        if held is None:
+            return plain
+        plain = replace(
+            plain, shares={**held.shares, **shares}, lengths={**held.lengths, **lengths}
+        )
+        return plain.with_causes(held.causes, held.numbers, held.covariance, held.constants)
+
+    def extension_numbers(self) -> dict[str, np.ndarray]:
+        """Label → numbers of the causes it has already."""
+        return {} if self.extension is None else dict(self.extension.numbers)
 
     def simulator(self, seed: int) -> Simulator:
         """A physical model: equations of the profile's geometry, numbers of this seed."""
-        from shiplog.models import hybrid, mmg
+        from shiplog.models import hybrid
 
         arrays = _arrays(self._seed(seed) / "model.safetensors")
         ship, _, _ = mmg.geometry_of(self.profile, self.config.physics.without)
@@ -295,6 +380,28 @@ def open_folder(path: Path) -> Run:
     """A run folder as it stands, finished or partial."""
     profile = Profile.model_validate(json.loads((path / "profile.json").read_text("utf-8")))
     return Run(path, configuration.load(path / "config.toml"), profile)
+
+
+def extend(run: Run, out: Path, simulator: ExtendedSimulator, files: Sequence[Path] = ()) -> Run:
+    """A new run: everything of the old one, and the causes. Raises RunError for a taken name."""
+    if out.exists():
+        raise RunError(f"{out} exists already.", hint="choose another --extend, or remove it.")
+    partial = out.with_name(f"{out.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    shutil.copytree(
+        run.path, partial,
+        ignore=shutil.ignore_patterns(
+            "errors.parquet", "rollouts.parquet", "*.rrd", "band.safetensors", "extension.*",
+            "extension-*.py",
+        ),
+    )  # fmt: skip
+    told, arrays = Extension.kept(simulator, len(simulator.model.base.names))
+    for i, path in enumerate(files):
+        shutil.copy(path, partial / f"extension-{i}.py")
+    write_json(partial / "extension.json", told | {"base": run.name, "files": len(files)})
+    _save_arrays(partial / "extension.safetensors", arrays)
+    partial.rename(out)
+    return Run(out, run.config, run.profile)
 
 
 def write_json(path: Path, content: dict) -> None:

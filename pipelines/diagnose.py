@@ -1,0 +1,426 @@
+"""A model and voyages to a verdict: what is wrong, why, the extended model, the gain."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.prepare import seconds
+from pipelines.provenance import Answer, provenance
+from pipelines.split import plan
+from shiplog import causes as catalogue
+from shiplog import coverage as covering
+from shiplog import diagnose, record, reference, runs, segments, table, user_causes, windows
+from shiplog import verdict as verdicts
+from shiplog.causes import Cause, Setting
+from shiplog.diagnose import Decision, Named
+from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.extend import ExtendedSimulator
+from shiplog.gain import Gain, gain, parts
+from shiplog.hypotheses import Trial
+from shiplog.models import mmg
+from shiplog.models.extended import Extended
+from shiplog.record import Record
+from shiplog.reference import Reference, Start
+from shiplog.runs import Run
+from shiplog.sensitivity import series
+from shiplog.store import Store
+from shiplog.verdict import Interval, Verdict
+from shiplog.windows import Windows
+
+log = logging.getLogger(__name__)
+
+LEAST_S = 240.0  # of unbroken record, below which nothing can be said
+PLACES = 12  # of a map of the bottom
+UNCOVERED = 0.5  # share of a window's seconds outside the training data
+MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
+SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
+PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict and what it rests on."""
+
+    verdict: Verdict
+    decision: Decision | None
+    trial: Trial | None
+    windows: Windows | None
+    before: ExtendedSimulator | None
+    after: ExtendedSimulator | None
+    folder: Path
+
+
+def diagnose_run(
+    run_path: Path,
+    store: Store,
+    voyages: Sequence[str],
+    out: Path,
+    *,
+    extend: Path | None = None,
+    cause_files: Sequence[Path] = (),
+) -> Diagnosis:
+    """The whole way. Raises ShiplogError."""
+    began = time.time()
+    run = runs.load(run_path)
+    names = _trial_voyages(run, store, voyages)
+    profile = store.profile(names)
+    if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
+        raise RunError(
+            f"{run.name} is of {run.profile.ship.name!r} with {listed(run.profile.columns)}; the "
+            f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
+            hint="diagnose a ship with a model of her own.",
+        )
+    trained = [*run.config.split.training, *run.config.split.validation]
+    before_effect = not set(names) & set(trained) and run.config.physics.fit
+    recorded = _record(store, names, profile)
+    notes: list[str] = []
+    if recorded.seconds < LEAST_S or len(segments.begins(recorded)) < 4:
+        return _too_little(run, recorded, before_effect, out)
+    nominal = None
+    if before_effect:
+        stored = {entry.name for entry in store.entries()}
+        there = [n for n in trained if n in stored]
+        if there:
+            nominal = _record(store, there, profile)
+        if nominal is None or len(segments.begins(nominal)) < 8:
+            nominal = None
+            notes.append(
+                f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
+                "this ship is not known, and causes that another fit would absorb are not tested."
+            )
+    trial, untested = _trial(run, nominal, recorded, cause_files)
+    log.info(
+        "%s against %s: %d segments of %d s, κ %.0f",
+        listed(names, most=4), run.name, len(trial.rows), segments.SECONDS,
+        trial.reference.kappa,
+    )  # fmt: skip
+    decision = diagnose.decide(trial, run.extension_numbers())
+    cut = _windows(run, store, names, profile)
+    before = run.extended(run.config.seeds[0], trial.reference.model.constants, recorded)
+    after, found, decision, dropped = _gain(trial, decision, cut, before, recorded)
+    verdict = _verdict(
+        run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
+        _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial,
+    )  # fmt: skip
+    done = Diagnosis(verdict, decision, trial, cut, before, after, out)
+    _save(done, run, store, names, began)
+    if extend is not None:
+        _extend(run, done, extend)
+    return done
+
+
+def _trial_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
+    if voyages:
+        return store.select(list(voyages))
+    used = {*run.config.split.training, *run.config.split.validation}
+    names = [n for n in store.select() if n not in used]
+    if not names:
+        raise StoreError(
+            f"Every voyage in {store.path} was used to make {run.name}.",
+            hint="name some with --voyages, or ingest voyages it has not seen.",
+        )
+    return names
+
+
+def _record(store: Store, names: Sequence[str], profile) -> Record:
+    return record.read([frame.collect() for frame in store.tables(names)], names, profile)
+
+
+def _trial(
+    run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path]
+) -> tuple[Trial, dict[str, str]]:
+    """Reference and trial; which causes cannot be tested, and why."""
+    usual = nominal if nominal is not None else recorded
+    setting = _setting(run, usual, recorded)
+    every: tuple[Cause, ...] = (*catalogue.CATALOGUE, *user_causes.load(cause_files))
+    untested: dict[str, str] = {}
+    chosen = []
+    for cause in every:
+        missing = cause.missing(setting)
+        if missing is None and nominal is None and cause.absorbed:
+            missing = "a model fitted to these voyages, or to none, absorbs it"
+        if missing is not None:
+            untested[cause.label] = missing
+        else:
+            chosen.append(cause.on(setting))
+    constants: dict[str, np.ndarray] = {}
+    for cause in chosen:
+        constants |= cause.constants(setting)
+    base, start, stand_in, values = run.base()
+    model = Extended(base, tuple(chosen), stand_in, values, constants)
+    if nominal is not None:
+        known = reference.learn(model, setting, start, nominal)
+    else:
+        known = reference.assume(model, setting, start, recorded)
+    return Trial(known, recorded, tuple(run.extension_numbers())), untested
+
+
+def _setting(run: Run, usual: Record, recorded: Record) -> Setting:
+    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
+    _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
+    places, spacing = reference.places(recorded, PLACES)
+    scale = {
+        "speed": max(speed, 1e-3), "length": main.length, "mass": main.mass,
+        "moment": main.mass * main.length,
+    }  # fmt: skip
+    return Setting(run.profile, scale, places, spacing)
+
+
+def _windows(run: Run, store: Store, names: Sequence[str], profile) -> Windows | None:
+    rows = table.with_elapsed(seconds(store, names, profile))
+    planned = plan(rows, "ref", run.config.window)
+    if planned.height == 0:
+        return None
+    return windows.cut(
+        rows, planned, run.config.window, profile.actuator_names, profile.wind_names
+    )
+
+
+def _gain(
+    trial: Trial,
+    decision: Decision,
+    cut: Windows | None,
+    before: ExtendedSimulator,
+    recorded: Record,
+) -> tuple[ExtendedSimulator | None, Gain | None, Decision, dict[str, str]]:
+    """Causes kept for what they are worth on held-out voyages; numbers without each voyage."""
+    dropped: dict[str, str] = {}
+    if not decision.named or cut is None:
+        return None, None, decision, dropped
+    steps = series(cut).steps
+    measured = cut.state.double().numpy()
+    usual = parts(before.states(cut, before.theta) - measured, steps)
+    voyages = cut.plan["voyage"].to_list()
+
+    def worth(named: tuple[Named, ...]) -> Gain:
+        after = np.empty_like(usual)
+        for voyage, rows in _folds(cut, recorded):
+            numbers = _without(trial, decision, named, voyage)
+            simulator = before.with_causes([n.cause for n in named], numbers, None)
+            part = cut.pick(rows)
+            states = simulator.states(part, simulator.theta)
+            after[rows.numpy()] = parts(
+                states - part.state.double().numpy(), series(part).steps
+            )
+        return gain(usual, after, voyages)
+
+    named = decision.named
+    found = worth(named)
+    if len(named) > 1:
+        for one in list(named):
+            rest = tuple(n for n in named if n is not one)
+            without = worth(rest)
+            if without.after < found.after and one.cause.moves:
+                dropped[one.cause.label] = (
+                    f"no gain on held-out voyages ({1.0 - found.after / without.after:+.1%})"
+                )
+                named, found = rest, without
+                break
+    elif not found.real and found.reduction < 0.0 and named[0].cause.moves:
+        dropped[named[0].cause.label] = (
+            f"no gain on held-out voyages ({found.reduction:+.1%})"
+        )
+        named = ()
+    if not named:
+        verdict = "named" if decision.pulses else "none"
+        return None, None, replace(decision, named=(), verdict=verdict), dropped
+    after = before.with_causes(
+        [n.cause for n in named], {n.cause.label: n.numbers for n in named},
+        {n.cause.label: n.covariance for n in named},
+    )  # fmt: skip
+    return after, found, replace(decision, named=named), dropped
+
+
+def _folds(cut: Windows, recorded: Record):
+    """(what is left out of the fit, window rows): whole voyages, or the halves of one alone."""
+    import torch
+
+    names = cut.plan["voyage"].to_list()
+    known = list(dict.fromkeys(names))
+    if len(known) > 1:
+        for name in known:
+            rows = torch.tensor([i for i, n in enumerate(names) if n == name])
+            yield (name, None), rows
+        return
+    elapsed = cut.plan["elapsed"].to_numpy()
+    middle = 0.5 * (elapsed.min() + elapsed.max() + float(cut.dt[0].sum()))
+    for late in (False, True):
+        rows = torch.tensor(np.flatnonzero((elapsed >= middle) == late))
+        if len(rows):
+            yield (known[0], (middle, late)), rows
+
+
+def _without(
+    trial: Trial, decision: Decision, named: tuple[Named, ...], left: tuple
+) -> dict[str, np.ndarray]:
+    """Numbers of the named causes from the other voyages alone."""
+    voyage, half = left
+    segment = decision.point.linear.cut
+    index = trial.record.names.index(voyage) if voyage in trial.record.names else -1
+    out = segment.voyage == index
+    if half is not None:
+        middle, late = half
+        out &= (trial.record.time[segment.rows] >= middle) == late
+    labels = tuple(n.cause.label for n in named)
+    included = (*trial.fixed, *labels)
+    numbers = trial.without(decision.point, included, decision.louder, out)
+    return {label: numbers[label] for label in labels}
+
+
+def _uncovered(run: Run, store: Store, names, profile, cut: Windows | None) -> list[Interval]:
+    """Windows that the training data never came near."""
+    if cut is None:
+        return []
+    import polars as pl
+
+    rows = table.with_elapsed(seconds(store, names, profile))
+    seen = covering.of(run.training(), profile.actuator_names, profile.has_wind)
+    numbered = cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
+        "elapsed",
+    )  # fmt: skip
+    size = run.config.window
+    whole = numbered.hstack(seen.table(rows, numbered, size))
+    found = []
+    for row in whole.filter(pl.col("coverage") < UNCOVERED).to_dicts():
+        within = rows.filter(
+            (pl.col("voyage") == row["voyage"])
+            & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)
+        )
+        why = covering.reason(row, within) or "unlike anything in the training data"
+        found.append(
+            Interval(
+                row["voyage"], float(row["elapsed"]), float(row["elapsed"] + size), "coverage",
+                f"Only {row['coverage']:.0%} of these seconds lie where the model was made: {why}.",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _verdict(
+    run, decision, found, before_effect, untested, dropped, notes, uncovered, count, trial
+) -> Verdict:
+    causes = [verdicts.cause_json(n) for n in decision.named]
+    if decision.pulses is not None:
+        share = decision.ranking.get(diagnose.PULSES, 0.95)
+        causes.append(verdicts.pulses_json(decision, _pulses(trial, decision), share))
+    structure = verdicts.structure_json(decision, run.profile.actuator_names)
+    said = "named" if causes else decision.verdict
+    if said == "named":
+        structure = None
+    family = structure["family"] if structure else ""
+    if said == "unknown" and family in SEEN and len(uncovered) > MOSTLY * count:
+        said = "coverage"
+    rejected = dict(decision.rejected) | dropped
+    rejected |= {k: f"not testable: {why}" for k, why in untested.items()}
+    traces = [
+        {
+            "name": n.cause.name,
+            "parameters": {k: v.as_json() for k, v in n.shown.items()},
+            "sentence": f"Present, but below practical size: {n.cause.sentence(n.shown)}",
+        }
+        for n in decision.traces
+    ]
+    return Verdict(
+        verdict=said,
+        said=verdicts.sentence(said, causes, structure, found, decision.louder),
+        run=run.name,
+        before_effect=before_effect,
+        causes=tuple(causes),
+        ranking=verdicts.ranking_json(decision),
+        rejected=tuple({"name": k.split(":")[0], "reason": why} for k, why in rejected.items()),
+        traces=tuple(traces),
+        structure=structure if said == "unknown" else None,
+        intervals=tuple(uncovered),
+        gain=found if causes else None,
+        notes=tuple(notes),
+    )
+
+
+def _pulses(trial: Trial, decision: Decision) -> list[dict]:
+    """When the unrecorded thruster worked: voyage, start_s, end_s, force_N."""
+    assert decision.pulses is not None
+    force = trial.pulse_force(decision.point, decision.base, decision.pulses)
+    rows = trial.rows
+    found: list[dict] = []
+    strongest = float(np.quantile(np.abs(force), 0.98))
+    for i, row in enumerate(rows):
+        name = trial.record.names[trial.record.voyage[row]]
+        begin = float(trial.record.time[row])
+        for k, value in enumerate(force[i][:-1]):
+            if abs(value) < PULSE_SURE * strongest:
+                continue
+            at = begin + segments.KNOT * k
+            last = found[-1] if found else None
+            joined = (
+                last is not None and last["voyage"] == name
+                and at - last["end_s"] < 2.5 * segments.KNOT and last["force_N"] * value > 0
+            )  # fmt: skip
+            if joined:
+                assert last is not None
+                last["end_s"] = at
+                last["force_N"] = max(last["force_N"], float(value), key=abs)
+            else:
+                found.append(
+                    {"voyage": name, "start_s": at, "end_s": at, "force_N": float(value)}
+                )
+    return found
+
+
+def _too_little(run: Run, recorded: Record, before_effect: bool, out: Path) -> Diagnosis:
+    short = max(LEAST_S - recorded.seconds, segments.SECONDS * 4 - recorded.seconds, 0.0)
+    said = (
+        f"Too little for a verdict: {recorded.seconds:.0f} s can be used and {LEAST_S:.0f} s in "
+        f"unbroken stretches of {segments.SECONDS:.0f} s are needed. Log at least {short:.0f} s "
+        "more, with turns both ways, a stop, and runs on several headings."
+    )
+    verdict = Verdict("coverage", said, run.name, before_effect)
+    done = Diagnosis(verdict, None, None, None, None, None, out)
+    _write(done)
+    return done
+
+
+def _write(done: Diagnosis) -> None:
+    done.folder.mkdir(parents=True, exist_ok=True)
+    (done.folder / "report.md").write_text(verdicts.markdown(done.verdict), encoding="utf-8")
+    runs.write_json(done.folder / "verdict.json", done.verdict.as_json())
+
+
+def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: float) -> None:
+    _write(done)
+    split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
+    runs.write_json(done.folder / "provenance.json", provenance(store, split, began))
+
+
+def _extend(run: Run, done: Diagnosis, out: Path) -> None:
+    """The named causes as a run of its own; none, and nothing is written."""
+    if done.after is None or done.decision is None:
+        log.info("nothing was named that a model can take in: %s is not written", out)
+        return
+    runs.extend(run, out, done.after)
+    log.info("extended model in %s", out)
+
+
+def diagnose_command(
+    store_path: Path,
+    run: Path,
+    *,
+    voyages: Sequence[str],
+    out: Path,
+    extend: Path | None,
+    cause_files: Sequence[Path],
+) -> Answer:
+    """`shiplog diagnose`."""
+    done = diagnose_run(
+        run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
+    )
+    text = f"{verdicts.markdown(done.verdict)}\nReport: {out / 'report.md'}"
+    if extend is not None and done.after is not None:
+        text += f"\nExtended model: {extend}"
+    return Answer(text, done.verdict.as_json())

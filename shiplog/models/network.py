@@ -1,0 +1,115 @@
+"""The paper's network compiled beside the physics, with what a diagnosis may bend it by.
+
+ν̇ = f_NN(ν, u, ω) + Σ w_k φ_k(ν, u, ω): smooth functions of the network's own inputs stand for all
+that another training of it could have learned.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from shiplog.models.feedforward import FeedForward
+from shiplog.models.mmg.wind import apparent
+
+BENDS = 24  # features, each in three channels
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase"],
+    meta_fields=["wind", "components", "input_tanh"],
+)
+@dataclass(frozen=True)
+class Network:
+    """θ is w [3K], zero for the network as it was trained.
+
+    weights     (W₁, b₁, W₂, b₂, ...), each W [out, in]
+    frequency   [inputs, K] and phase [K] of φ on the standardised inputs
+    """
+
+    weights: tuple
+    mean: np.ndarray | Array
+    std: np.ndarray | Array
+    out_mean: np.ndarray | Array
+    out_std: np.ndarray | Array
+    frequency: np.ndarray | Array
+    phase: np.ndarray | Array
+    wind: bool
+    components: bool
+    input_tanh: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(f"bend.{i}" for i in range(3 * self.phase.shape[0]))
+
+    @property
+    def substeps(self) -> int:
+        return 1
+
+    def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
+        """ν̇ [..., 3]; arguments as for MMG.acceleration."""
+        u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
+        parts = [u[..., None], v[..., None], r[..., None], actuator]
+        smooth = list(parts)
+        if self.wind:
+            ahead, starboard = apparent(true_wind, heading, u, v)
+            plain = [ahead[..., None], starboard[..., None]]
+            smooth += plain
+            if not self.components:
+                speed = jnp.sqrt(ahead**2 + starboard**2 + 1e-12)
+                angle = jnp.mod(jnp.arctan2(starboard, ahead), 2.0 * math.pi)
+                plain = [speed[..., None], angle[..., None]]
+            parts += plain
+        z = (jnp.concatenate(parts, -1) - self.mean) / self.std
+        hidden = jnp.tanh(z) if self.input_tanh else z
+        pairs = list(zip(self.weights[::2], self.weights[1::2], strict=True))
+        for w, b in pairs[:-1]:
+            hidden = jnp.tanh(hidden @ w.T + b)
+        w, b = pairs[-1]
+        said = (hidden @ w.T + b) * self.out_std + self.out_mean
+        # the bends go with the wind's components always: an angle jumps
+        s = jnp.concatenate(smooth, -1)
+        waves = jnp.cos(((s - self.smooth_mean) / self.smooth_std) @ self.frequency + self.phase)
+        count = self.phase.shape[0]
+        bent = waves @ theta.reshape(3, count).T * math.sqrt(2.0 / count)
+        return said + bent * self.out_std
+
+    @property
+    def smooth_mean(self) -> Array | np.ndarray:
+        return self.mean if self.components or not self.wind else self._apart(self.mean, 0.0)
+
+    @property
+    def smooth_std(self) -> Array | np.ndarray:
+        if self.components or not self.wind:
+            return self.std
+        # components are about as wide as the mean speed
+        return self._apart(self.std, jnp.hypot(self.mean[-2], self.std[-2]))
+
+    def _apart(self, values, wind):
+        return jnp.concatenate((values[:-2], jnp.full(2, wind)))
+
+
+def compiled(model: FeedForward, seed: int = 0) -> Network:
+    """A trained network."""
+    shape, scale = model.shape, model.scaling
+    rng = np.random.default_rng([seed, 77])
+    inputs = shape.inputs
+    return Network(
+        weights=tuple(w.detach().double().numpy() for w in model.weights),
+        mean=scale.input_mean.double().numpy(),
+        std=scale.input_std.double().numpy(),
+        out_mean=scale.output_mean.double().numpy(),
+        out_std=scale.output_std.double().numpy(),
+        frequency=rng.standard_normal((inputs, BENDS)) / math.sqrt(0.5 * inputs),
+        phase=rng.uniform(0.0, 2.0 * math.pi, BENDS),
+        wind=shape.wind,
+        components=shape.wind_input == "components",
+        input_tanh=shape.input_tanh,
+    )

@@ -1,0 +1,272 @@
+"""The answer of a diagnosis: for machines as the contract has it, for people in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from shiplog.diagnose import PULSES, Decision, Named
+from shiplog.exceptions import listed
+from shiplog.findings import CONTRACT
+from shiplog.gain import Gain
+
+SHARE_SAID = 0.01  # of a ranking
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of a voyage that is another matter: external, gap or coverage."""
+
+    voyage: str
+    start_s: float
+    end_s: float
+    kind: str
+    sentence: str
+
+    def as_json(self) -> dict:
+        return {
+            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
+            "kind": self.kind, "sentence": self.sentence,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `shiplog diagnose` answers.
+
+    verdict    named, none, unknown, coverage or external
+    causes     as the contract has them
+    said       one sentence
+    """
+
+    verdict: str
+    said: str
+    run: str
+    before_effect: bool
+    causes: tuple[dict, ...] = ()
+    ranking: tuple[dict, ...] = ()
+    rejected: tuple[dict, ...] = ()
+    traces: tuple[dict, ...] = ()
+    wrong: tuple[dict, ...] = ()
+    structure: dict | None = None
+    intervals: tuple[Interval, ...] = ()
+    gain: Gain | None = None
+    unseen: tuple[dict, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    def as_json(self) -> dict:
+        found = {
+            "contract": CONTRACT,
+            "verdict": self.verdict,
+            "sentence": self.said,
+            "causes": list(self.causes),
+            "ranking": list(self.ranking),
+            "rejected": list(self.rejected),
+            "traces": list(self.traces),
+            "wrong": list(self.wrong),
+            "intervals": [i.as_json() for i in self.intervals],
+            "unseen": list(self.unseen),
+            "notes": list(self.notes),
+            "base": {"run": self.run, "before_effect": self.before_effect},
+        }
+        if self.structure is not None:
+            found["structure"] = self.structure
+        if self.gain is not None:
+            found["gain"] = self.gain.as_json()
+        return found
+
+
+DEPENDS = {
+    "position": ("x0", "y0"),
+    "heading": ("heading",),
+    "time": ("time",),
+    "motion": ("surge", "sway", "yaw_rate"),
+    "wind": ("wind_speed", "wind_angle"),
+    "stochastic": (),
+}
+
+
+def cause_json(named: Named) -> dict:
+    shown = named.shown
+    content = {
+        "name": named.cause.name,
+        "probability": min(max(named.probability, 0.0), 1.0),
+        "parameters": {k: v.as_json() for k, v in shown.items()} | _which(named),
+        "sentence": named.cause.sentence(shown),
+        "equation": equation(named),
+        "indistinguishable_from": list(dict.fromkeys(n.split(":")[0] for n in named.alike)),
+        "evidence_nats": named.evidence,
+    }
+    tests = [named.cause.separated_by[n] for n in named.alike if n in named.cause.separated_by]
+    if named.alike:
+        content["next_test"] = "; ".join(dict.fromkeys(tests)) or (
+            "log the same manoeuvres again, with turns both ways and stops"
+        )
+    if named.cause.user:
+        content["user"] = True
+    return content
+
+
+def _which(named: Named) -> dict:
+    channel = getattr(named.cause, "channel", None)
+    if channel is None:
+        return {}
+    return {"channel": {"value": channel, "low": channel, "high": channel, "unit": ""}}
+
+
+def equation(named: Named) -> str:
+    """With numbers; fields of the fit and of what is shown may both stand in it."""
+    values = {p.name: float(v) for p, v in zip(named.cause.parameters, named.numbers, strict=False)}
+    values |= {k: v.value for k, v in named.shown.items()}
+    return named.cause.equation.format(**values)
+
+
+def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
+    """The thruster that nobody records."""
+    found = decision.pulses
+    assert found is not None
+    peak = max((abs(t["force_N"]) for t in times), default=found.force)
+    size = {"value": peak, "low": 0.7 * peak, "high": 1.3 * peak, "unit": "N"}
+    where = "ahead of" if found.lever >= 0.0 else "abaft"
+    return {
+        "name": PULSES,
+        "probability": probability,
+        "parameters": {"force": size},
+        "times": list(times),
+        "sentence": (
+            f"A side force of up to {peak:.2g} N, {abs(found.lever):.2g} m {where} midship, comes "
+            "and goes without being recorded: a thruster, or something that pushes."
+        ),
+        "equation": "Y + F(t), N + x F(t)",
+        "indistinguishable_from": [],
+        "evidence_nats": found.gain,
+    }
+
+
+def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
+    found = decision.structure
+    if found is None:
+        return None
+    depends = tuple(actuators) if found.family == "controls" else DEPENDS[found.family]
+    return {
+        "family": found.family, "acts_on": list(found.acts_on), "depends_on": list(depends),
+        "evidence_nats": found.evidence,
+    }  # fmt: skip
+
+
+def ranking_json(decision: Decision) -> tuple[dict, ...]:
+    """Causes of one name together, and what is none of them."""
+    of: dict[str, float] = {}
+    for label, share in decision.ranking.items():
+        name = label if label.startswith("unknown:") else label.split(":")[0]
+        of[name] = of.get(name, 0.0) + share
+    kept = [(n, p) for n, p in of.items() if p >= SHARE_SAID]
+    return tuple(
+        {"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1])
+    )
+
+
+def sentence(
+    verdict: str,
+    causes: Sequence[dict],
+    structure: dict | None,
+    gain: Gain | None,
+    louder: float,
+) -> str:
+    """The verdict in a sentence."""
+    if verdict == "named":
+        said = " ".join(cause["sentence"] for cause in causes)
+        if gain is None:
+            return said
+        if not gain.real:
+            return f"{said} On held-out windows that gains nothing."
+        return (
+            f"{said} With it in the model, the error on {gain.windows} held-out windows falls by "
+            f"{gain.reduction:.0%} ({gain.low:.0%} to {gain.high:.0%})."
+        )
+    if verdict == "unknown":
+        assert structure is not None
+        if structure["family"] == "stochastic":
+            return (
+                f"The ship is pushed about at random {louder:.1f} times as hard as when the model "
+                "was made; no cause of the catalogue does that."
+            )
+        return (
+            f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
+            f"{listed(structure['depends_on'])}."
+        )
+    if verdict == "coverage":
+        return "The model was never there: collect data in these conditions before asking why."
+    if verdict == "external":
+        return "The ship was pushed, held or towed: no force of her own explains these stretches."
+    return "Nothing is wrong beyond what the model got wrong where it was made."
+
+
+def markdown(verdict: Verdict) -> str:
+    """One page."""
+    lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
+    lines += [f"Model: {verdict.run}, made on " + (
+        "voyages before these." if verdict.before_effect else "these very voyages."
+    ), ""]  # fmt: skip
+    for cause in verdict.causes:
+        lines += [
+            f"## {cause['name']} (probability {cause['probability']:.2f})", "",
+            cause["sentence"], "", f"    {cause['equation']}", "",
+            "| parameter | value | 90 % interval | unit |", "| --- | ---: | --- | --- |",
+        ]  # fmt: skip
+        for name, p in cause["parameters"].items():
+            if isinstance(p["value"], str):
+                lines.append(f"| {name} | {p['value']} | | |")
+            else:
+                lines.append(
+                    f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} "
+                    f"| {p['unit']} |"
+                )
+        if cause["indistinguishable_from"]:
+            lines += [
+                "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}; "
+                f"this would: {cause['next_test']}.",
+            ]  # fmt: skip
+        lines.append("")
+    if verdict.gain is not None:
+        g = verdict.gain
+        lines += [
+            "## Gain on held-out windows", "",
+            f"L {g.before:.0f} before, {g.after:.0f} after: {g.reduction:.1%} less "
+            f"({g.low:.1%} to {g.high:.1%}, {g.windows} windows, each predicted with numbers "
+            "fitted without its voyage).", "",
+            "By channel: "
+            + ", ".join(f"{c.replace('_', ' ')} {v:.0%}" for c, v in g.channels.items()) + ".", "",
+        ]  # fmt: skip
+    if verdict.ranking:
+        lines += ["## Ranking", "", "| hypothesis | probability |", "| --- | ---: |"]
+        lines += [f"| {r['name']} | {r['probability']:.3f} |" for r in verdict.ranking]
+        lines.append("")
+    for title, rows in (("Rejected", verdict.rejected), ("Traces", verdict.traces)):
+        if rows:
+            lines += [f"## {title}", ""]
+            lines += [f"- {r['name']}: {r.get('reason') or r.get('sentence')}" for r in rows]
+            lines.append("")
+    if verdict.wrong:
+        lines += ["## Where it is wrong", ""]
+        lines += [
+            f"- {w['channel'].replace('_', ' ')}: {w['share_of_error']:.0%} of the error; "
+            f"{w['where']}"
+            for w in verdict.wrong
+        ]
+        lines.append("")
+    if verdict.unseen:
+        lines += [
+            "What the model cannot see, and the residual depends on (cross-validated R²):", "",
+            *[f"- {u['variable']}: {u['sentence']}" for u in verdict.unseen], "",
+        ]  # fmt: skip
+    if verdict.intervals:
+        lines += ["## Stretches left out or never trained on", ""]
+        lines += [
+            f"- {i.voyage}, {i.start_s:.0f} to {i.end_s:.0f} s ({i.kind}): {i.sentence}"
+            for i in verdict.intervals
+        ]
+        lines.append("")
+    if verdict.notes:
+        lines += ["## Notes", "", *[f"- {note}" for note in verdict.notes], ""]
+    return "\n".join(lines)
