@@ -153,7 +153,7 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
     real = tuple(n for n in named if n.cause.practical(n.numbers, ref.setting))
     stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
     verdict = "named" if real or pulses else "none"
-    if structure is not None and not real:
+    if structure is not None and not real and pulses is None:
         verdict = "unknown"
     elif verdict == "none" and stochastic > STOCHASTIC and base.louder >= 1.4:
         verdict = "unknown"

@@ -61,12 +61,13 @@ class Stretch:
     def sentence(self) -> str:
         towards = TOWARDS[CHANNELS.index(self.channel)][0 if self.peak > 0.0 else 1]
         turning = self.channel == "yaw_rate"
-        what = f"A moment of {abs(self.peak):.3g} N m" if turning else (
-            f"A force of {abs(self.peak):.3g} N"
-        )  # fmt: skip
-        full = "her full turning moment" if turning else "full thrust"
+        what, unit, full = (
+            ("moment", "N m", "her full turning moment")
+            if turning
+            else ("force", "N", "full thrust")
+        )
         return (
-            f"{what} {towards} ({self.percent:.0f} % of {full}) for "
+            f"A {what} of {abs(self.peak):.3g} {unit} {towards} ({self.percent:.0f} % of {full}) for "
             f"{self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of hers does that."
         )
 
@@ -82,6 +83,7 @@ class Stretch:
 class Balance:
     """Along K knots, in order, X, Y [N] and N [N m] at midship.
 
+    rows   [K]     of the record
     force  [K, 3]  unexplained
     sd     [K, 3]
     limit  [K, 3]  what ship, wind and hull could add there, and what the model misses always
@@ -248,25 +250,14 @@ def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
     yield from (slice(a, b) for a, b in itertools.pairwise(ends))
 
 
-@dataclass(frozen=True, slots=True)
-class _Event:
-    voyage: int
-    start: float
-    end: float
-    channel: int
-    peak: float
-    full: float
-    times: float  # the limit
-
-
 def _event(
     record: Record, weighed: Balance, part: slice, channel: int, first: int, last: int
-) -> _Event:
-    """Knots first to last of a part, and on to where the force has fallen to half."""
-    force, rows = weighed.force[part, channel], weighed.rows[part]
-    at = first + int(np.abs(force[first : last + 1]).argmax())
-    peak = float(force[at])
-    share, time = np.abs(force) / abs(peak), record.time[rows]
+) -> tuple[float, Stretch]:
+    """How far beyond the limit, and the event: knots first to last of a part, and on to where
+    the force has fallen to EDGE of its peak."""
+    force, rows = np.abs(weighed.force[part, channel]), weighed.rows[part]
+    at = first + int(force[first : last + 1].argmax())
+    share, time = force / force[at], record.time[rows]
     low = np.flatnonzero(share[:first] < EDGE)
     high = np.flatnonzero(share[last + 1 :] < EDGE) + last + 1
 
@@ -275,29 +266,29 @@ def _event(
         way = (share[inside] - EDGE) / (share[inside] - share[outside])
         return float(time[inside] + max(way, 0.0) * (time[outside] - time[inside]))
 
-    start = crossing(low[-1] + 1, low[-1]) if len(low) else float(time[0])
-    end = crossing(high[0] - 1, high[0]) if len(high) else float(time[-1])
-    full = weighed.full[channel if channel == 2 else 0]
-    times = float((np.abs(force) / weighed.limit[part, channel])[first : last + 1].max())
-    return _Event(int(record.voyage[rows[0]]), start, end, channel, peak, float(full), times)
+    found = Stretch(
+        voyage=record.names[record.voyage[rows[0]]],
+        start_s=crossing(low[-1] + 1, low[-1]) if len(low) else float(time[0]),
+        end_s=crossing(high[0] - 1, high[0]) if len(high) else float(time[-1]),
+        channel=CHANNELS[channel],
+        peak=float(weighed.force[part, channel][at]),
+        percent=float(100.0 * force[at] / weighed.full[2 if channel == 2 else 0]),
+    )
+    return float((force / weighed.limit[part, channel])[first : last + 1].max()), found
 
 
-def _merged(events: list[_Event], names: tuple[str, ...]) -> Iterator[Stretch]:
+def _merged(events: list[tuple[float, Stretch]], names: tuple[str, ...]) -> Iterator[Stretch]:
     """Over channels and short breaks; what is shorter than LEAST after all is left out."""
-    events = sorted(events, key=lambda e: (e.voyage, e.start))
-    groups: list[list[_Event]] = []
-    for event in events:
-        last = groups[-1] if groups else []
-        near = last and last[0].voyage == event.voyage
-        if near and event.start - max(e.end for e in last) < GAP:
-            last.append(event)
+    groups: list[list[tuple[float, Stretch]]] = []
+    for event in sorted(events, key=lambda e: (names.index(e[1].voyage), e[1].start_s)):
+        last = [e for _, e in groups[-1]] if groups else []
+        near = last and last[0].voyage == event[1].voyage
+        if near and event[1].start_s - max(e.end_s for e in last) < GAP:
+            groups[-1].append(event)
         else:
             groups.append([event])
     for group in groups:
-        worst = max(group, key=lambda e: e.times)
-        start, end = group[0].start, max(e.end for e in group)
+        _, worst = max(group, key=lambda e: e[0])
+        start, end = group[0][1].start_s, max(e.end_s for _, e in group)
         if end - start >= LEAST:
-            yield Stretch(
-                names[worst.voyage], start, end, CHANNELS[worst.channel], worst.peak,
-                100.0 * abs(worst.peak) / worst.full,
-            )  # fmt: skip
+            yield replace(worst, start_s=start, end_s=end)

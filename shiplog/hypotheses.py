@@ -323,23 +323,36 @@ class Trial:
         count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
         gram = evidence.gram(weighed, self.unrest.louder(louder))
         whole = (gram.each * self.weight[:, None, None]).sum(0)
-        fresh = np.eye(count + more)
-        fresh[:count, :count] = ref.information
-        pull = np.concatenate((ref.pull, np.zeros(more)))
         for size in structure.SIZES:
             by = np.concatenate(([1.0], unit, np.full(more, size)))
             total = whole * np.outer(by, by)
-            value = self._solved(total, gram.logdet, louder, point, included, fresh, pull).value
+            known, pull = self._usual(before, by, more)
+            value = self._solved(
+                _twice(total, more), gram.logdet, louder, point, included,
+                _beside(known, more), np.concatenate((pull, np.zeros(more))),
+            ).value  # fmt: skip
             if before is not None:
                 # what the nominal campaign has of it already is no news
-                known = _joint(before * np.outer(by, by), ref)
-                usual = self._solved(total, gram.logdet, louder, point, included, *known).value
+                usual = self._solved(total, gram.logdet, louder, point, included, known, pull)
                 kept = total[: count + 1, : count + 1]
                 without = self._solved(
                     kept, gram.logdet, louder, point, included, ref.information, ref.pull
-                ).value
-                value -= max(usual - without, 0.0)
+                )
+                value -= max(usual.value - without.value, 0.0)
             yield Found(family, value, louder)
+
+    def _usual(self, before, by, more) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients and a structure's weights after the nominal campaign; where that says
+        nothing of the structure, it is usually not there."""
+        ref = self.reference
+        if before is None:
+            held = _beside(ref.information, more)
+            held[len(ref.pull) :, len(ref.pull) :] *= HELD
+            return held, np.concatenate((ref.pull, np.zeros(more)))
+        seen = before * np.outer(by, by) / ref.kappa
+        sure = np.diag(np.concatenate((ref.columns.known, np.ones(more))))
+        prior = np.concatenate((ref.prior, np.zeros(more)))
+        return seen[1:, 1:] + sure, seen[1:, 0] + prior
 
     def pulses(self, point: Point, base: Found, included: Sequence[str]) -> Pulses:
         """A force to the side that comes and goes at one place along the ship, unrecorded: its
@@ -412,13 +425,15 @@ def accelerations(coefficients: Mapping, geometry, force: np.ndarray) -> np.ndar
     return np.asarray(body.accelerations(coefficients, geometry, zero, zero, zero, force))
 
 
-def _joint(known: np.ndarray, ref: Reference) -> tuple[np.ndarray, np.ndarray]:
-    """Information and pull of coefficients and weights together after the nominal campaign; κ
-    makes the coefficients less sure, not the weights."""
-    size, count = len(known) - 1, len(ref.pull)
-    before = np.diag(np.concatenate((ref.columns.known, np.ones(size - count))))
-    mean = np.linalg.solve(known[1:, 1:] + before, known[1:, 0])
-    by = np.ones(size)
-    by[:count] = ref.kappa**-0.5
-    information = known[1:, 1:] * np.outer(by, by) + before
-    return information, information @ mean
+def _twice(total: np.ndarray, more: int) -> np.ndarray:
+    """The last columns once more: what is usual of them, and what changed."""
+    at = np.arange(len(total))
+    both = np.concatenate((at, at[len(at) - more :]))
+    return total[np.ix_(both, both)]
+
+
+def _beside(information: np.ndarray, more: int) -> np.ndarray:
+    """With as many numbers more, of unit size each."""
+    whole = np.eye(len(information) + more)
+    whole[: len(information), : len(information)] = information
+    return whole

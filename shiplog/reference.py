@@ -98,6 +98,7 @@ class Reference:
     wide: Wide
     information: np.ndarray
     pull: np.ndarray
+    prior: np.ndarray  # [C] the pull of what was known before any data
     kappa: float
     nominal: Linear | None
     grams: Gram | None
@@ -176,7 +177,7 @@ def learn(
     information = grams.total[1:, 1:] / chosen + np.diag(columns.known)
     return Reference(
         model, setting, theta, columns, unrest, wide, information,
-        grams.total[1:, 0] / chosen + prior, chosen, linear, grams,
+        grams.total[1:, 0] / chosen + prior, prior, chosen, linear, grams,
     )  # fmt: skip
 
 
@@ -299,4 +300,6 @@ def assume(model: Extended, setting: Setting, start: Start, record: Record) -> R
     causes = slice(base, len(unit))
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD
-    return replace(whole, information=information, pull=prior, nominal=None, grams=None)
+    return replace(
+        whole, information=information, pull=prior, prior=prior, nominal=None, grams=None
+    )

@@ -7,7 +7,7 @@ cause of the catalogue explains, but a map of the pond does, is unknown and depe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,11 +51,14 @@ class Basis:
     width: np.ndarray
     frequency: np.ndarray
     phase: np.ndarray
+    level: np.ndarray | None = None  # [F] taken off: what is always there does not depend
 
     def features(self, knots: Knots) -> np.ndarray:
         """[S, J, 3, W]: acceleration of each weight, of unit size."""
         z = (_variables(self.family, knots) - self.middle) / self.width
-        waves = np.sqrt(2.0 / len(self.phase)) * np.cos(z @ self.frequency + self.phase)
+        waves = self._waves(z)
+        if self.level is not None:
+            waves = waves - self.level
         count = waves.shape[-1]
         out = np.zeros((*waves.shape[:2], 3, 3 * count))
         for channel in range(3):
@@ -68,6 +71,9 @@ class Basis:
         out[..., 0, :] = c[..., None] * north + s[..., None] * east
         out[..., 1, :] = c[..., None] * east - s[..., None] * north
         return out
+
+    def _waves(self, z: np.ndarray) -> np.ndarray:
+        return np.sqrt(2.0 / len(self.phase)) * np.cos(z @ self.frequency + self.phase)
 
 
 def basis(family: str, record: Record, *campaigns: Knots) -> Basis | None:
@@ -88,7 +94,10 @@ def basis(family: str, record: Record, *campaigns: Knots) -> Basis | None:
             np.where(np.arange(FEATURES) % 2, -0.5 * np.pi, 0.0),
         )  # fmt: skip
     frequency = rng.standard_normal((count, FEATURES)) / np.sqrt(max(count / 2.0, 1.0))
-    return Basis(family, middle, width, frequency, rng.uniform(0.0, 2.0 * np.pi, FEATURES))
+    found = Basis(family, middle, width, frequency, rng.uniform(0.0, 2.0 * np.pi, FEATURES))
+    if family != "time":  # a push that is always there is no drift; it may well be the screw's
+        return found
+    return replace(found, level=found._waves((z - middle) / width).mean(0))
 
 
 def _variables(family: str, knots: Knots) -> np.ndarray:

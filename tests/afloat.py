@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -11,33 +10,60 @@ import numpy as np
 
 from pipelines import known_ship
 from shiplog import profile as profiles
+from shiplog import segments, unexplained
+from shiplog.evidence import Unrest
 from shiplog.models import mmg
+from shiplog.models.extended import Extended
+from shiplog.models.mmg import body
 from shiplog.record import Record
+from shiplog.segments import Linear, Wide
 from shiplog.sensitivity import rate
 
 PROFILE = profiles.load("esso-vectwin")
 SHIP, PARTICULARS, _ = mmg.geometry_of(PROFILE)
 MODEL = mmg.MMG(SHIP)
 THETA = mmg.estimated(SHIP, PARTICULARS).values
+COEFFICIENTS = dict(zip(MODEL.names, THETA, strict=True))
 NOISE = np.array([0.02, 0.01, 0.02, 0.01, math.radians(0.1), math.radians(0.1)])
+WIDE = Wide(
+    np.array([0.02, 0.01, 0.02, 0.01, 0.003, 0.002]),
+    np.array([1.0, 0.3, 1.0, 0.3, 0.2, 0.1]),
+    np.array([0.02, 0.02, 0.02]),
+)
+UNREST = Unrest(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes her
+    np.array([0.007, 0.0076, 0.0066, 0.0073, 0.0006, 0.0013]),
+    np.array([7e-4, 7e-4, 5e-4]),
+    4.0,
+    WIDE.start,
+)
 
 
-def voyage(seconds: float = 300.0, seed: int = 5) -> known_ship.Voyage:
+def voyage(seconds: float, seed: int = 5) -> known_ship.Voyage:
     return known_ship.sail(
         seconds, seed=seed, wind=known_ship.Wind(2.0, 0.7), effects=known_ship.Effects()
     )
 
 
-def record(sailed: known_ship.Voyage, state: np.ndarray | None = None, seed: int = 1) -> Record:
+def true_wind(sailed: known_ship.Voyage) -> np.ndarray:
+    north = sailed.true_wind_speed * np.cos(sailed.true_wind_direction)
+    east = sailed.true_wind_speed * np.sin(sailed.true_wind_direction)
+    return np.stack((north, east), -1)
+
+
+def controls(sailed: known_ship.Voyage) -> np.ndarray:
+    return np.stack((sailed.rudder_port, sailed.rudder_starboard, sailed.propeller), -1)
+
+
+def record(
+    sailed: known_ship.Voyage, state: np.ndarray | None = None, noise: float = 1.0
+) -> Record:
     """A voyage at 10 Hz with instruments' noise; `state` [K, 6] instead of her own path."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     if state is None:
         state = np.stack(
             (sailed.x0, sailed.surge, sailed.y0, sailed.sway, sailed.heading, sailed.yaw_rate), -1
         )
-    north = sailed.true_wind_speed * np.cos(sailed.true_wind_direction)
-    east = sailed.true_wind_speed * np.sin(sailed.true_wind_direction)
-    c, s = np.cos(state[:, 4]), np.sin(state[:, 4])
+    (north, east), c, s = true_wind(sailed).T, np.cos(state[:, 4]), np.sin(state[:, 4])
     wind = np.stack((c * north + s * east + state[:, 1], c * east - s * north + state[:, 3]), -1)
     count = len(state)
     starts = np.zeros(count, dtype=bool)
@@ -45,34 +71,41 @@ def record(sailed: known_ship.Voyage, state: np.ndarray | None = None, seed: int
     return Record(
         profile=PROFILE, names=("one",), voyage=np.zeros(count, dtype=int),
         time=0.1 * np.arange(count), share=(np.arange(count) + 0.5) / count, starts=starts,
-        seen=np.ones(count, dtype=bool), state=state + NOISE * rng.standard_normal((count, 6)),
+        seen=np.ones(count, dtype=bool),
+        state=state + noise * NOISE * rng.standard_normal((count, 6)),
         actuator=controls(sailed), wind=wind,
     )  # fmt: skip
-
-
-def controls(sailed: known_ship.Voyage) -> np.ndarray:
-    return np.stack((sailed.rudder_port, sailed.rudder_starboard, sailed.propeller), -1)
 
 
 def pushed(sailed: known_ship.Voyage, push: np.ndarray) -> np.ndarray:
     """States [K, 6] of the project's MMG, with her controls and wind, under `push` [K, 3]: forces
     in N and N m that no actuator makes. Explicit Euler at 0.1 s."""
-    north = sailed.true_wind_speed * np.cos(sailed.true_wind_direction)
-    east = sailed.true_wind_speed * np.sin(sailed.true_wind_direction)
-    start = np.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
-    return np.asarray(_sail(start, controls(sailed), np.stack((north, east), -1), push))
+    start = jnp.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
+    return np.asarray(_sail(start, controls(sailed), true_wind(sailed), push))
 
 
-@partial(jax.jit)
+@jax.jit
 def _sail(start, actuator, wind, push):
-    p = dict(zip(MODEL.names, jnp.asarray(THETA), strict=True))
-
     def step(state, along):
         now, blowing, force = along
         slope = rate(MODEL, jnp.asarray(THETA), state, now, blowing)
-        zero = jnp.zeros(())
-        more = mmg.model.body.accelerations(p, SHIP, zero, zero, zero, force)
-        slope = slope.at[jnp.array([1, 3, 5])].add(more)
-        return state + 0.1 * slope, state
+        still = jnp.zeros(())
+        added = body.accelerations(COEFFICIENTS, SHIP, still, still, still, force)
+        return state + 0.1 * slope.at[jnp.array([1, 3, 5])].add(added), state
 
     return jax.lax.scan(step, start, (actuator, wind, push))[1]
+
+
+def linear(seen: Record) -> Linear:
+    """The record under the project's MMG as it is, covered to the end.
+
+    `segments.linear` without its columns by θ, which take twice as long to compile.
+    """
+    model = Extended(MODEL, (), MODEL, np.zeros(0), {})
+    g = segments.grid(seen)
+    cut = segments.cut(seen, unexplained.covering(seen))
+    path = segments.pulled(model, THETA, cut, g, WIDE)
+    y, z = segments._run(model, THETA, cut, path, g)
+    at = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
+    e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
+    return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

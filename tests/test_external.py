@@ -1,0 +1,87 @@
+"""Pushes of known size and time, hidden in a voyage, and voyages without."""
+
+from dataclasses import replace
+
+import afloat
+import numpy as np
+import pytest
+
+from shiplog import external
+from shiplog.external import Stretch
+
+START, END = 70.0, 85.0
+NONE = np.zeros(0)
+
+
+@pytest.fixture(scope="module")
+def sailed():
+    return afloat.voyage(150.0)
+
+
+def found(record) -> tuple[Stretch, ...]:
+    linear = afloat.linear(record)
+    return external.find(linear, NONE, afloat.UNREST, record, afloat.MODEL, afloat.THETA)
+
+
+def under(sailed, force, noise=1.0):
+    """Her record with `force` (X, Y in N, N in N m) on her from START to END."""
+    push = np.zeros((len(sailed.time), 3))
+    push[(sailed.time >= START) & (sailed.time < END)] = force
+    return afloat.record(sailed, afloat.pushed(sailed, push), noise)
+
+
+@pytest.mark.parametrize(
+    ("force", "channel"),
+    [((12.0, 0.0, 0.0), "surge"), ((-15.0, 0.0, 0.0), "surge"), ((0.0, 60.0, 0.0), "sway"),
+     ((0.0, 0.0, -30.0), "yaw_rate")],
+    ids=["ahead", "held back", "aside", "turned"],
+)  # fmt: skip
+def test_a_push_is_found_in_time_and_size(sailed, force, channel):
+    (stretch,) = found(under(sailed, force))
+    assert stretch.voyage == "one"
+    assert stretch.channel == channel
+    assert stretch.start_s == pytest.approx(START, abs=3.0)
+    assert stretch.end_s == pytest.approx(END, abs=3.0)
+    assert stretch.peak == pytest.approx(sum(force), rel=0.25)
+
+
+def test_without_a_push_there_is_none(sailed):
+    assert found(under(sailed, (0.0, 0.0, 0.0))) == ()
+
+
+def test_what_she_could_do_herself_is_no_push(sailed):
+    assert found(under(sailed, (3.0, 0.0, 0.0))) == ()  # full thrust is 4 N
+
+
+def test_another_ship_under_a_crude_model_is_not_pushed(sailed):
+    """The known ship shares no formula with the estimated MMG that she is judged by."""
+    assert found(afloat.record(sailed)) == ()
+
+
+def test_a_receiver_that_stands_still_and_catches_up_is_no_hand(sailed):
+    """Position held for 3 s; the velocity that was filtered from it falls, and overshoots."""
+    record = under(sailed, (0.0, 0.0, 0.0), noise=0.2)
+    state, time = record.state.copy(), record.time
+    knots = START + np.array([-1.0, 1.0, 3.0, 4.0, 6.0])
+    state[:, 1] += 0.4 * np.interp(time, knots, [0.0, -1.0, -1.0, 1.0, 0.0])
+    stopped = found(replace(record, state=state))
+    held = (time >= START) & (time < START + 3.0)
+    state[held, 0], state[held, 2] = (state[held, i][0] for i in (0, 2))
+    caught_up = found(replace(record, state=state))
+    assert len(stopped) == 1
+    assert caught_up == ()
+
+
+def test_full_thrust_is_that_of_the_open_water_diagram(sailed):
+    """(1 - t) k₀ ρ D⁴ n² at 12.5 rev/s, by hand: rudders amidships neither add nor brake."""
+    p = afloat.COEFFICIENTS
+    bollard = (1.0 - p["propeller.t"]) * p["propeller.k0"] * 998.0 * 0.1**4 * 12.5**2
+    full = external.means(afloat.record(sailed), afloat.MODEL, afloat.THETA)
+    assert full[0] == pytest.approx(bollard, rel=1e-6)
+
+
+def test_the_sentence_says_how_much_and_which_way():
+    said = Stretch("v", 70.0, 85.0, "sway", -24.0, 600.0)
+    assert said.sentence.startswith("A force of 24 N to port (600 % of full thrust) for 15 s")
+    assert said.as_json()["kind"] == "external"
+    assert said.as_json()["end_s"] == 85.0

@@ -1,0 +1,123 @@
+"""The posterior against kriging written the other way round, and against forces we put in."""
+
+from dataclasses import replace
+
+import afloat
+import numpy as np
+import pytest
+
+from shiplog import segments, unexplained
+from shiplog.evidence import Unrest
+from shiplog.models.mmg import body
+from shiplog.record import Record
+from shiplog.segments import Cut, Linear, Path
+
+UNREST = Unrest(
+    noise=np.full(6, 3e-4), push=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)
+)
+
+
+def rested(lengths: tuple[int, ...], voyages: tuple[int, ...]) -> Record:
+    """A ship that lies still, in stretches of so many rows, each of a voyage."""
+    count, names = sum(lengths), tuple("abcdef"[: max(voyages) + 1])
+    starts = np.zeros(count, dtype=bool)
+    starts[np.cumsum((0, *lengths))[:-1]] = True
+    voyage = np.repeat(voyages, lengths)
+    time = np.concatenate([0.1 * np.arange((voyage == v).sum()) for v in np.unique(voyage)])
+    return Record(
+        afloat.PROFILE, names, voyage, time, np.linspace(0.0, 1.0, count), starts,
+        np.ones(count, dtype=bool), np.zeros((count, 6)), np.zeros((count, 3)),
+        np.zeros((count, 2)),
+    )  # fmt: skip
+
+
+def seen_directly(y: np.ndarray, rows: np.ndarray) -> Linear:
+    """Observations that are the knots themselves, [S, 3, J] seen as u, v, r of bins 0 to J - 2."""
+    count, _, knots = y.shape
+    bins = knots - 1
+    e, z = np.zeros((count, bins, 6)), np.zeros((bins, 6, 6 + 3 * knots))
+    for channel, column in enumerate((1, 3, 5)):
+        e[:, :, column] = y[:, channel, :bins]
+        z[np.arange(bins), column, 6 + channel * knots + np.arange(bins)] = 1.0
+    used = np.zeros((count, bins, 6), dtype=bool)
+    used[..., [1, 3, 5]] = True
+    cut = Cut(rows, e, used, np.zeros((count, 1, 6)), np.zeros(count, dtype=int), 0.2)
+    path = Path(np.zeros((count, 6)), np.zeros_like(y))
+    j = np.zeros((count, bins, 6, 1))
+    j[:, :, 1, 0] = 1.0  # a number that adds to every surge
+    return Linear(cut, path, e, np.repeat(z[None], count, axis=0), j)
+
+
+def test_the_posterior_is_kriging():
+    """K (K + R)⁻¹ y, with the covariance K = σ² exp(-|t - t'|/τ) that the precision came from."""
+    rng = np.random.default_rng(0)
+    y = 1e-3 * rng.standard_normal((2, 3, 16))
+    found = unexplained.posterior(
+        seen_directly(y, np.array([0, 300])), np.array([4e-4]), UNREST, rested((700,), (0,))
+    )
+    t = 2.0 * np.arange(16)
+    for channel in range(3):
+        prior = UNREST.push[channel] ** 2 * np.exp(-np.abs(t[:, None] - t) / UNREST.time)
+        gain = prior[:, :15] @ np.linalg.inv(prior[:15, :15] + 3e-4**2 * np.eye(15))
+        shifted = y[:, channel, :15] - (4e-4 if channel == 0 else 0.0)
+        assert found.mean[:, channel] == pytest.approx(shifted @ gain.T, abs=1e-9)
+        variance = np.diag(prior - gain @ prior[:15])
+        assert found.sd[0, channel] == pytest.approx(np.sqrt(variance), rel=1e-4)
+    assert found.time[1].tolist() == pytest.approx((30.0 + t).tolist())
+
+
+def test_segments_cover_every_stretch_to_its_end():
+    record = rested((700, 299, 301, 650), (0, 0, 1, 1))
+    rows = unexplained.covering(record)
+    assert rows.tolist() == [0, 300, 399, 999, 1300, 1600, 1649]  # 299 rows hold no 30 s
+    assert set(segments.begins(record)) <= set(rows.tolist())
+    assert (record.firsts[rows] == record.firsts[rows + 300]).all()
+
+
+def test_each_instant_counts_once_and_by_the_better_known():
+    y = np.zeros((3, 3, 16))
+    found = unexplained.posterior(
+        seen_directly(y, np.array([0, 300, 399])), np.zeros(1), UNREST, rested((700,), (0,))
+    )
+    keep = unexplained.once(found)
+    rows = np.sort(found.rows[keep])
+    assert np.diff(rows).min() >= 10  # knots are 20 rows apart; no pair is nearer than half of it
+    assert rows[0] == 0
+    assert rows[-1] == 699
+    assert not keep[0, 15]  # seen at the next segment's first knot, here by nothing
+    assert keep[1, 0]
+
+
+def test_the_table_tells_what_went_with_it():
+    record = rested((700,), (0,))
+    state = record.state.copy()
+    state[:, 0] = 100.0 + 0.05 * np.arange(700)  # means over 2 s of a line are the line
+    state[:, 4] = 4.0
+    wind = np.tile([3.0, -4.0], (700, 1))
+    record = replace(record, state=state, wind=wind)
+    linear = seen_directly(np.ones((2, 3, 16)) * 1e-3, np.array([0, 300]))
+    table = unexplained.table(unexplained.posterior(linear, np.zeros(1), UNREST, record), record)
+    assert table["time_s"].to_list() == pytest.approx([2.0 * i for i in range(31)])
+    assert table["x0"][5] == pytest.approx(105.0)
+    assert table["heading"][5] == pytest.approx(4.0 - 2.0 * np.pi)
+    assert table["wind_starboard"][5] == pytest.approx(-4.0)
+    assert table["share"][5] == pytest.approx(record.share[100])
+    assert table["surge_acceleration"][5] == pytest.approx(1e-3, rel=0.1)
+    assert {"rudder_port", "propeller", "yaw_acceleration_sd"} <= set(table.columns)
+
+
+def test_a_force_that_no_model_has_is_found_with_its_uncertainty():
+    """A push that swells and ebbs, through helm, wind and noise, by the project's own MMG."""
+    sailed = afloat.voyage(150.0)
+    swell = np.sin(2.0 * np.pi * sailed.time / 50.0)[:, None] * np.array([3.0, -2.0, 1.0])
+    record = afloat.record(sailed, afloat.pushed(sailed, swell))
+    white = replace(afloat.UNREST.louder(10.0), noise=afloat.NOISE / np.sqrt(20.0))  # of 2 s
+    found = unexplained.posterior(afloat.linear(record), np.zeros(0), white, record)
+    zero = np.zeros(1)
+    added = body.accelerations(afloat.COEFFICIENTS, afloat.SHIP, zero, zero, zero, swell)
+    true = np.moveaxis(np.asarray(added)[found.rows], -1, 1)
+    z = (found.mean - true) / found.sd
+    assert 0.6 < np.sqrt((z**2).mean()) < 1.2
+    assert (np.abs(z) < 3.0).mean() > 0.98
+    for channel in range(3):
+        assert np.corrcoef(found.mean[:, channel].ravel(), true[:, channel].ravel())[0, 1] > 0.8
