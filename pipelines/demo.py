@@ -1,4 +1,4 @@
-"""The main job on the sample logs, from MCAP to a recording: what a new user sees first."""
+"""The main job on the sample logs, from MCAP to a verdict: what a new user sees first."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipelines.diagnose import diagnose_run
 from pipelines.evaluate import compare_runs
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
@@ -20,6 +21,7 @@ log = logging.getLogger(__name__)
 
 DATASETS = ("ref", "d-ref")  # the paper's two voyages, and four that met the test's wind
 SEEDS = (0, 1, 2)
+NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden in her logs
 RECIPE = Fast(iterations=200)  # a hundred fewer than usual: a demo is waited for
 
 
@@ -33,11 +35,12 @@ class Demo:
 
 
 def run_demo(out: Path, logs: Path | None) -> Demo:
-    """Ingest, train, evaluate, compare. Resumes: what is in `out` already is not done again."""
+    """Ingest, train, compare, diagnose, extend, gain. Resumes: what is in `out` already is not
+    done again."""
     began = time.monotonic()
     folder = logs or sample_logs()
     store = Store(out / "store")
-    log.info("1/3 ingesting %s", folder)
+    log.info("1/4 ingesting %s", folder)
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
     if not done.reports:
         raise ShiplogError(f"No log in {folder} could be ingested.", hint="see the messages above.")
@@ -46,11 +49,11 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         path = out / "runs" / data
         paths.append(path)
         if path.exists():
-            log.info("2/3 %s is trained already", path)
+            log.info("2/4 %s is trained already", path)
             continue
         split = choose_split(store, (), (), data, 100)
         log.info(
-            "2/3 training on %s: %s, validating on %s",
+            "2/4 training on %s: %s, validating on %s",
             data,
             listed(split.training),
             listed(split.validation),
@@ -59,18 +62,35 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     path = out / "runs" / "mmg"
     if not path.exists():
         split = choose_physical_split(store, (), (), DATASETS[0], 100)
-        log.info("2/3 identifying mmg on %s", listed(split.training))
+        log.info("2/4 identifying mmg on %s", listed(split.training))
         config = Config(model="mmg", data=DATASETS[0], split=split, physics=Physics(folds=2))
         identify_run(config, store, path)
     paths.append(path)
-    log.info("3/3 comparing on the test voyage")
+    log.info("3/4 comparing on the test voyage")
     result = compare_runs(paths, store, (), out / "compare.rrd")
+    log.info("4/4 diagnosing mmg on %s: what is wrong half a year later?", NEXT_SEASON)
+    extended = out / "runs" / "mmg-extended"
+    diagnosis = diagnose_run(
+        path, store, [NEXT_SEASON], out / "diagnosis",
+        extend=None if extended.exists() else extended,
+    )  # fmt: skip
+    both, repeated = [path], "nothing was named"
+    content = result.content | {"diagnosis": diagnosis.verdict.as_json()}
+    if extended.exists():
+        both.append(extended)
+        again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again").verdict
+        repeated, content["diagnosis_again"] = again.said, again.as_json()
+    season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
-        f"{result.text}\n\nTook {took:.0f} s. The voyages are in {store.path}, the runs in "
-        f"{out / 'runs'}.\nLook at it again: rerun {result.recording}"
+        f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship and another sea:\n\n"
+        f"{diagnosis.verdict.said}\n\nThe extended model, diagnosed again: {repeated}\n\n"
+        f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
+        f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
+        f"Look at it again: rerun {result.recording} {season.recording}"
     )
-    return Demo(ending, result.content | {"seconds": round(took, 1)}, result.recording)
+    content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
+    return Demo(ending, content, result.recording)
 
 
 def sample_logs() -> Path:

@@ -26,7 +26,6 @@ from shiplog.hypotheses import Trial
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.record import Record
-from shiplog.reference import Reference, Start
 from shiplog.runs import Run
 from shiplog.sensitivity import series
 from shiplog.store import Store
@@ -177,9 +176,7 @@ def _windows(run: Run, store: Store, names: Sequence[str], profile) -> Windows |
     planned = plan(rows, "ref", run.config.window)
     if planned.height == 0:
         return None
-    return windows.cut(
-        rows, planned, run.config.window, profile.actuator_names, profile.wind_names
-    )
+    return windows.cut(rows, planned, run.config.window, profile.actuator_names, profile.wind_names)
 
 
 def _gain(
@@ -205,9 +202,7 @@ def _gain(
             simulator = before.with_causes([n.cause for n in named], numbers, None)
             part = cut.pick(rows)
             states = simulator.states(part, simulator.theta)
-            after[rows.numpy()] = parts(
-                states - part.state.double().numpy(), series(part).steps
-            )
+            after[rows.numpy()] = parts(states - part.state.double().numpy(), series(part).steps)
         return gain(usual, after, voyages)
 
     named = decision.named
@@ -222,10 +217,8 @@ def _gain(
                 )
                 named, found = rest, without
                 break
-    elif not found.real and found.reduction < 0.0 and named[0].cause.moves:
-        dropped[named[0].cause.label] = (
-            f"no gain on held-out voyages ({found.reduction:+.1%})"
-        )
+    elif named and not found.real and found.reduction < 0.0 and named[0].cause.moves:
+        dropped[named[0].cause.label] = f"no gain on held-out voyages ({found.reduction:+.1%})"
         named = ()
     if not named:
         verdict = "named" if decision.pulses else "none"
@@ -367,9 +360,7 @@ def _pulses(trial: Trial, decision: Decision) -> list[dict]:
                 last["end_s"] = at
                 last["force_N"] = max(last["force_N"], float(value), key=abs)
             else:
-                found.append(
-                    {"voyage": name, "start_s": at, "end_s": at, "force_N": float(value)}
-                )
+                found.append({"voyage": name, "start_s": at, "end_s": at, "force_N": float(value)})
     return found
 
 

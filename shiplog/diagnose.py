@@ -21,8 +21,9 @@ MORE = 25.0  # that each further one must: small evidence follows large ones abo
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
+LOUD = 1.4  # times the usual unrest, from which on it is asked where it comes from
 PULSED = 40.0  # nats that pulses must bring beyond louder unrest
-TEMPERATURE = 8.0  # nats: calibrates probabilities
+TEMPERATURE = 3.0  # nats: calibrates probabilities
 ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 SETTLED = 3  # contenders that are linearised again
@@ -102,9 +103,11 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
     while True:
         first = len(included) == len(fixed)
         wanted = LEAST if first and pulses is None else MORE
-        if pulses is None and base.louder >= 1.4:
+        remains = trial.structures(point, base, included)
+        if pulses is None and base.louder >= LOUD:
             tried = trial.pulses(point, base, included)
-            if tried.gain > PULSED and tried.gain > (found[0].evidence if found else 0.0):
+            rivals = [f.evidence for f in (*found[:1], *remains[:1])]
+            if tried.gain > max(PULSED, *rivals):
                 pulses = tried
                 trial.unrest = replace(trial.unrest, pulse=tried.unit * tried.force)
                 base, found = trial.scan(
@@ -112,11 +115,10 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
                 )
                 continue
         settled = _settle(trial, point, base, found, included, wanted)
-        remains = trial.structures(point, base, included)
         strongest = max(remains, key=lambda f: f.evidence, default=None)
         stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
         if not ranking:
-            ranking = _ranked(settled, found, remains, wanted, stochastic)
+            ranking = _ranked(settled, found, remains, base, wanted, stochastic)
         best = settled[0] if settled else None
         gain = best[1].evidence - base.evidence if best else -math.inf
         if strongest and strongest.evidence > max(UNKNOWN, gain + FLEXIBLE):
@@ -155,7 +157,7 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
     verdict = "named" if real or pulses else "none"
     if structure is not None and not real and pulses is None:
         verdict = "unknown"
-    elif verdict == "none" and stochastic > STOCHASTIC and base.louder >= 1.4:
+    elif verdict == "none" and stochastic > STOCHASTIC and base.louder >= LOUD:
         verdict = "unknown"
         structure = Structure("stochastic", stochastic, ("surge", "sway", "yaw_rate"))
     return Decision(
@@ -168,9 +170,7 @@ def _settle(trial, point, base, found, included, wanted) -> list[tuple[Point, Fo
     """Contenders linearised where they are found, best first; those whose fit ran away left out."""
     if not found or found[0].evidence < wanted:
         return []
-    contenders = [
-        f for f in found[:SETTLED] if f.evidence > max(wanted, SHARE * found[0].evidence)
-    ]
+    contenders = [f for f in found[:SETTLED] if f.evidence > max(wanted, SHARE * found[0].evidence)]
     if not any(f is found[0] for f in contenders):
         contenders = [found[0]]
     settled = []
@@ -187,14 +187,12 @@ def _louder(trial: Trial, point: Point, base: Found, included: tuple[str, ...]) 
     return base.evidence - trial.level(point, 1.0, included).value
 
 
-def _ranked(settled, found, remains, wanted, stochastic) -> dict[str, float]:
+def _ranked(settled, found, remains, base, wanted, stochastic) -> dict[str, float]:
     """Probabilities of the first step, tempered; `none` holds the threshold."""
     value = {"none": wanted}
     value |= {f.name: f.evidence for f in found}
-    if settled:
-        base = settled[0][1].evidence - value.get(settled[0][1].name.split("+")[-1], 0.0)
-        for _, one in settled:
-            value[one.name.split("+")[-1]] = one.evidence - base
+    for _, one in settled:
+        value[one.name.split("+")[-1]] = one.evidence - base.evidence
     value |= {f"unknown:{f.name}": f.evidence - FLEXIBLE for f in remains}
     value["unknown:stochastic"] = min(stochastic - STOCHASTIC, wanted)
     names = list(value)

@@ -39,12 +39,9 @@ class Unrest:
 
     def kernel(self, knots: int) -> np.ndarray:
         """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
-        at = np.arange(knots) * KNOT
-        apart = np.abs(at[:, None] - at)
-        own = np.exp(-apart / self.time) + 1e-9 * np.eye(knots)
-        whole = np.kron(np.diag(self.push**2), own)
+        whole = np.kron(np.diag(self.push**2), _decay(knots, self.time))
         if self.pulse is not None:
-            whole += np.kron(np.outer(self.pulse, self.pulse), np.exp(-apart / self.pulse_time))
+            whole += np.kron(np.outer(self.pulse, self.pulse), _decay(knots, self.pulse_time))
         return whole
 
     def louder(self, factor: float) -> Unrest:
@@ -59,6 +56,12 @@ class Unrest:
         whole[6:, 6:] = np.linalg.inv(kernel)
         logdet = -2.0 * np.log(self.start).sum() - np.linalg.slogdet(kernel)[1]
         return whole, float(logdet)
+
+
+def _decay(knots: int, time: float) -> np.ndarray:
+    """Correlation [J, J] of an Ornstein-Uhlenbeck process at the knots."""
+    at = np.arange(knots) * KNOT
+    return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(knots)
 
 
 @dataclass(frozen=True)
@@ -119,9 +122,7 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
     return Gram(each, weighed.logdet - logdet * len(weighed.zz) + float(of_inner))
 
 
-def learnt(
-    linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12
-) -> Unrest:
+def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> Unrest:
     """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977).
 
     d   [C] the numbers of the columns
@@ -138,12 +139,10 @@ def learnt(
         covariance = np.linalg.inv(zt @ flat + prior)
         z = (covariance @ (zt @ left.reshape(count, -1, 1)))[..., 0]
         gap = left - (flat @ z[..., None])[..., 0].reshape(left.shape)
-        spread = np.einsum("snz,szy,sny->sn", flat, covariance, flat).reshape(left.shape)
+        spread = ((flat @ covariance) * flat).sum(-1).reshape(left.shape)
         squares = np.where(used, gap**2 + spread, 0.0).sum((0, 1))
         noise = np.maximum(np.sqrt(squares / np.maximum(used.sum((0, 1)), 1)), LEAST)
-        at = np.arange(knots) * KNOT
-        kernel = np.exp(-np.abs(at[:, None] - at) / unrest.time) + 1e-9 * np.eye(knots)
-        inverse = np.linalg.inv(kernel)
+        inverse = np.linalg.inv(_decay(knots, unrest.time))
         push = np.empty(3)
         for channel in range(3):
             part = slice(6 + channel * knots, 6 + (channel + 1) * knots)

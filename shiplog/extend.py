@@ -45,7 +45,7 @@ class ExtendedSimulator:
 
     def simulate(self, windows: Windows) -> torch.Tensor:
         """States [N, I, 6] as the instruments would have shown them."""
-        return torch.from_numpy(self.states(windows, self.theta))
+        return torch.from_numpy(self.states(windows, self.theta).copy())
 
     def states(self, windows: Windows, theta: np.ndarray) -> np.ndarray:
         recorded = as_record(windows, self.profile, self.shares, self.lengths)
@@ -157,9 +157,7 @@ class Extension:
                     f"The run was extended by {entry['label']!r}, which nobody knows here.",
                     hint="extend it again with the --cause file that defines it.",
                 )
-            made = {
-                k: tuple(v) if isinstance(v, list) else v for k, v in entry["made"].items()
-            }
+            made = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["made"].items()}
             cause = replace(by[entry["label"]], **made)
             causes.append(cause)
             numbers[cause.label] = np.array(entry["numbers"])
@@ -231,4 +229,3 @@ def campaign(record: Record) -> tuple[dict[str, tuple[float, float]], dict[str, 
             shares[name] = (float(record.share[rows[0]]), float(record.share[rows[-1]]))
             lengths[name] = float(record.time[rows[-1]])
     return shares, lengths
-

@@ -67,8 +67,9 @@ class Stretch:
             else ("force", "N", "full thrust")
         )
         return (
-            f"A {what} of {abs(self.peak):.3g} {unit} {towards} ({self.percent:.0f} % of {full}) for "
-            f"{self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of hers does that."
+            f"A {what} of {abs(self.peak):.3g} {unit} {towards} ({self.percent:.0f} % of {full}) "
+            f"for {self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of hers does "
+            "that."
         )
 
     def as_json(self) -> dict:
@@ -220,9 +221,10 @@ def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
     looks like a ship that was stopped and thrown."""
     sensors = record.profile.sensors
     state, shaken = record.state, np.zeros(len(record), dtype=bool)
-    velocity = midship.to_body(state[:, [1, 3]], -state[:, 4])
+    velocity = midship.to_body(state[:, [1, 3]], -state[:, 4])  # and back, to earth axes
+    lasts = record.lasts
     for a in np.flatnonzero(record.starts):
-        part = slice(a, record.lasts[a] + 1)
+        part = slice(a, lasts[a] + 1)
         for gone, rate, noise in (
             (state[part][:, [0, 2]], velocity[part], sensors.noise("position")),
             (state[part, 4, None], state[part, 5, None], sensors.noise("heading")),

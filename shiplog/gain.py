@@ -63,9 +63,7 @@ def gain(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> Gain:
         if fresh:
             blocks.append([])
         blocks[-1].append(i)
-    of = np.array(
-        [[before[b].sum(), after[b].sum()] for b in blocks]
-    )
+    of = np.array([[before[b].sum(), after[b].sum()] for b in blocks])
     rng = np.random.default_rng(0)
     drawn = of[rng.integers(len(of), size=(DRAWS, len(of)))].sum(1)
     reduced = 1.0 - drawn[:, 1] / np.maximum(drawn[:, 0], 1e-12)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import jax.numpy as jnp
 import numpy as np
 
 from shiplog import evidence, segments, structure
@@ -70,9 +71,7 @@ class Level:
 class Trial:
     """Voyages under question, against a reference. `unrest` grows a pulse when one is found."""
 
-    def __init__(
-        self, reference: Reference, record: Record, fixed: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, reference: Reference, record: Record, fixed: Sequence[str] = ()) -> None:
         """`fixed`: labels of causes that the model has already, with numbers that stay."""
         self.reference, self.record, self.fixed = reference, record, tuple(fixed)
         self.unrest = reference.unrest
@@ -241,9 +240,7 @@ class Trial:
                 low, high = by[name].bounds(self.reference.setting)
                 moved[name] = np.clip(base.numbers[name], low, high)
             size = {n: self.reference.columns.unit[self.reference.columns.of[n]] for n in included}
-            far = max(
-                float(np.abs((moved[n] - numbers[n]) / size[n]).max()) for n in included
-            )
+            far = max(float(np.abs((moved[n] - numbers[n]) / size[n]).max()) for n in included)
             numbers = moved
             if far < REST:
                 break
@@ -421,8 +418,9 @@ class Pulses:
 
 def accelerations(coefficients: Mapping, geometry, force: np.ndarray) -> np.ndarray:
     """ν̇ [3] that a force X, Y, N makes of a ship at rest."""
-    zero = np.zeros(())
-    return np.asarray(body.accelerations(coefficients, geometry, zero, zero, zero, force))
+    zero = jnp.zeros(())
+    found = body.accelerations(coefficients, geometry, zero, zero, zero, jnp.asarray(force))
+    return np.asarray(found)
 
 
 def _twice(total: np.ndarray, more: int) -> np.ndarray:

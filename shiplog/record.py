@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -102,11 +103,15 @@ def read(tables: Sequence[pl.DataFrame], names: Sequence[str], profile: Profile)
     order = np.argsort([t["time"][0].timestamp() for t in tables], kind="stable")
     parts = [_voyage(tables[i], profile) for i in order]
     lengths = [len(p["time"]) for p in parts]
-    whole = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
+    whole: dict[str, Any] = {n: np.concatenate([p[n] for p in parts]) for n in parts[0]}
     voyage = np.repeat(np.arange(len(parts)), lengths)
     share = (np.arange(sum(lengths)) + 0.5) / max(sum(lengths), 1)
     return Record(
-        profile=profile, names=tuple(names[i] for i in order), voyage=voyage, share=share, **whole
+        profile=profile,
+        names=tuple(str(names[i]) for i in order),
+        voyage=voyage,
+        share=share,
+        **whole,
     )
 
 

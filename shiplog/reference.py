@@ -20,7 +20,7 @@ from shiplog.evidence import Gram, Unrest
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
 from shiplog.record import Record
-from shiplog.segments import Cut, Grid, Linear, Path, Wide
+from shiplog.segments import Cut, Linear, Path, Wide
 
 ROUNDS = 8  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
@@ -114,7 +114,6 @@ class Reference:
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
 
-
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
         """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
@@ -186,9 +185,7 @@ def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
     return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
 
 
-def inflation(
-    each: np.ndarray, voyage: np.ndarray, prior: np.ndarray, known: np.ndarray
-) -> float:
+def inflation(each: np.ndarray, voyage: np.ndarray, prior: np.ndarray, known: np.ndarray) -> float:
     """κ that predicts each voyage best from the others; never less than is usual.
 
     each [S, 1 + C, 1 + C], voyage [S], prior and its information [C]: all in units
@@ -215,9 +212,7 @@ def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> flo
     towards = gram[1:, 0] + pull
     square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
     square -= towards @ np.linalg.solve(both, towards)
-    return -0.5 * float(
-        square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1]
-    )
+    return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])
 
 
 # --- what causes read otherwise -------------------------------------------------------------------

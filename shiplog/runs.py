@@ -38,7 +38,7 @@ from shiplog import config as configuration
 from shiplog.band import Band
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
-from shiplog.extend import Extension, ExtendedSimulator, campaign
+from shiplog.extend import ExtendedSimulator, Extension, campaign
 from shiplog.models import mmg, network
 from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
@@ -157,7 +157,7 @@ class Run:
     def extended(
         self,
         seed: int,
-        constants: Mapping[str, np.ndarray] | None = None,
+        constants: Mapping[str, Any] | None = None,
         record: Record | None = None,
     ) -> ExtendedSimulator:
         """The run's model, with its extension if it has one, ready to take in causes.

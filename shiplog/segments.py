@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
@@ -82,9 +83,7 @@ def begins(record: Record) -> np.ndarray:
     """Rows at which segments begin: end to end in every unbroken stretch."""
     size = grid(record).rows
     at = np.append(np.flatnonzero(record.starts), len(record))
-    found = [
-        np.arange(a, b - size, size) for a, b in zip(at[:-1], at[1:], strict=True) if b - a > size
-    ]
+    found = [np.arange(a, b - size, size) for a, b in pairwise(at) if b - a > size]
     return np.concatenate(found) if found else np.zeros(0, dtype=int)
 
 
@@ -315,9 +314,7 @@ def pulled(
         normal = np.einsum("sij,sik->sjk", scaled, scaled) + np.diag(prior**-2.0)
         pull = np.einsum("sij,si->sj", scaled, gap) - known * prior**-2.0
         step = np.linalg.solve(normal, pull[..., None])[..., 0]
-        path = Path(
-            path.start + step[:, :6], path.push + step[:, 6:].reshape(len(y), 3, g.knots)
-        )
+        path = Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(len(y), 3, g.knots))
     return path
 
 
@@ -363,9 +360,7 @@ def _run(model, theta, segments, path, g, moved=None):
             return np.concatenate((values, np.repeat(values[-1:], lack, axis=0)))
 
         driven = filled(segments.driven[part])
-        how = (
-            filled(moved[part]) if moved is not None else np.zeros((CHUNK, *driven.shape[1:], 0))
-        )
+        how = filled(moved[part]) if moved is not None else np.zeros((CHUNK, *driven.shape[1:], 0))
         y, c = _linear(
             model, theta, filled(path.start[part]), filled(push[part]), driven, how, hats,
             segments.step, g.bins, coefficients,

@@ -120,9 +120,7 @@ def _variables(family: str, knots: Knots) -> np.ndarray:
 
 
 def _count(family: str, knots: Knots) -> int:
-    return {"position": 2, "heading": 1, "time": 1, "motion": 3, "wind": 2}.get(
-        family, knots.driven.shape[-1] - 3
-    )
+    return int(_variables(family, knots).shape[-1])
 
 
 def columns(linear: Linear, features: np.ndarray, push: np.ndarray) -> np.ndarray:

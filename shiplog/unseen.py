@@ -103,7 +103,8 @@ def table(
         null = _gains(
             shared, known, [features(move(shared.runs, time, rng)) for _ in range(shifts)]
         )
-        limit = np.maximum(null.max(0), null.mean(0) + BEYOND * null.std(0))
+        lucky = np.maximum(null, 0.0)  # how much worse than nothing a bad guess is does not count
+        limit = np.maximum(lucky.max(0), lucky.mean(0) + BEYOND * lucky.std(0))
         acts_on = tuple(
             c for c, a, b in zip(CHANNELS, r2, np.maximum(limit, LEAST), strict=True) if a > b
         )
@@ -282,10 +283,9 @@ def _ridge(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = sums[..., 0, 0]
     mean = sums[..., 0, 1:] / count[..., None]
     inner = _centred(sums, mean)
-    roots, turn = np.linalg.eigh(inner[..., :-3, :-3])
-    pull = np.swapaxes(turn, -1, -2) @ inner[..., :-3, -3:]
-    firm = np.maximum(roots, 0.0)[:, None] + PENALTIES[:, None] * count[:, None, None]
-    return turn[:, None] @ (pull[:, None] / firm[..., None]), mean
+    features, pull = inner[..., :-3, :-3], inner[..., :-3, -3:]
+    firm = PENALTIES[:, None, None] * count[:, None, None, None] * np.eye(features.shape[-1])
+    return np.linalg.solve(features[:, None] + firm, pull[:, None]), mean
 
 
 def _errors(sums: np.ndarray, weights: np.ndarray, mean: np.ndarray) -> np.ndarray:

@@ -31,7 +31,9 @@ def _of(path: Path) -> list[Cause]:
     name = f"shiplog_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise RunError(f"{path} is no Python file.", hint="give --cause a file such as my_cause.py.")
+        raise RunError(
+            f"{path} is no Python file.", hint="give --cause a file such as my_cause.py."
+        )
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

@@ -161,9 +161,7 @@ def ranking_json(decision: Decision) -> tuple[dict, ...]:
         name = label if label.startswith("unknown:") else label.split(":")[0]
         of[name] = of.get(name, 0.0) + share
     kept = [(n, p) for n, p in of.items() if p >= SHARE_SAID]
-    return tuple(
-        {"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1])
-    )
+    return tuple({"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1]))
 
 
 def sentence(

@@ -21,7 +21,6 @@ RARE = 0.03  # of the time: what is seen less often is an incident, not a regime
 STANDS_OUT = 0.05  # nats of `_score`: 20 % of the error in 15 % of the time
 FINER = 1.2  # how much more a second or third condition must say
 CONDITIONS = 3
-CAP = 6.0  # times the median window: no single window decides where the error is
 RECENT = 2.0  # s, over which controls are said to move
 SIDES = ("ahead", "starboard", "astern", "port")
 COMPASS = ("north", "east", "south", "west")
@@ -78,12 +77,9 @@ def explain(error: np.ndarray, data: Series, windows: pl.DataFrame, profile: Pro
     if not total:
         return Wrong((), None, rows, int((~finite).sum()))
     regimes = list(_regimes(kept, windows[np.flatnonzero(finite).tolist()], profile))
-    of_window = cost.sum((1, 2))
-    most = CAP * np.median(of_window)
-    capped = cost * np.minimum(1.0, most / np.maximum(of_window, 1e-300))[:, None, None]
     found = []
     for i, name in enumerate(CHANNELS):
-        where, within, occurs = _where(capped[..., i], kept.steps, regimes)
+        where, within, occurs = _where(cost[..., i], kept.steps, regimes)
         found.append(Channel(name, float(cost[..., i].sum() / total), where, within, occurs))
     found.sort(key=lambda c: -c.share)
     return Wrong(tuple(found), worst_minute(rows), rows, int((~finite).sum()))
@@ -167,10 +163,18 @@ def _where(cost: np.ndarray, steps: np.ndarray, regimes: list[Regime]) -> tuple[
 
 def _score(cost: np.ndarray, steps: np.ndarray, inside: np.ndarray) -> float:
     """s log(s/t) of a share s of the error in a share t of the time: its part in their Kullback-
-    Leibler divergence. It asks for much of the error, and for more of it than of the time."""
-    occurs = steps[inside].sum() / steps.sum()
-    within = cost[inside].sum() / max(cost.sum(), 1e-300)
-    return float(within * np.log(within / occurs)) if occurs >= RARE and within > 0.0 else 0.0
+    Leibler divergence. It asks for much of the error, and for more of it than of the time.
+
+    The window that speaks for it most is not heard: one bad window makes no regime.
+    """
+    of_cost, of_time = ((v * inside).sum(1) for v in (cost, steps))
+    heard = np.arange(len(cost)) != of_cost.argmax()
+    all_cost, all_time = cost[heard].sum(), steps[heard].sum()
+    within, time = of_cost[heard].sum(), of_time[heard].sum()
+    if not within or time < RARE * all_time:
+        return 0.0
+    share = within / all_cost
+    return float(share * np.log(share * all_time / time))
 
 
 def _regimes(data: Series, windows: pl.DataFrame, profile: Profile) -> Iterator[Regime]:

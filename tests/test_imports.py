@@ -20,6 +20,9 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"engine", "simulate", "coverage", "sensitivity"},
     {"identify", "band"},
     {"evaluate", "floors", "train", "crossvalidation", "identifiability", "residual", "forces"},
+    {"segments", "evidence", "wrong"},
+    {"unexplained"},
+    {"unseen", "external"},
     {"runs", "report", "viewer"},
     {"cli"},
 )

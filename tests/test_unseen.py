@@ -59,12 +59,12 @@ def asked(knots: pl.DataFrame) -> dict[str, unseen.Dependence]:
 
 
 def effect(knots: pl.DataFrame, variable: str) -> np.ndarray:
-    """Of an earth-fixed force, a hollow in the pond, something that wears, a rudder that lags."""
+    """Of an earth-fixed force, a tether, something that wears, a rudder that lags."""
     get = {name: knots[name].to_numpy() for name in knots.columns if name != "voyage"}
     if variable == "heading":
         return np.cos(get["heading"] - 0.7)
     if variable == "position":
-        north, east = -get["x0"], 30.0 - get["y0"]  # pulled towards (0, 30)
+        north, east = -get["x0"], 5.0 - get["y0"]  # pulled towards (0, 5)
         far = np.hypot(north, east) + 1.0
         return (north * np.cos(get["heading"]) + east * np.sin(get["heading"])) / far
     if variable == "time":

@@ -53,7 +53,7 @@ def test_shares_are_those_of_the_loss(driven):
     error = little(data)
     error[..., 3] *= 2.0
     found = wrong.explain(error, data, windows, afloat.PROFILE)
-    assert [c.channel for c in found.channels][0] == "sway"
+    assert found.channels[0].channel == "sway"
     assert {c.channel: c.share for c in found.channels} == pytest.approx(
         {"sway": 4.0 / 6.0, "surge": 1.0 / 6.0, "yaw_rate": 1.0 / 6.0}
     )
@@ -119,13 +119,14 @@ def test_two_conditions_are_said_where_both_are_needed(driven):
 def test_the_worst_minute_is_found(driven):
     data, windows = driven
     error = little(data)
-    error[17, 30:80, 1] = 0.1  # voyage b, from 730 s; 50 s of 100, against 3 everywhere
+    error[17, 30:80, 1] = 0.1  # voyage b, 730 to 780 s: 100 a second, against 0.01 a channel
     found = wrong.explain(error, data, windows, afloat.PROFILE)
+    assert found.worst is not None
     assert found.worst.voyage == "b"
     assert 720.0 <= found.worst.start_s <= 730.0
-    inside = 50 * 102.0 + 10 * 3.0
-    whole = 50 * 102.0 + 3.0 * (COUNT * SIZE - 50 - COUNT)  # the two ends of a window count half
-    assert found.worst.share == pytest.approx(inside / whole, rel=1e-3)
+    inside = 50 * 100.02 + 10 * 0.03
+    whole = 50 * 100.02 + 0.03 * (COUNT * SIZE - 50 - COUNT)  # ends of a window count half
+    assert found.worst.share == pytest.approx(inside / whole, rel=1e-6)
 
 
 def test_one_bad_window_does_not_say_where(driven):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import jax.numpy as jnp
@@ -156,11 +157,7 @@ class Bank(Cause):
         return None
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
-        lines = [
-            [*a, *b]
-            for line in setting.profile.site.banks
-            for a, b in zip(line[:-1], line[1:], strict=True)
-        ]
+        lines = [[*a, *b] for line in setting.profile.site.banks for a, b in pairwise(line)]
         ship = setting.profile.ship
         breadth = ship.breadth_m or 0.15 * setting.scale["length"]
         draught = ship.draught_m or 0.07 * setting.scale["length"]
@@ -187,9 +184,7 @@ class Bank(Cause):
         pull = 0.15 * 0.5 * density * length * draught * (u * starboard) ** 2 * near * p[0]
         lead = u / jnp.sqrt(u * u + 1e-4)
         turn = -0.25 * length * pull * starboard * lead
-        return jnp.stack(
-            ((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1
-        )
+        return jnp.stack(((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1)
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return (

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.signal import lfilter
 
 from shiplog.causes.base import Cause, Parameter, Setting, Shown
 from shiplog.profile import Profile
@@ -265,15 +267,13 @@ def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
         return values - time * rate
     if time < 0.0:
         return values - time * rate
-    from scipy.signal import lfilter
-
     decay = np.exp(-record.step / time)
     # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact
     b1 = 1.0 - time / record.step * (1.0 - decay)
     b0 = 1.0 - decay - b1
     out = np.empty_like(values)
     at = np.append(np.flatnonzero(starts), len(values))
-    for a, b in zip(at[:-1], at[1:], strict=True):
+    for a, b in pairwise(at):
         x = values[a:b]
         if len(x) == 0:
             continue

@@ -18,7 +18,7 @@ from jax import Array
 
 from shiplog.causes.base import Cause
 from shiplog.models.mmg import body
-from shiplog.models.mmg.model import MMG, named
+from shiplog.models.mmg.model import MMG, named, total
 
 
 @partial(
@@ -80,12 +80,14 @@ class Extended:
         x0, u, y0, v, heading, r = (state[..., i] for i in range(6))
         wet = jnp.stack((x0, u - ahead, y0, v - starboard, heading, r), -1)
         wind = true_wind + jnp.stack((north, east), -1)
+        at = dict(self.constants)
         before = named(
-            self.stand_in.names, values if isinstance(self.base, MMG) else self.stand_in_values
+            self.stand_in.names,
+            values if isinstance(self.base, MMG) else jnp.asarray(self.stand_in_values),
         )
         after = before
         for cause, p in zip(self.causes, numbers, strict=True):
-            after = cause.coefficients(after, p, wet, share, self.constants)
+            after = cause.coefficients(after, p, wet, share, at)
         if isinstance(self.base, MMG):
             acceleration = self.base.acceleration_of(after, wet, actuator, wind)
         else:
@@ -95,15 +97,12 @@ class Extended:
                     self.stand_in.acceleration_of(after, wet, actuator, wind)
                     - self.stand_in.acceleration_of(before, wet, actuator, wind)
                 )
-        forces = [
-            cause.force(p, wet, self.constants)
-            for cause, p in zip(self.causes, numbers, strict=True)
-        ]
+        forces = [cause.force(p, wet, at) for cause, p in zip(self.causes, numbers, strict=True)]
         forces = [f for f in forces if f is not None]
         if forces:
             at_rest = jnp.zeros_like(u)
             acceleration = acceleration + body.accelerations(
-                after, self.stand_in.geometry, at_rest, at_rest, at_rest, sum(forces[1:], forces[0])
+                after, self.stand_in.geometry, at_rest, at_rest, at_rest, total(forces)
             )
         turning = jnp.stack((r * starboard, -r * ahead, jnp.zeros_like(r)), -1)
         return acceleration + turning
