@@ -9,20 +9,34 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import plan
 from shiplog import causes as catalogue
 from shiplog import coverage as covering
-from shiplog import diagnose, record, reference, runs, segments, table, user_causes, windows
+from shiplog import (
+    diagnose,
+    external,
+    record,
+    reference,
+    runs,
+    segments,
+    table,
+    unexplained,
+    unseen,
+    user_causes,
+    windows,
+    wrong,
+)  # fmt: skip
 from shiplog import verdict as verdicts
 from shiplog.causes import Cause, Setting
 from shiplog.diagnose import Decision, Named
 from shiplog.exceptions import RunError, StoreError, listed
-from shiplog.extend import ExtendedSimulator
+from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.gain import Gain, gain, parts
-from shiplog.hypotheses import Trial
+from shiplog.hypotheses import Point, Trial
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.record import Record
@@ -99,13 +113,17 @@ def diagnose_run(
         listed(names, most=4), run.name, len(trial.rows), segments.SECONDS,
         trial.reference.kappa,
     )  # fmt: skip
-    decision = diagnose.decide(trial, run.extension_numbers())
+    point = trial.at(run.extension_numbers())
+    trial.robust(point)
+    pushed = _external(trial, point)
+    decision = diagnose.decide(trial, point)
     cut = _windows(run, store, names, profile)
     before = run.extended(run.config.seeds[0], trial.reference.model.constants, recorded)
     after, found, decision, dropped = _gain(trial, decision, cut, before, recorded)
     verdict = _verdict(
         run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
-        _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial,
+        _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial, pushed,
+        _wrong(trial, before, cut, profile), _unseen(trial, decision),
     )  # fmt: skip
     done = Diagnosis(verdict, decision, trial, cut, before, after, out)
     _save(done, run, store, names, began)
@@ -270,8 +288,6 @@ def _uncovered(run: Run, store: Store, names, profile, cut: Windows | None) -> l
     """Windows that the training data never came near."""
     if cut is None:
         return []
-    import polars as pl
-
     rows = table.with_elapsed(seconds(store, names, profile))
     seen = covering.of(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(
@@ -297,8 +313,9 @@ def _uncovered(run: Run, store: Store, names, profile, cut: Windows | None) -> l
 
 
 def _verdict(
-    run, decision, found, before_effect, untested, dropped, notes, uncovered, count, trial
-) -> Verdict:
+    run, decision, found, before_effect, untested, dropped, notes, uncovered, count, trial,
+    pushed, wrongs, depends,
+) -> Verdict:  # fmt: skip
     causes = [verdicts.cause_json(n) for n in decision.named]
     if decision.pulses is not None:
         share = decision.ranking.get(diagnose.PULSES, 0.95)
@@ -310,6 +327,8 @@ def _verdict(
     family = structure["family"] if structure else ""
     if said == "unknown" and family in SEEN and len(uncovered) > MOSTLY * count:
         said = "coverage"
+    if said == "none" and pushed:
+        said = "external"
     rejected = dict(decision.rejected) | dropped
     rejected |= {k: f"not testable: {why}" for k, why in untested.items()}
     traces = [
@@ -330,10 +349,53 @@ def _verdict(
         rejected=tuple({"name": k.split(":")[0], "reason": why} for k, why in rejected.items()),
         traces=tuple(traces),
         structure=structure if said == "unknown" else None,
-        intervals=tuple(uncovered),
+        intervals=(*pushed, *uncovered),
         gain=found if causes else None,
-        notes=tuple(notes),
+        wrong=tuple(wrongs),
+        unseen=tuple(depends),
+        notes=(*notes, *verdicts.remains(decision, said)),
     )
+
+
+def _external(trial: Trial, point: Point) -> list[Interval]:
+    """Stretches that no force of the ship explains; no hypothesis is judged on them."""
+    ref = trial.reference
+    whole = trial.over(unexplained.covering(trial.record), point.numbers)
+    base, _ = trial.scan(point, (), trial.fixed)
+    found = external.find(
+        whole, trial.solved(point, base), trial.unrest.louder(base.louder), trial.record,
+        ref.model.stand_in, np.array(list(ref.coefficients.values())),
+    )  # fmt: skip
+    out = np.zeros(len(trial.rows), dtype=bool)
+    of = np.array(trial.record.names)[trial.record.voyage[trial.rows]]
+    begin = trial.record.time[trial.rows]
+    for stretch in found:
+        inside = (begin < stretch.end_s) & (begin + segments.SECONDS > stretch.start_s)
+        out |= inside & (of == stretch.voyage)
+    trial.leave_out(out)
+    return [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
+
+
+def _wrong(trial: Trial, before: ExtendedSimulator, cut: Windows | None, profile) -> list[dict]:
+    """Where the error is, channel by channel."""
+    if cut is None:
+        return []
+    error = before.states(cut, before.theta) - cut.state.double().numpy()
+    shares, _ = campaign(trial.record)
+    share = [shares.get(v, (1.0, 1.0))[0] for v in cut.plan["voyage"]]
+    plan_ = cut.plan.with_columns(share=pl.Series(share))
+    return [c.as_json() for c in wrong.explain(error, series(cut), plan_, profile).channels]
+
+
+def _unseen(trial: Trial, decision: Decision) -> list[dict]:
+    """What the model cannot see and the residual depends on."""
+    found = unexplained.posterior(
+        decision.first.linear, trial.solved(decision.first, decision.nothing),
+        trial.unrest.louder(decision.nothing.louder), trial.record,
+    )  # fmt: skip
+    knots = unexplained.table(found, trial.record)
+    rows = unseen.table(knots, trial.record.profile, np.random.default_rng(0))
+    return [verdicts.unseen_json(row) for row in rows]
 
 
 def _pulses(trial: Trial, decision: Decision) -> list[dict]:

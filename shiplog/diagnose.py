@@ -67,6 +67,9 @@ class Decision:
     traces     there, but too small to matter
     ranking    label or family → probability, of the first step
     louder     λ that is left
+    point, base      the trial linearised with what is named, and that hypothesis
+    first, nothing   the same with nothing named
+    remains    families of structure, with what they would still explain
     """
 
     verdict: str
@@ -79,18 +82,17 @@ class Decision:
     louder: float
     point: Point
     base: Found
+    first: Point
     nothing: Found
     remains: tuple[Found, ...] = field(default=())
 
 
-def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Decision:
-    """`numbers`: of causes that the model has already (`Trial.fixed`)."""
+def decide(trial: Trial, point: Point) -> Decision:
+    """From a trial linearised as the model stands, with what it has of causes (`Trial.fixed`)."""
     ref = trial.reference
-    known = dict(numbers or {})
-    fixed = tuple(known)
+    fixed = trial.fixed
     catalogue = {c.label: c for c in ref.model.causes if c.label not in fixed}
-    point = trial.at(known)
-    trial.robust(point)
+    first_point = point
     included: tuple[str, ...] = fixed
     base, found = trial.scan(point, tuple(catalogue.values()), included)
     nothing = base
@@ -105,7 +107,7 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
         wanted = LEAST if first and pulses is None else MORE
         remains = trial.structures(point, base, included)
         if pulses is None and base.louder >= LOUD:
-            tried = trial.pulses(point, base, included)
+            tried = trial.pulses(point, base)
             rivals = [f.evidence for f in (*found[:1], *remains[:1])]
             if tried.gain > max(PULSED, *rivals):
                 pulses = tried
@@ -162,7 +164,7 @@ def decide(trial: Trial, numbers: Mapping[str, np.ndarray] | None = None) -> Dec
         structure = Structure("stochastic", stochastic, ("surge", "sway", "yaw_rate"))
     return Decision(
         verdict, real, structure, pulses, traces, rejected, ranking, base.louder, point, base,
-        nothing, tuple(remains),
+        first_point, nothing, tuple(remains),
     )  # fmt: skip
 
 

@@ -97,6 +97,14 @@ class Trial:
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
         return Point(numbers, path, linear, evidence.weighed(linear, self.unrest.noise))
 
+    def over(self, rows: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Linear:
+        """The same for segments that begin at other rows, around paths of their own."""
+        ref = self.reference
+        cut, moved, shown = read(ref.model, ref.setting, self.record, rows, dict(numbers))
+        whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
+        path = segments.pulled(ref.model, whole, cut, self.grid, ref.wide)
+        return segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+
     def robust(self, point: Point) -> None:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
         ref = self.reference
@@ -351,14 +359,25 @@ class Trial:
         prior = np.concatenate((ref.prior, np.zeros(more)))
         return seen[1:, 1:] + sure, seen[1:, 0] + prior
 
-    def pulses(self, point: Point, base: Found, included: Sequence[str]) -> Pulses:
+    def solved(self, point: Point, base: Found) -> np.ndarray:
+        """[C] numbers around the point, under a hypothesis of that point: what is usual of the
+        coefficients on these voyages, and what its causes add."""
+        ref = self.reference
+        level = self.level(point, base.louder, tuple(base.numbers))
+        d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
+        for name, values in base.numbers.items():
+            d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)
+        return d
+
+    def leave_out(self, segments_out: np.ndarray) -> None:
+        """Segments [S] bool that no hypothesis is judged on."""
+        self.weight = np.where(segments_out, 0.0, self.weight)
+
+    def pulses(self, point: Point, base: Found) -> Pulses:
         """A force to the side that comes and goes at one place along the ship, unrecorded: its
         accelerations go together as those of no other unrest do. Judged on what is left."""
         ref = self.reference
-        level = self.level(point, base.louder, included)
-        d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
-        for name, values in self._numbers(level, point, included)[0].items():
-            d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)
+        d = self.solved(point, base)
         left = point.weighed
         r = np.concatenate(([1.0], -d))
         alone = replace(
@@ -388,12 +407,7 @@ class Trial:
 
     def pulse_force(self, point: Point, base: Found, pulses: Pulses) -> np.ndarray:
         """[S, J] force of the unrecorded thruster at the knots [N], as far as the data tell."""
-        ref = self.reference
-        included = tuple(base.numbers)
-        level = self.level(point, base.louder, included)
-        d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
-        for name, values in base.numbers.items():
-            d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)
+        d = self.solved(point, base)
         unrest = self.unrest.louder(base.louder)
         z = evidence.starts_and_knots(point.linear, d, unrest)
         knots = self.grid.knots

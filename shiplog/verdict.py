@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from shiplog.diagnose import PULSES, Decision, Named
+from shiplog.channels import VELOCITY
+from shiplog.diagnose import PULSES, UNKNOWN, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.findings import CONTRACT
 from shiplog.gain import Gain
+from shiplog.unseen import Dependence
 
 SHARE_SAID = 0.01  # of a ranking
 
@@ -198,6 +200,29 @@ def sentence(
     if verdict == "external":
         return "The ship was pushed, held or towed: no force of her own explains these stretches."
     return "Nothing is wrong beyond what the model got wrong where it was made."
+
+
+def unseen_json(row: Dependence) -> dict:
+    """One line of the table of what the model cannot see."""
+    r2 = dict(zip((c.name for c in VELOCITY), row.r2, strict=True))
+    said = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in r2.items())
+    depends = f"acts on {listed(row.acts_on)}" if row.significant else "no dependence"
+    return {
+        "variable": row.variable, "r2": r2, "acts_on": list(row.acts_on),
+        "significant": row.significant, "left_out": row.folds,
+        "sentence": f"R² {said} ({row.folds} left out): {depends}",
+    }  # fmt: skip
+
+
+def remains(decision: Decision, verdict: str) -> list[str]:
+    """What is left where something was named."""
+    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
+    if verdict != "named" or strongest is None or strongest.evidence < UNKNOWN:
+        return []
+    return [
+        f"Something else remains: it depends on {strongest.name} "
+        f"({strongest.evidence:.0f} nats beyond what is named) and has no name here."
+    ]
 
 
 def markdown(verdict: Verdict) -> str:
