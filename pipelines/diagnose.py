@@ -113,8 +113,7 @@ def diagnose_run(
         listed(names, most=4), run.name, len(trial.rows), segments.SECONDS,
         trial.reference.kappa,
     )  # fmt: skip
-    point = trial.at(run.extension_numbers())
-    trial.robust(point)
+    point = trial.begin(run.extension_numbers())
     pushed = _external(trial, point)
     decision = diagnose.decide(trial, point)
     cut = _windows(run, store, names, profile)

@@ -48,13 +48,13 @@ class Unrest:
         return replace(self, push=self.push * factor)
 
     def precision(self, knots: int) -> tuple[np.ndarray, float]:
-        """Of z [Z, Z], and its log determinant."""
+        """Of z [Z, Z], and the log determinant of its knots' part."""
         kernel = self.kernel(knots)
         size = 6 + 3 * knots
         whole = np.zeros((size, size))
         whole[:6, :6] = np.diag(self.start**-2.0)
         whole[6:, 6:] = np.linalg.inv(kernel)
-        logdet = -2.0 * np.log(self.start).sum() - np.linalg.slogdet(kernel)[1]
+        logdet = -np.linalg.slogdet(kernel)[1]
         return whole, float(logdet)
 
 
@@ -118,8 +118,21 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
     root = np.linalg.cholesky(inner)
     solved = np.linalg.solve(root, weighed.zd)
     each = weighed.dd - np.swapaxes(solved, 1, 2) @ solved
+    return Gram(each, _volume(weighed, prior, logdet, root))
+
+
+def log_volume(weighed: Weighed, unrest: Unrest) -> float:
+    """log |C| of all segments, by itself."""
+    prior, logdet = unrest.precision(weighed.knots)
+    return _volume(weighed, prior, logdet, np.linalg.cholesky(weighed.zz + prior))
+
+
+def _volume(weighed: Weighed, prior: np.ndarray, logdet: float, root: np.ndarray) -> float:
+    # Restricted likelihood (Patterson & Thompson 1971): how far a model lets a start be felt is
+    # no evidence, and a ship with less damping would be punished for it, segment by segment.
     of_inner = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
-    return Gram(each, weighed.logdet - logdet * len(weighed.zz) + float(of_inner))
+    of_inner -= np.linalg.slogdet(weighed.zz[:, :6, :6] + 1e-9 * prior[:6, :6])[1].sum()
+    return weighed.logdet - logdet * len(weighed.zz) + float(of_inner)
 
 
 def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> Unrest:

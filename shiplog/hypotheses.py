@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from shiplog import evidence, segments, structure
 from shiplog.causes import Cause
@@ -22,6 +23,7 @@ from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
 QUIETER = 0.7
+FINER = (1.15, 1.03)  # steps of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
 REST = 0.02  # of a number's size: it rests
@@ -78,13 +80,25 @@ class Trial:
         self.grid = segments.grid(record)
         self.rows = segments.begins(record)
         self._known: tuple[np.ndarray, np.ndarray] | None = None
+        self._first: Point | None = None
+        self._volume: tuple[evidence.Unrest, CubicSpline] | None = None
         self.weight = np.ones(len(self.rows))
 
     # --- linearisation ---
 
-    def at(self, numbers: Mapping[str, np.ndarray], path: Path | None = None) -> Point:
-        """Linearised with these numbers, around a path pulled onto what was then measured."""
+    def at(
+        self,
+        numbers: Mapping[str, np.ndarray],
+        path: Path | None = None,
+        louder: float | None = None,
+    ) -> Point:
+        """Linearised with these numbers, around a path pulled onto what was then measured.
+
+        louder   λ that holds the path: one that follows every wave of the noise is as far from
+                 the likely one as a free rollout, and what is not linear then looks like evidence
+        """
         ref = self.reference
+        wide = ref.wide if louder is None else ref.held(louder)
         cut, moved, shown = read(
             ref.model, ref.setting, self.record, self.rows, dict(numbers), self._known
         )
@@ -92,10 +106,21 @@ class Trial:
             self._known = (moved, shown)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         path = segments.pulled(
-            ref.model, whole, cut, self.grid, ref.wide, path, rounds=1 if path else 2
+            ref.model, whole, cut, self.grid, wide, path, rounds=1 if path else 2
         )
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
-        return Point(numbers, path, linear, evidence.weighed(linear, self.unrest.noise))
+        point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest.noise))
+        if self._first is None:
+            self._first = point
+        return point
+
+    def begin(self, numbers: Mapping[str, np.ndarray]) -> Point:
+        """The model as it stands, with weights of the segments and a path held as firmly as the
+        unrest then found allows."""
+        point = self.at(numbers)
+        self.robust(point)
+        base, _ = self.scan(point, (), self.fixed)
+        return self.at(numbers, point.path, base.louder)
 
     def over(self, rows: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Linear:
         """The same for segments that begin at other rows, around paths of their own."""
@@ -121,7 +146,18 @@ class Trial:
     def gram(self, point: Point, louder: float) -> Gram:
         ref = self.reference
         found = evidence.gram(point.weighed, self.unrest.louder(louder)).scaled(ref.columns.unit)
-        return Gram(found.each * self.weight[:, None, None], found.logdet)
+        return Gram(found.each * self.weight[:, None, None], self.volume(louder))
+
+    def volume(self, louder: float) -> float:
+        """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
+        model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
+        own misfit it would count as such."""
+        if self._volume is None or self._volume[0] is not self.unrest:
+            assert self._first is not None
+            at = (QUIETER / 2.0, QUIETER, *LOUDER, 2.0 * LOUDER[-1])
+            values = [evidence.log_volume(self._first.weighed, self.unrest.louder(v)) for v in at]
+            self._volume = (self.unrest, CubicSpline(np.log(at), values))
+        return float(self._volume[1](np.log(louder)))
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: what is usual, and the included causes free."""
@@ -175,14 +211,24 @@ class Trial:
         return max(levels, key=lambda level: level.value).louder
 
     def levels(self, point: Point, included: Sequence[str] = ()) -> list[Level]:
-        """From the usual unrest upwards, until it is too much; below it, if that is better."""
-        found = []
+        """From the usual unrest upwards, until it is too much; below it, if that is better; and
+        finely about the best, since thousands of knots make λ sharp."""
+        found: list[Level] = []
         for louder in LOUDER:
             found.append(self.level(point, louder, included))
             if len(found) > 1 and found[-1].value < found[-2].value:
                 break
         if len(found) == 2:
             found.append(self.level(point, QUIETER, included))
+        for apart in FINER:
+            best = max(found, key=lambda level: level.value)
+            sides = [self.level(point, best.louder * by, included) for by in (1.0 / apart, apart)]
+            found += sides
+            below, here, above = sides[0].value, best.value, sides[1].value
+            bend = below - 2.0 * here + above
+            if here >= max(below, above) and bend < 0.0:
+                top = best.louder * apart ** (0.5 * (below - above) / bend)
+                found.append(self.level(point, top, included))
         return found
 
     def scan(
@@ -238,11 +284,12 @@ class Trial:
     ) -> tuple[Point, Found]:
         """These causes together, linearised where they are until they rest."""
         by = {cause.label: cause for cause in self.reference.model.causes}
-        point = None
+        point, louder = None, 1.0
         for _ in range(ROUNDS):
-            point = self.at(numbers, path)
+            point = self.at(numbers, path, louder)
             path = point.path
             base, _ = self.scan(point, (), included)
+            louder = base.louder
             moved = {}
             for name in included:
                 low, high = by[name].bounds(self.reference.setting)
@@ -327,21 +374,22 @@ class Trial:
         unit = ref.columns.unit
         count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
         gram = evidence.gram(weighed, self.unrest.louder(louder))
+        volume = self.volume(louder)
         whole = (gram.each * self.weight[:, None, None]).sum(0)
         for size in structure.SIZES:
             by = np.concatenate(([1.0], unit, np.full(more, size)))
             total = whole * np.outer(by, by)
             known, pull = self._usual(before, by, more)
             value = self._solved(
-                _twice(total, more), gram.logdet, louder, point, included,
+                _twice(total, more), volume, louder, point, included,
                 _beside(known, more), np.concatenate((pull, np.zeros(more))),
             ).value  # fmt: skip
             if before is not None:
                 # what the nominal campaign has of it already is no news
-                usual = self._solved(total, gram.logdet, louder, point, included, known, pull)
+                usual = self._solved(total, volume, louder, point, included, known, pull)
                 kept = total[: count + 1, : count + 1]
                 without = self._solved(
-                    kept, gram.logdet, louder, point, included, ref.information, ref.pull
+                    kept, volume, louder, point, included, ref.information, ref.pull
                 )
                 value -= max(usual.value - without.value, 0.0)
             yield Found(family, value, louder)

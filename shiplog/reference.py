@@ -22,10 +22,11 @@ from shiplog.models.mmg.model import MMG
 from shiplog.record import Record
 from shiplog.segments import Cut, Linear, Path, Wide
 
-ROUNDS = 8  # of moving the coefficients to where they are linearised
+ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
-NEAR = 0.3  # plausible spreads that need no further round
-STEP = 0.02  # of a cause's size, to see how it changes what is read
+NEAR = 0.1  # plausible spreads that need no further round
+FREE = 2.0  # times the unrest that a path's knots may be pulled by
+STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (2.0, 4.0, 8.0, 16.0, 32.0)
 USUAL_KAPPA = 11.0  # DIAGNOSIS: one campaign's coefficients are some 3.3 times too sure
 UNREST_TIME = 4.0  # s
@@ -34,10 +35,12 @@ HELD = 1e8  # information that leaves a number where it is
 
 @dataclass(frozen=True)
 class Start:
-    """Coefficients of the base [P]: those of the run, what was known of them before any data,
-    and their range."""
+    """Coefficients of the base [P] as the run has them, how far off they may be, and their range.
 
-    begin: np.ndarray
+    The run's own values hold them, and not what was known before any data: what these say nothing
+    of stays, and all is linear about where the ship is.
+    """
+
     values: np.ndarray
     spread: np.ndarray
     low: np.ndarray
@@ -66,11 +69,11 @@ class Columns:
 
     @cached_property
     def known(self) -> np.ndarray:
-        """[C] how surely each is as it stands, before any data, in units: a cause that is only
-        another value of coefficients has no usual size of its own."""
+        """[C] how surely each is as it stands, before any data, in units: a cause that
+        coefficients or another one stand for has no usual size of its own."""
         whole = np.ones(len(self.unit))
         for cause in self.causes:
-            if cause.absorbed:
+            if not cause.usual:
                 whole[self.of[cause.label]] = HELD
         return whole
 
@@ -114,6 +117,10 @@ class Reference:
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
 
+    def held(self, louder: float) -> Wide:
+        """How far a path may be pulled where the unrest is so much louder than usual."""
+        return Wide(self.unrest.noise, self.wide.start, FREE * louder * self.unrest.push)
+
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
         """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
@@ -149,15 +156,15 @@ def learn(
     rows = segments.begins(record)
     cut, moved, shown = read(model, setting, record, rows)
     base, unit = columns.base, columns.unit
-    theta = np.clip(start.begin, start.low, start.high)
+    theta = np.clip(start.values, start.low, start.high)
     unrest = Unrest(wide.noise, 0.04 * wide.push, UNREST_TIME, wide.start)
     path: Path | None = None
+    hold = wide
+    prior = np.zeros(len(unit))  # about wherever the coefficients stand
     for round_ in range(ROUNDS + 1):
         whole = np.concatenate((theta, np.zeros(len(unit) - base)))
-        path = segments.pulled(model, whole, cut, g, wide, path, rounds=1 if path else 2)
+        path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
-        prior = np.zeros(len(unit))
-        prior[:base] = (start.values - theta) / unit[:base]
         for again in range(3):
             grams = evidence.gram(evidence.weighed(linear, unrest.noise), unrest).scaled(unit)
             found = np.linalg.solve(
@@ -165,6 +172,7 @@ def learn(
             )
             if again < 2:
                 unrest = evidence.learnt(linear, found * unit, unrest, rounds=4)
+        hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
         far = float(np.abs(found[:base]).max(initial=0.0))
         if round_ == ROUNDS or far < NEAR:
             break
@@ -291,7 +299,6 @@ def assume(model: Extended, setting: Setting, start: Start, record: Record) -> R
     information = np.diag(whole.columns.known.copy())
     prior = np.zeros(len(unit))
     base = whole.columns.base
-    prior[:base] = (start.values - whole.theta) / unit[:base]
     causes = slice(base, len(unit))
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD

@@ -138,7 +138,7 @@ class Run:
             net = network.compiled(self.model(seed))
             count = len(net.names)
             wide = np.full(count, BEND)
-            start = Start(np.zeros(count), np.zeros(count), wide, -10.0 * wide, 10.0 * wide)
+            start = Start(np.zeros(count), wide, -10.0 * wide, 10.0 * wide)
             return net, start, mmg.MMG(ship), usual.values
         simulator = self.simulator(seed)
         known = self.identified(seed)
@@ -146,7 +146,6 @@ class Run:
         # a hybrid's network stays as it was trained
         start = Start(
             simulator.theta,
-            np.concatenate((known["start"].to_numpy(), simulator.theta[count:])),
             np.concatenate((known["spread"].to_numpy(), np.full(more, 1e-9))),
             np.concatenate((usual.low, np.full(more, -np.inf))),
             np.concatenate((usual.high, np.full(more, np.inf))),
@@ -169,7 +168,7 @@ class Run:
         base, start, stand_in, values = self.base()
         if own is None:
             base = network.compiled(self.model(seed))
-        theta = start.begin if own is None else own.theta
+        theta = start.values if own is None else own.theta
         covariance = np.zeros((len(theta),) * 2) if own is None else own.covariance
         model = Extended(base if own is None else own.model, (), stand_in, values, constants or {})
         shares, lengths = campaign(record) if record is not None else ({}, {})

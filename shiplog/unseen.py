@@ -240,7 +240,9 @@ def _gains(shared: _Knots, known: np.ndarray, designs: list[np.ndarray]) -> np.n
     whole = np.zeros((len(shared.y), 0))
     total, before = (_left_out(shared, x) for x in (whole, known))
     after = np.stack([_left_out(shared, np.concatenate((known, x), 1)) for x in designs])
-    return (before - after) / np.maximum(total, 1e-300)
+    # against whichever is the better guess without it: a share of what is left to predict
+    base = np.minimum(before, total)
+    return (base - after) / np.maximum(base, 1e-300)
 
 
 def _left_out(shared: _Knots, features: np.ndarray) -> np.ndarray:

@@ -102,6 +102,12 @@ class Cause:
         return len(self.parameters)
 
     @property
+    def usual(self) -> bool:
+        """Whether a ship may have some of it always: false where coefficients, or another cause,
+        already stand for that."""
+        return not self.absorbed
+
+    @property
     def reads(self) -> bool:
         """Whether it changes what was recorded, and not the ship's motion."""
         return type(self).read is not Cause.read

@@ -93,6 +93,10 @@ class ClockOffset(Cause):
     def label(self) -> str:
         return f"{self.name}:{self.channel}"
 
+    @property
+    def usual(self) -> bool:
+        return self.channel != "gnss"  # that is position and velocity together
+
     def missing(self, setting: Setting) -> str | None:
         if self.channel == "wind" and not setting.profile.has_wind:
             return "no wind is recorded"

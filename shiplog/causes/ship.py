@@ -291,6 +291,10 @@ class RudderDelay(_OnRudders):
     parameters = (Parameter("time", "s", 1.3, 0.1, low=0.0, high=10.0),)
     separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
 
+    @property
+    def usual(self) -> bool:
+        return False  # a small one is a small lag
+
     def read(self, record: Record, p: np.ndarray) -> Record:
         return self._with(record, record.later(self._recorded(record), -float(p[0])))
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from shiplog.comparison import Actuator, Comparison
+from shiplog.exhibit import Exhibit
 from shiplog.viewer.native import Served, open_viewer, serve
 
-__all__ = ["Actuator", "Comparison", "Served", "open_viewer", "save", "serve"]
+__all__ = [
+    "Actuator", "Comparison", "Exhibit", "Served", "open_viewer", "save", "save_diagnosis", "serve",
+]  # fmt: skip
 
 
 def save(comparison: Comparison, path: str | Path) -> None:
@@ -15,3 +18,10 @@ def save(comparison: Comparison, path: str | Path) -> None:
     from shiplog.viewer import recording  # half a second of imports that most commands never need
 
     recording.write(comparison, Path(path))
+
+
+def save_diagnosis(exhibit: Exhibit, path: str | Path) -> None:
+    """Write the pictures of a diagnosis as an .rrd."""
+    from shiplog.viewer import recording
+
+    recording.write_diagnosis(exhibit, Path(path))

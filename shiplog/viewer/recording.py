@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
@@ -10,7 +12,17 @@ import rerun.blueprint as rrb
 
 from shiplog.comparison import Comparison
 from shiplog.exceptions import ShiplogError
-from shiplog.viewer import display, forces, histogram, report, style, timeline, trajectory
+from shiplog.exhibit import Exhibit
+from shiplog.viewer import (
+    diagnosis,
+    display,
+    forces,
+    histogram,
+    report,
+    style,
+    timeline,
+    trajectory,
+)
 from shiplog.viewer.display import Drawn
 
 # A view sends entities and says where it stands: beside the others of a voyage, or, asked without
@@ -26,18 +38,32 @@ LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
 
 
 def write(comparison: Comparison, path: Path) -> None:
-    """Write the recording whole or not at all.
+    """The comparison as an .rrd."""
+    picture = display.drawn(comparison)
+    with whole(comparison.title, layout(picture), path) as recording:
+        for view in VIEWS.values():
+            view.send(recording, picture)
+
+
+def write_diagnosis(exhibit: Exhibit, path: Path) -> None:
+    """The pictures of a diagnosis as an .rrd."""
+    picture = diagnosis.pictured(exhibit)
+    with whole(exhibit.title, screen(diagnosis.blueprint(picture)), path) as recording:
+        diagnosis.send(recording, picture)
+
+
+@contextmanager
+def whole(title: str, blueprint: rrb.Blueprint, path: Path) -> Iterator[rr.RecordingStream]:
+    """Write what is sent meanwhile, whole or not at all.
 
     It is made in memory: Rerun's own file sink waits for ever on a disk that is full.
     """
     rr.set_strict_mode(True)  # else what Rerun cannot draw is left out with a warning
     recording = rr.RecordingStream("shiplog")
     made = recording.binary_stream()
-    picture = display.drawn(comparison)
-    recording.send_recording_name(comparison.title)
-    recording.send_blueprint(layout(picture))
-    for view in VIEWS.values():
-        view.send(recording, picture)
+    recording.send_recording_name(title)
+    recording.send_blueprint(blueprint)
+    yield recording
     content = made.read() or b""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
@@ -64,6 +90,11 @@ def layout(picture: Drawn) -> rrb.Blueprint:
         tabs.append(rrb.Horizontal(track, *right, column_shares=[1.0, 1.45], name=voyage))
     own = (view.blueprint(picture, None) for view in VIEWS.values())
     tabs += [part for part in own if part is not None]
+    return screen(tabs)
+
+
+def screen(tabs: Sequence[rrb.View | rrb.Container]) -> rrb.Blueprint:
+    """Nothing but these tabs, the first one in front, and the time below."""
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),

@@ -32,8 +32,8 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.View | None:
     if voyage is None:
         return None
     drawn, unit = in_chart_units(drawn)
-    east, north = _extent(drawn, voyage)
-    every = hull_interval(drawn.measured.filter(pl.col("voyage") == voyage))
+    east, north = extent(drawn, voyage)
+    every = hull_interval(drawn.measured.filter(pl.col("voyage") == voyage), drawn.ship_length)
     return rrb.Spatial2DView(
         origin=entity("track", voyage),
         name=f"Track, north up, {unit}: measured black, hull every {every:g} s, dots start windows",
@@ -42,14 +42,14 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.View | None:
     )
 
 
-def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
-    """Tracks and hulls of every voyage, measured and simulated."""
+def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None:
+    """Tracks and hulls of every voyage, measured and simulated. `room`: as for `extent`."""
     drawn, _ = in_chart_units(drawn)
     measured = drawn.measured
     simulated = drawn.simulated
     shown = display.shown_seeds(drawn)
     for voyage in drawn.voyages:
-        _send_chart(recording, drawn, voyage)
+        _send_chart(recording, drawn, voyage, room)
         rows = measured.filter(pl.col("voyage") == voyage)
         _send_measured(recording, drawn, voyage, rows)
         _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
@@ -109,10 +109,13 @@ def hulls(table: pl.DataFrame, outline: NDArray[np.float64]) -> NDArray[np.float
     return positions(table)[:, None, :] + np.stack((east, -north), axis=-1)
 
 
-def hull_interval(rows: pl.DataFrame) -> float:
-    """The round number of seconds that leaves at most MOST_HULLS outlines on a track."""
+def hull_interval(rows: pl.DataFrame, length: float) -> float:
+    """The round number of seconds that leaves at most MOST_HULLS outlines on a track, and mostly
+    a ship's length between them."""
     time = display.column(rows, "time")
-    least = (time[-1] - time[0]) / MOST_HULLS if len(time) else 1.0
+    sailed = float(np.nansum(np.linalg.norm(np.diff(positions(rows), axis=0), axis=1)))
+    count = min(max(sailed / length, 1.0), MOST_HULLS)
+    least = (time[-1] - time[0]) / count if len(time) else 1.0
     choices = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600]
     return float(next((c for c in choices if c >= least), 3600 * math.ceil(least / 3600)))
 
@@ -136,7 +139,7 @@ def _send_measured(
         ),
         static=True,
     )
-    every = hull_interval(rows)
+    every = hull_interval(rows, drawn.ship_length)
     marks = rows.filter((pl.col("time") / every).floor().diff().fill_null(1) > 0)
     recording.log(
         entity("track", voyage, "measured", "hulls"),
@@ -225,9 +228,9 @@ def _send_moving_hull(
     )
 
 
-def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str) -> None:
+def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: float) -> None:
     """Grid lines at round metres, and what the site has."""
-    east, north = _extent(drawn, voyage)
+    east, north = extent(drawn, voyage, room)
     step = grid_step(max(east[1] - east[0], north[1] - north[0]))
     meridians = np.arange(math.ceil(east[0] / step), math.floor(east[1] / step) + 1) * step
     parallels = np.arange(math.ceil(north[0] / step), math.floor(north[1] / step) + 1) * step
@@ -273,21 +276,43 @@ def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str) -> Non
         )
 
 
-def _extent(drawn: Drawn, voyage: str) -> tuple[tuple[float, float], tuple[float, float]]:
+def extent(
+    drawn: Drawn, voyage: str, room: float = 0.0
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """East and north ranges that show all that was measured with room for what was simulated.
 
     What a diverging model does far outside is left there: it must not shrink the ship to a dot.
+
+    room   how far beyond it is followed, in sizes of the measured track
     """
-    rows = drawn.measured.filter(pl.col("voyage") == voyage)
-    ranges = []
+    of = pl.col("voyage") == voyage
+    rows, simulated = drawn.measured.filter(of), drawn.simulated.filter(of)
+    ranges, followed = [], []
     for name in ("y0", "x0"):
         values = display.column(rows, name)
         values = values[np.isfinite(values)]
         low, high = (values.min(), values.max()) if len(values) else (0.0, 0.0)
         ranges.append((float(low), float(high)))
-    margin = max(0.08 * max(high - low for low, high in ranges), 1.5 * drawn.ship_length)
-    (west, east), (south, north) = ranges
+        followed.append(display.column(simulated, name))
+    size = max(high - low for low, high in ranges)
+    margin = max(0.08 * size, 1.5 * drawn.ship_length)
+    (west, east), (south, north) = (
+        _widened(*ends, values, room * size) for ends, values in zip(ranges, followed, strict=True)
+    )
     return (west - margin, east + margin), (south - margin, north + margin)
+
+
+def _widened(
+    low: float, high: float, values: NDArray[np.float64], most: float
+) -> tuple[float, float]:
+    """The range with these values in it, but wider by `most` on either side at most."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return low, high
+    return (
+        min(low, max(float(values.min()), low - most)),
+        max(high, min(float(values.max()), high + most)),
+    )
 
 
 def _strips(rollouts: pl.DataFrame, by: tuple[str, ...]) -> list[NDArray[np.float64]]:

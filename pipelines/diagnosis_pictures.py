@@ -1,0 +1,167 @@
+"""A diagnosis as the tables that the viewer draws."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import polars as pl
+
+from pipelines.diagnose import Diagnosis, held_out
+from shiplog import unexplained
+from shiplog import verdict as verdicts
+from shiplog.channels import STATE, VELOCITY
+from shiplog.diagnose import PULSES, Decision
+from shiplog.exceptions import listed
+from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.gain import parts
+from shiplog.hypotheses import Trial
+from shiplog.models.mmg import body
+from shiplog.record import Record
+from shiplog.reference import corrected
+from shiplog.sensitivity import series
+from shiplog.unexplained import Unexplained, around
+from shiplog.windows import Windows
+
+FARTHEST = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
+
+
+def exhibit(done: Diagnosis) -> Exhibit:
+    """Of a diagnosis that came to a decision."""
+    trial, decision = done.trial, done.decision
+    assert trial is not None and decision is not None
+    profile = trial.record.profile
+    residual, named = _residual(trial, decision)
+    tracks, errors = _before_and_after(done)
+    return Exhibit(
+        title=f"{profile.ship.name}: {listed(trial.record.names, most=3)}",
+        ship_length=profile.ship.length_m,
+        ship_breadth=profile.ship.breadth,
+        ship_outline=profile.ship.outline or (),
+        banks=profile.site.banks,
+        measured=_measured(trial.record),
+        residual=residual,
+        named=named,
+        extended=tuple(n.cause.label for n in decision.named) if done.after is not None else (),
+        tracks=tracks,
+        errors=errors,
+        report=verdicts.markdown(done.verdict),
+    )
+
+
+def _measured(record: Record) -> pl.DataFrame:
+    """About a row a second."""
+    rows = np.flatnonzero(record.seen)
+    rows = rows[:: max(1, round(1.0 / record.step))]
+    index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
+    return pl.DataFrame(index | _columns(record.state[rows]))
+
+
+# --- forces ---------------------------------------------------------------------------------------
+
+
+def _residual(trial: Trial, decision: Decision) -> tuple[pl.DataFrame, tuple[str, ...]]:
+    """Unexplained and named force at the knots, and what the latter is of."""
+    ref, record = trial.reference, trial.record
+    found = unexplained.posterior(
+        decision.first.linear, ref.mean * ref.columns.unit,
+        trial.unrest.louder(decision.nothing.louder), record,
+    )  # fmt: skip
+    keep = unexplained.once(found)
+    order = np.argsort(found.rows[keep])
+    rows = found.rows[keep][order]
+    # columns: the force that one m/s² (rad/s²) takes
+    mass = np.asarray(body.forces_of(ref.coefficients, ref.model.stand_in.geometry, np.eye(3))).T
+    mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
+    names = [n.cause.label for n in decision.named if n.cause.kind != "sensor"]
+    force = _caused(trial, decision, rows) @ mass.T
+    if decision.pulses is not None:
+        names.append(PULSES)
+        force = force + _pulses(trial, decision, found)[keep][order]
+    columns = zip(VELOCITY, (mean @ mass.T).T, np.sqrt(sd**2 @ mass.T**2).T, force.T, strict=True)
+    index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
+    tables = [
+        pl.DataFrame(index | {"force": left, "sd": doubt, "named": caused}).with_columns(
+            pl.lit(channel.name).alias("channel"),
+            pl.col("named") if names else pl.lit(None, pl.Float64).alias("named"),
+        )
+        for channel, left, doubt, caused in columns
+    ]
+    return pl.concat(tables), tuple(names)
+
+
+def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
+    """ν̇ [n, 3] that the named causes add where the ship was: a wrong instrument adds none."""
+    ref = trial.reference
+    fixed = dict(decision.first.numbers)
+    named = {n.cause.label: n.numbers for n in decision.named if n.cause.kind != "sensor"}
+    usual = np.concatenate((ref.theta, np.zeros(len(ref.columns.unit) - ref.columns.base)))
+    usual += ref.mean * ref.columns.unit
+
+    def acceleration(numbers: dict[str, np.ndarray]) -> np.ndarray:
+        theta = usual.copy()
+        theta[ref.columns.base :] += ref.columns.numbers(numbers)
+        was = corrected(ref.model.causes, trial.record, ref.columns, numbers)
+        driven = np.concatenate((was.actuator, was.share[:, None]), 1)
+        state, driven, wind = (around(was, v, rows) for v in (was.state, driven, was.true_wind))
+        return np.asarray(_acceleration(ref.model, theta, state, driven, wind))
+
+    return acceleration(fixed | named) - acceleration(fixed)
+
+
+@jax.jit
+def _acceleration(model, theta, state, driven, wind):
+    return model.acceleration(theta, state, driven, wind)
+
+
+def _pulses(trial: Trial, decision: Decision, found: Unexplained) -> np.ndarray:
+    """Force [S, J, 3] of the thruster that nobody records."""
+    assert decision.pulses is not None
+    force = trial.pulse_force(decision.point, decision.base, decision.pulses)
+    assert force.shape == found.rows.shape
+    return force[..., None] * np.array([0.0, 1.0, decision.pulses.lever])
+
+
+# --- windows --------------------------------------------------------------------------------------
+
+
+def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
+    cut, before, trial, decision = done.windows, done.before, done.trial, done.decision
+    if cut is None or before is None or trial is None or decision is None:
+        return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERRORS)
+    states = {BEFORE: before.states(cut, before.theta)}
+    if done.after is not None:
+        states[AFTER] = held_out(trial, decision, decision.named, cut, before)
+    measured, steps = cut.state.double().numpy(), series(cut).steps
+    numbered = cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),
+        pl.col("elapsed").alias("time"),
+    )  # fmt: skip
+    errors = numbered.with_columns(
+        pl.Series("seconds", cut.dt.double().numpy().sum(1)),
+        *(pl.Series(k, parts(v - measured, steps).sum(1)) for k, v in states.items()),
+    )
+    if AFTER not in states:
+        errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
+    tracks = [_tracks(name, simulated, numbered, cut) for name, simulated in states.items()]
+    return pl.concat(tracks), errors.select(ERRORS.keys())
+
+
+def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:
+    """A row a sample; what has left the pond is null."""
+    count, size, _ = states.shape
+    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt.double().numpy(), 1)), 1)
+    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < FARTHEST), axis=1)
+    states = np.where(gone[..., None], np.nan, states)
+    index = numbered[np.repeat(np.arange(count), size)]
+    return (
+        index.with_columns(
+            pl.lit(model).alias("model"), pl.col("time") + pl.Series(since.reshape(-1))
+        )
+        .hstack(pl.DataFrame(_columns(states.reshape(-1, 6))))
+        .select(TRACKS.keys())
+    )
+
+
+def _columns(states: np.ndarray) -> dict[str, np.ndarray]:
+    return {channel.name: states[:, i] for i, channel in enumerate(STATE)}

@@ -1,0 +1,613 @@
+"""Every cause: nothing where its numbers are zero, and what physics says where they are not."""
+
+import math
+from dataclasses import replace
+
+import closed
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from shiplog import profile as profiles
+from shiplog.causes import CATALOGUE, Setting
+from shiplog.causes.environment import Current
+from shiplog.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
+from shiplog.models import mmg
+from shiplog.models.extended import Extended
+from shiplog.models.network import Network
+from shiplog.profile import Profile
+from shiplog.record import Record
+
+TWIN = profiles.load("esso-vectwin")  # velocity over ground, by an antenna 0.3 m ahead
+SINGLE = profiles.load("esso-osaka")  # velocity in body axes, at midship; one rudder
+LOG = TWIN.sensors.velocity.model_copy(update={"kind": "body", "lever_arm_m": (0.8, -0.2)})
+APART = TWIN.model_copy(  # a speed log of her own: where the antenna stands is no matter to it
+    update={"sensors": TWIN.sensors.model_copy(update={"velocity": LOG})}
+)
+FERRY = profiles.load("milliampere")  # neither rudder nor wind sensor nor gyro
+PLACES = np.random.default_rng(3).uniform(-20.0, 20.0, (12, 2))
+BY = {cause.label: cause for cause in CATALOGUE}
+DEGREE = math.pi / 180.0
+EVERY = pytest.mark.parametrize("cause", CATALOGUE, ids=list(BY))
+SHIPS = pytest.mark.parametrize(
+    "profile", (TWIN, SINGLE, APART), ids=("over ground", "body axes", "log apart")
+)
+
+
+def setting(profile: Profile = TWIN, places: np.ndarray = PLACES) -> Setting:
+    scale = {"speed": 0.6, "length": 3.0, "mass": 244.6, "moment": 3.0 * 244.6}
+    return Setting(profile, scale, places, 8.0)
+
+
+def extended(causes, profile: Profile = TWIN, without=(), base=None) -> tuple[Extended, np.ndarray]:
+    """Around an MMG with estimated coefficients, or around another base that it stands in for."""
+    ship, main, _ = mmg.geometry_of(profile, without)
+    model = mmg.MMG(ship)
+    values = mmg.estimated(ship, main).values
+    constants = {}
+    for cause in causes:
+        constants |= cause.constants(setting(profile))
+    whole = Extended(base or model, tuple(causes), model, values, constants)
+    return whole, values if base is None else np.zeros(len(base.names))
+
+
+def network() -> Network:
+    """A network of the paper's form with random weights; wind as components."""
+    rng = np.random.default_rng(0)
+    inputs, width, bends = 8, 5, 4
+    return Network(
+        weights=(
+            rng.standard_normal((width, inputs)), rng.standard_normal(width),
+            rng.standard_normal((3, width)), rng.standard_normal(3),
+        ),
+        mean=rng.standard_normal(inputs), std=np.full(inputs, 2.0),
+        out_mean=np.zeros(3), out_std=np.full(3, 0.05),
+        frequency=rng.standard_normal((inputs, bends)), phase=rng.uniform(0.0, 6.0, bends),
+        wind=True, components=True, input_tanh=False,
+    )  # fmt: skip
+
+
+def under_way(count: int = 40, actuators: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Random states, actuators with a share of the campaign, and winds."""
+    rng = np.random.default_rng(1)
+    state = rng.uniform((-20, -0.3, -20, -0.3, -3, -0.2), (20, 0.9, 20, 0.3, 3, 0.2), (count, 6))
+    low, high = [-1.0] * (actuators - 1) + [0.0, 0.0], [1.0] * (actuators - 1) + [12.0, 1.0]
+    actuator = rng.uniform(low, high, (count, actuators + 1))
+    return state, actuator, rng.uniform(-3.0, 3.0, (count, 2))
+
+
+def acceleration(model: Extended, values, numbers, state, actuator, wind) -> np.ndarray:
+    theta = jnp.asarray(np.concatenate((values, numbers)))
+    return np.asarray(model.acceleration(theta, state, actuator, wind))
+
+
+def sized(cause) -> np.ndarray:
+    """Numbers of half their realistic size, of alternating sign where that has a meaning."""
+    low, _ = cause.bounds(setting())
+    sign = np.where((low < 0.0) & (np.arange(cause.count) % 2 == 1), -1.0, 1.0)
+    return 0.5 * sign * cause.sizes(setting())
+
+
+# --- nothing --------------------------------------------------------------------------------------
+
+
+def test_labels_are_unique():
+    assert len(BY) == len(CATALOGUE)
+
+
+@EVERY
+def test_zero_leaves_an_mmg_as_it_was(cause):
+    cause = cause.on(setting())
+    model, values = extended([cause])
+    state, actuator, wind = under_way()
+    found = acceleration(model, values, np.zeros(cause.count), state, actuator, wind)
+    plain = model.base.acceleration(jnp.asarray(values), state, actuator[:, :-1], wind)
+    assert found == pytest.approx(np.asarray(plain), rel=1e-14, abs=1e-16)
+
+
+@EVERY
+def test_zero_leaves_a_network_as_it_was(cause):
+    cause = cause.on(setting())
+    model, values = extended([cause], base=network())
+    state, actuator, wind = under_way()
+    found = acceleration(model, values, np.zeros(cause.count), state, actuator, wind)
+    plain = model.base.acceleration(jnp.asarray(values), state, actuator[:, :-1], wind)
+    assert found == pytest.approx(np.asarray(plain), rel=1e-14, abs=1e-16)
+
+
+@EVERY
+@pytest.mark.parametrize("base", (None, network()), ids=("mmg", "network"))
+def test_what_reads_leaves_the_motion_and_what_moves_does_not(cause, base):
+    """A cause has an effect exactly where it says it has one, around either model."""
+    cause = cause.on(setting())
+    model, values = extended([cause], base=base)
+    state, actuator, wind = under_way()
+    state[:, 2] = 38.0  # near the bank
+    changed = acceleration(model, values, sized(cause), state, actuator, wind)
+    plain = acceleration(model, values, np.zeros(cause.count), state, actuator, wind)
+    assert np.isfinite(changed).all()
+    assert (np.abs(changed - plain).max() > 1e-6) != cause.reads
+    seen = closed.record(TWIN)
+    after = cause.read(seen, sized(cause))
+    same = all(np.array_equal(getattr(after, n), getattr(seen, n)) for n in CHANGED)
+    assert same != cause.reads
+
+
+CHANGED = ("state", "actuator", "wind")
+
+
+@EVERY
+@SHIPS
+def test_zero_leaves_a_record_as_it_was(cause, profile):
+    cause = cause.on(setting(profile))
+    seen = closed.record(profile, heading=0.1, bias=0.01, wind_angle=0.2)
+    after = cause.read(seen, np.zeros(cause.count))
+    for name in CHANGED:
+        assert getattr(after, name) == pytest.approx(getattr(seen, name), abs=1e-12)
+    for name in ("time", "starts", "seen", "voyage", "share"):
+        assert getattr(after, name) is getattr(seen, name)
+
+
+# --- sensors: the test bends them by hand ---------------------------------------------------------
+
+WRONG = {  # label → what the instruments do, the cause's own numbers for it
+    "heading_offset": ({"heading": 0.08}, [0.08]),
+    "yaw_rate_bias": ({"bias": -0.007}, [-0.007]),
+    "yaw_rate_scale": ({"scale": 1.08}, [0.08]),
+    "antenna_offset": ({"moved": (0.7, -0.25)}, [0.7, -0.25]),
+    "wind_direction_offset": ({"wind_angle": 0.3}, [0.3]),
+    "wind_speed_scale": ({"wind_scale": 0.8}, [-0.2]),
+    "clock_offset:position": ({"late": {"position": 0.73}}, [0.73]),
+    "clock_offset:velocity": ({"late": {"velocity": -0.4}}, [-0.4]),
+    "clock_offset:gnss": ({"late": {"position": 0.73, "velocity": 0.73}}, [0.73]),
+    "clock_offset:yaw_rate": ({"late": {"yaw_rate": 1.21}}, [1.21]),
+    "clock_offset:wind": ({"late": {"wind": 0.55}}, [0.55]),
+}  # fmt: skip
+INNER = slice(20, -20)  # rows whose later values a delay still finds
+
+
+def test_every_sensor_cause_is_bent_here():
+    assert set(WRONG) == {c.label for c in CATALOGUE if c.kind == "sensor"}
+
+
+@SHIPS
+@pytest.mark.parametrize("label", WRONG)
+def test_bent_instruments_are_put_right(label, profile):
+    bent, numbers = WRONG[label]
+    was, shown = closed.record(profile), closed.record(profile, **bent)
+    found = BY[label].read(shown, np.array(numbers))
+    # a clock is put right by interpolation: h²/8 times a second derivative of at most 0.06
+    close = 1e-4 if label.startswith("clock") else 1e-12
+    far = max(np.abs(getattr(shown, n) - getattr(was, n))[INNER].max() for n in CHANGED)
+    assert far > 10.0 * close  # they were bent
+    for name in CHANGED:
+        right = getattr(found, name)[INNER]
+        assert right == pytest.approx(getattr(was, name)[INNER], abs=close), name
+
+
+@SHIPS
+@pytest.mark.parametrize("cause", [c for c in CATALOGUE if c.reads], ids=lambda c: c.label)
+def test_inverse_undoes_read(cause, profile):
+    """What the instruments will show, of what was. A lag forgets nothing but its first seconds."""
+    cause = cause.on(setting(profile))
+    seen = closed.record(profile)
+    numbers = sized(cause)
+    back = cause.read(cause.read(seen, numbers), cause.inverse(numbers))
+    rough = cause.label.startswith(("clock", "rudder_delay", "rudder_lag"))
+    rows = slice(100, -40) if rough else slice(None)
+    for name in CHANGED:
+        assert getattr(back, name)[rows] == pytest.approx(
+            getattr(seen, name)[rows], abs=2e-3 if rough else 1e-12
+        ), name
+
+
+def test_instruments_are_put_right_one_after_another():
+    """Compass, gyro and antenna wrong together: the catalogue's order takes them apart."""
+    shown = closed.record(TWIN, heading=-0.05, bias=0.004, moved=(0.3, 0.1))
+    for label, numbers in (
+        ("heading_offset", [-0.05]), ("yaw_rate_bias", [0.004]), ("antenna_offset", [0.3, 0.1]),
+    ):  # fmt: skip
+        shown = BY[label].read(shown, np.array(numbers))
+    assert shown.state == pytest.approx(closed.record(TWIN).state, abs=1e-12)
+
+
+# --- rudders --------------------------------------------------------------------------------------
+
+
+def steered(values: np.ndarray, starts: tuple[int, ...] = (0,)) -> Record:
+    """Both rudders recorded at these values [n], the screw at 5 rev/s."""
+    seen = closed.record(TWIN)
+    count = len(values)
+    actuator = np.stack((values, -2.0 * values, np.full(count, 5.0)), -1)
+    begins = np.zeros(count, dtype=bool)
+    begins[list(starts)] = True
+    return Record(
+        TWIN, ("one",), np.zeros(count, dtype=int), 0.1 * np.arange(count), np.zeros(count),
+        begins, np.ones(count, dtype=bool), seen.state[:count], actuator, seen.wind[:count],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("lag", (0.07, 0.4, 2.5))
+def test_lag_of_a_ramp(lag):
+    """δ = k (t - T (1 - e^(-t/T))), the first-order answer to a ramp that began at rest."""
+    t = 0.1 * np.arange(400)
+    found = RudderLag().read(steered(0.03 * t), np.array([lag])).actuator
+    answer = 0.03 * (t - lag * (1.0 - np.exp(-t / lag)))
+    assert found[:, 0] == pytest.approx(answer, abs=1e-12)
+    assert found[:, 1] == pytest.approx(-2.0 * answer, abs=1e-12)
+    assert (found[:, 2] == 5.0).all()
+
+
+def test_lag_of_a_step():
+    """1 - e^(-t/T), from the middle of the tenth of a second in which the record shows the step."""
+    t = 0.1 * np.arange(300)
+    found = RudderLag().read(steered(np.where(t > 9.95, 1.0, 0.0)), np.array([2.0])).actuator[:, 0]
+    answer = np.where(t > 9.95, 1.0 - np.exp(-(t - 9.95) / 2.0), 0.0)
+    assert found == pytest.approx(answer, abs=2e-4)  # (h/T)²/24, the ramp within that tenth
+
+
+def test_a_lag_forgets_what_was_before_a_gap():
+    values = np.where(np.arange(400) < 200, 0.5, -0.2)
+    found = RudderLag().read(steered(values, (0, 200)), np.array([3.0])).actuator[:, 0]
+    assert found == pytest.approx(values, abs=1e-12)
+
+
+def test_delay_of_a_ramp():
+    t = 0.1 * np.arange(300)
+    found = RudderDelay().read(steered(0.03 * t), np.array([1.27])).actuator
+    assert found[:, 0] == pytest.approx(0.03 * np.maximum(t - 1.27, 0.0), abs=1e-12)
+    assert (found[:, 2] == 5.0).all()
+
+
+def test_two_rudders_have_two_offsets_and_one_has_one():
+    two, one = RudderOffset().on(setting(TWIN)), RudderOffset().on(setting(SINGLE))
+    assert (two.count, one.count) == (2, 1)
+    assert list(two.shown(np.array([0.1, -0.2]))) == ["port", "starboard"]
+    assert list(one.shown(np.array([0.1]))) == ["angle"]
+    seen = closed.record(TWIN)
+    moved = two.read(seen, np.array([0.1, -0.2])).actuator - seen.actuator
+    assert moved == pytest.approx(np.broadcast_to([0.1, -0.2, 0.0], moved.shape), abs=1e-12)
+    seen = closed.record(SINGLE)
+    moved = one.read(seen, np.array([0.1])).actuator - seen.actuator
+    assert moved == pytest.approx(np.broadcast_to([0.1, 0.0], moved.shape), abs=1e-12)
+
+
+# --- current --------------------------------------------------------------------------------------
+
+NORTH, EAST = 0.11, -0.07
+
+
+def free_body(state: np.ndarray, off: tuple[str, ...] = ("propeller", "rudder", "wind")):
+    """Acceleration of a hull that no water holds, in a current, and her masses m_x, m_y, I."""
+    model, values = extended([Current()], without=off)
+    names = model.base.names
+    free = np.array([n.startswith("hull.") for n in names])
+    values = np.where(free, 0.0, values)
+    found = acceleration(
+        model, values, [NORTH, EAST], state, np.zeros((len(state), 4)), np.zeros((len(state), 2))
+    )
+    g = model.base.geometry
+    of = dict(zip(names, values, strict=True))
+    unit = 0.5 * g.density * g.length**2 * g.draught
+    masses = of["body.m_x"] * unit, of["body.m_y"] * unit, of["body.i_j"] * unit * g.length**2
+    return found, masses, g
+
+
+def drifting(heading, rate) -> np.ndarray:
+    """At rest in the moving water, turning: body velocities over ground."""
+    c, s = np.cos(heading), np.sin(heading)
+    u, v = c * NORTH + s * EAST, c * EAST - s * NORTH
+    zero = np.zeros_like(heading)
+    return np.stack((zero, u, zero, v, heading, rate), -1)
+
+
+def test_a_ship_at_rest_in_the_water_drifts_with_the_current():
+    """No force: in earth axes nothing accelerates, whatever her heading."""
+    heading = np.linspace(-3.0, 3.0, 13)
+    found, _, _ = free_body(drifting(heading, np.zeros(13)))
+    assert found == pytest.approx(np.zeros((13, 3)), abs=1e-15)
+
+
+def test_hull_forces_feel_the_water_and_not_the_ground():
+    heading = np.linspace(-3.0, 3.0, 13)
+    model, values = extended([Current()], without=("propeller", "rudder", "wind"))
+    still = np.zeros((13, 4)), np.zeros((13, 2))
+    found = acceleration(model, values, [NORTH, EAST], drifting(heading, np.zeros(13)), *still)
+    assert found == pytest.approx(np.zeros((13, 3)), abs=1e-12)
+    held = drifting(heading, np.zeros(13)) * [1, 0, 1, 0, 1, 1]  # over ground at rest
+    assert np.abs(acceleration(model, values, [NORTH, EAST], held, *still)).max() > 1e-4
+
+
+def test_turning_in_a_current_by_hand():
+    """The free body moves through the water by its own equations; over ground, the water's
+    velocity in body axes turns away under her: d/dt(RᵀV) = r (V_y, -V_x) in body axes."""
+    rng = np.random.default_rng(4)
+    heading, r = rng.uniform(-3, 3, 20), rng.uniform(-0.2, 0.2, 20)
+    u, v = rng.uniform(-0.5, 0.5, 20), rng.uniform(-0.2, 0.2, 20)  # through the water
+    state = drifting(heading, r)
+    c_u, c_v = state[:, 1].copy(), state[:, 3].copy()
+    state[:, 1] += u
+    state[:, 3] += v
+    found, (m_x, m_y, yaw), g = free_body(state)
+    m, x = g.mass, g.x_g
+    matrix = np.array([[m + m_x, 0, 0], [0, m + m_y, x * m], [0, x * m, yaw + x * x * m]])
+    pull = np.stack(
+        ((m + m_y) * v * r + x * m * r * r, -(m + m_x) * u * r, -x * m * u * r), -1
+    )  # centripetal and Coriolis terms of Yasukawa & Yoshimura 2015, Eq. 4
+    through = np.linalg.solve(matrix, pull.T).T
+    over = through + np.stack((r * c_v, -r * c_u, np.zeros(20)), -1)
+    assert found == pytest.approx(over, rel=1e-9, abs=1e-12)
+
+
+def test_wind_over_ground_and_not_over_the_water():
+    """A current that carries the ship leaves the wind that she feels over ground as it is."""
+    model, values = extended([Current()], without=("propeller", "rudder"))
+    heading = np.linspace(-3.0, 3.0, 13)
+    wind = np.tile([3.0, 1.0], (13, 1))
+    state = drifting(heading, np.zeros(13))
+    found = acceleration(model, values, [NORTH, EAST], state, np.zeros((13, 4)), wind)
+    # the same apparent wind on a ship at rest in still water, in a true wind that much stronger
+    rest = state * [1, 0, 1, 0, 1, 1]
+    felt = wind + np.array([NORTH, EAST])
+    still = acceleration(model, values, [0.0, 0.0], rest, np.zeros((13, 4)), felt)
+    assert np.abs(found).max() > 1e-4
+    assert found == pytest.approx(still, abs=1e-12)
+
+
+# --- the ship -------------------------------------------------------------------------------------
+
+
+def test_payload_by_the_rigid_body_equations():
+    """Mass, moment and inertia of a point of 30 kg, 0.8 m ahead of midship, written out."""
+    model, values = extended([Payload()])
+    state, actuator, wind = under_way()
+    found = acceleration(model, values, [30.0, 24.0], state, actuator, wind)
+    forces = model.base.forces(jnp.asarray(values), state, actuator[:, :-1], wind)
+    force = np.asarray(sum(forces.values()))
+    g, of = model.base.geometry, dict(zip(model.base.names, values, strict=True))
+    unit = 0.5 * g.density * g.length**2 * g.draught
+    m_x, m_y = of["body.m_x"] * unit, of["body.m_y"] * unit
+    inertia = of["body.i_j"] * unit * g.length**2 + g.mass * g.x_g**2 + 30.0 * 0.8**2
+    m, moment = g.mass + 30.0, g.mass * g.x_g + 30.0 * 0.8
+    u, v, r = state[:, 1], state[:, 3], state[:, 5]
+    du, dv, dr = found.T
+    surge = (m + m_x) * du - (m + m_y) * v * r - moment * r * r
+    sway = (m + m_y) * dv + (m + m_x) * u * r + moment * dr
+    yaw = inertia * dr + moment * (dv + u * r)
+    # the module's inertia is smooth where there is no load: 7e-5 of moment²/load
+    assert np.stack((surge, sway, yaw), -1) == pytest.approx(force, abs=1e-3)
+    assert Payload().shown(np.array([30.0, 24.0]))["position"][0] == pytest.approx(0.8)
+
+
+def forces(label: str, numbers, state, actuator, wind, without=()) -> np.ndarray:
+    """X, Y, N of a ship that does not turn, from her accelerations: mass times acceleration."""
+    cause = BY[label].on(setting())
+    model, values = extended([cause], without=without)
+    found = acceleration(model, values, numbers, state, actuator, wind)
+    g, of = model.base.geometry, dict(zip(model.base.names, values, strict=True))
+    unit = 0.5 * g.density * g.length**2 * g.draught
+    m, x = g.mass, g.x_g
+    m_x, m_y = of["body.m_x"] * unit, of["body.m_y"] * unit
+    c = of["body.i_j"] * unit * g.length**2 + m * x * x
+    return found @ np.array([[m + m_x, 0, 0], [0, m + m_y, x * m], [0, x * m, c]])
+
+
+REST = np.zeros((1, 6))
+CALM = np.zeros((1, 2))
+
+
+def test_wind_force_scales_each_force_of_the_wind():
+    off = ("propeller", "rudder")
+    args = (REST, np.zeros((1, 4)), np.array([[3.0, 2.0]]), off)
+    plain = forces("wind_force", np.zeros(3), *args)
+    found = forces("wind_force", [0.3, -0.2, 0.5], *args)
+    assert np.abs(plain).min() > 0.01
+    assert found / plain == pytest.approx(np.array([[1.3, 0.8, 1.5]]), rel=1e-9)
+
+
+def test_thrust_loss_and_drift_at_the_bollard():
+    """At rest the screw alone pushes: by the factor, and by the slope at 40 % of the campaign."""
+    off = ("rudder", "wind")
+    args = (REST, np.array([[0.0, 0.0, 8.0, 0.4]]), CALM, off)
+    plain = forces("thrust_loss", [0.0], *args)[0, 0]
+    assert plain > 1.0
+    assert forces("thrust_loss", [-0.25], *args)[0, 0] == pytest.approx(0.75 * plain, rel=1e-9)
+    assert forces("thrust_drift", [-0.25], *args)[0, 0] == pytest.approx(0.90 * plain, rel=1e-9)
+
+
+def test_fouling_and_cross_flow_are_what_the_hull_feels_straight_ahead_and_abeam():
+    """Towed without screw and rudders: X = ½ρLd X'₀ u² ahead, Y = -½ρLd C_D v |v| abeam."""
+    off = ("propeller", "rudder", "wind")
+    model, values = extended([], without=off)
+    of, g = dict(zip(model.base.names, values, strict=True)), model.base.geometry
+    q = 0.5 * g.density * g.length * g.draught
+    ahead = np.array([[0.0, 0.7, 0.0, 0.0, 0.2, 0.0]])
+    still = (np.zeros((1, 4)), CALM, off)
+    x = forces("fouling", [0.6], ahead, *still)[0, 0]
+    assert x == pytest.approx(1.6 * q * of["hull.x_0f"] * 0.49, rel=1e-3)
+    abeam = np.array([[0.0, 0.0, 0.0, -0.3, 0.2, 0.0]])
+    y = forces("cross_flow_drag", [0.35], abeam, *still)[0, 1]
+    assert y == pytest.approx(1.35 * q * of["hull.c_d"] * 0.09, rel=1e-9)
+
+
+def test_rudder_force_scales_what_the_rudders_add():
+    without = forces("rudder_force", [0.0], AHEAD, np.array([[0.4, 0.3, 6.0, 0.0]]), CALM,
+                     ("rudder", "wind"))  # fmt: skip
+    args = (AHEAD, np.array([[0.4, 0.3, 6.0, 0.0]]), CALM, ("wind",))
+    plain = forces("rudder_force", [0.0], *args) - without
+    found = forces("rudder_force", [-0.2], *args) - without
+    assert np.abs(plain).min() > 0.1
+    assert found == pytest.approx(0.8 * plain, rel=1e-6)
+
+
+AHEAD = np.array([[0.0, 0.6, 0.0, 0.0, 0.3, 0.0]])
+
+
+def test_a_bank_draws_in_and_turns_the_bow_out():
+    """Along a wall to starboard: pulled to starboard, turned to port; the mirrored way abeam to
+    port; with the square of the speed; and hardly at all a hundred metres off."""
+    off = ("propeller", "rudder", "wind")
+    still = (np.zeros((1, 4)), CALM, off)
+
+    def pull(heading, u, y0):
+        state = np.array([[0.0, u, y0, 0.0, heading, 0.0]])
+        one, none = (forces("bank", [p], state, *still) for p in (1.0, 0.0))
+        return (one - none)[0]
+
+    north, south = pull(0.0, 0.6, 38.0), pull(math.pi, 0.6, 38.0)
+    assert north[1] > 0.1 and north[2] < -0.1
+    assert south == pytest.approx(north * [1, -1, -1], abs=1e-9)
+    assert pull(0.0, 0.3, 38.0)[1] == pytest.approx(0.25 * north[1], rel=1e-9)
+    assert pull(0.0, 0.6, -60.0)[1] < 0.01 * north[1]
+    # by hand: 0.15 · ½ρLd u² / (1 + (gap/3L)³), gap 2 m less half a breadth
+    gap = (2.0 - 0.5 * 0.489) / 9.0
+    q = 0.5 * 1000.0 * 3.0 * 0.201
+    assert north[1] == pytest.approx(0.15 * q * 0.36 / (1.0 + gap**3), rel=1e-4)
+
+
+def test_shallow_water_acts_where_it_is_shallow():
+    """One bump of the map: the hull's drag grows there by 1.2 of it, and far away not at all."""
+    off = ("propeller", "rudder", "wind")
+    still = (np.zeros((1, 4)), CALM, off)
+    strength = np.zeros(12)
+    strength[4] = 0.5
+
+    def drag(at):
+        abeam = np.array([[at[0], 0.0, at[1], 0.3, 0.0, 0.0]])
+        model, values = extended([BY["shallow_water"]], without=off)
+        found = acceleration(model, values, strength, abeam, *still[:2])[0]
+        plain = acceleration(model, values, np.zeros(12), abeam, *still[:2])[0]
+        return found[1] / plain[1]
+
+    near, away = drag(PLACES[4]), drag(PLACES[4] + 200.0)
+    model, values = extended([])
+    of, g = dict(zip(model.base.names, values, strict=True)), model.base.geometry
+    added = of["body.m_y"] * 0.5 * g.density * g.length**2 * g.draught
+    # drag up by 1 + 1.2 s, inertia by the added mass's 1 + 0.7 s
+    heavier = (g.mass + 1.35 * added) / (g.mass + added)
+    assert away == pytest.approx(1.0, abs=1e-9)
+    assert near == pytest.approx(1.6 / heavier, rel=0.02)
+
+
+def test_around_a_network_a_cause_adds_what_it_changes_in_the_mmg():
+    """ν̇ = f + [g(c') - g(c)], and a current moves the water under either."""
+    cause = BY["thrust_loss"]
+    model, values = extended([cause], base=network())
+    physical, theta = extended([cause])
+    args = under_way()
+    more = acceleration(model, values, [-0.3], *args) - acceleration(model, values, [0.0], *args)
+    of_mmg = acceleration(physical, theta, [-0.3], *args) - acceleration(
+        physical, theta, [0.0], *args
+    )
+    assert more == pytest.approx(of_mmg, abs=1e-12)
+    model, values = extended([Current()], base=network())
+    heading = np.linspace(-3.0, 3.0, 40)
+    state = drifting(heading, np.zeros(40))
+    found = acceleration(model, values, [NORTH, EAST], state, args[1], args[2])
+    rest = state * [1, 0, 1, 0, 1, 1]
+    still = acceleration(
+        model, values, [0.0, 0.0], rest, args[1], args[2] + np.array([NORTH, EAST])
+    )
+    assert found == pytest.approx(still, abs=1e-12)
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+
+@EVERY
+def test_told_holds_its_value_and_ninety_percent(cause):
+    cause = cause.on(setting())
+    numbers = sized(cause)
+    spread = 0.1 * cause.sizes(setting())
+    told = cause.told(numbers, np.diag(spread**2))
+    for one in told.values():
+        assert one.low <= one.value <= one.high
+        assert one.high > one.low
+    assert cause.sentence(told).endswith(".")
+    if cause.count == 1 and cause.label not in ("shallow_water",):
+        (one,) = told.values()
+        unit = DEGREE if one.unit.startswith("deg") else 1.0
+        # 1.645 σ on either side; 4000 draws know it to 5 %
+        assert (one.high - one.low) * unit == pytest.approx(2.0 * 1.645 * spread[0], rel=0.06)
+
+
+def test_a_direction_near_north_has_a_short_interval():
+    """359 deg and 1 deg are two degrees apart: 0.01 m/s across 0.3 m/s is 1.9 deg."""
+    cause = Current()
+    for east in (-0.001, 0.001):
+        told = cause.told(np.array([0.3, east]), np.diag([1e-4, 1e-4]))["direction"]
+        assert told.low <= told.value <= told.high
+        assert told.high - told.low == pytest.approx(2 * 1.645 * math.degrees(0.01 / 0.3), rel=0.06)
+    assert cause.shown(np.array([0.0, 0.2]))["direction"][0] == pytest.approx(90.0)
+    assert cause.shown(np.array([0.0, 0.2]))["speed"][0] == pytest.approx(0.2)
+    assert "towards 180 deg" in cause.sentence(
+        cause.told(np.array([-0.2, 0.0]), np.diag([1e-6, 1e-6]))
+    )
+
+
+def test_words_speak_degrees_and_factors():
+    assert BY["heading_offset"].shown(np.array([0.1]))["angle"] == (
+        pytest.approx(math.degrees(0.1)), "deg",
+    )  # fmt: skip
+    assert BY["yaw_rate_bias"].shown(np.array([0.01]))["value"] == (
+        pytest.approx(math.degrees(0.01)), "deg/s",
+    )  # fmt: skip
+    for label in ("yaw_rate_scale", "wind_speed_scale"):
+        assert BY[label].shown(np.array([0.07]))["value"][0] == pytest.approx(1.07)
+    for label in ("fouling", "thrust_loss", "cross_flow_drag", "rudder_force"):
+        assert BY[label].shown(np.array([-0.2]))["factor"][0] == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize(
+    ("label", "number"),
+    [("current", [0.0, 0.02]), ("heading_offset", [-0.006]), ("rudder_lag", [0.15]),
+     ("rudder_offset", [0.0, -0.01]), ("payload", [5.0, 0.0]), ("antenna_offset", [0.05, 0.0]),
+     ("shallow_water", [0.1] + [0.0] * 11)],
+)  # fmt: skip
+def test_small_is_no_matter(label, number):
+    cause = BY[label].on(setting())
+    assert cause.practical(np.array(number), setting())
+    assert not cause.practical(0.2 * np.array(number), setting())
+
+
+# --- which cannot be tested -----------------------------------------------------------------------
+
+MISSING = {
+    "wind_force": "wind", "wind_direction_offset": "wind", "wind_speed_scale": "wind",
+    "clock_offset:wind": "wind", "clock_offset:yaw_rate": "yaw rate", "bank": "bank",
+    "rudder_offset": "rudder", "rudder_lag": "rudder", "rudder_delay": "rudder",
+    "rudder_force": "rudder",
+}  # fmt: skip
+
+
+@EVERY
+def test_what_a_ferry_cannot_be_asked(cause):
+    """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested."""
+    said = cause.missing(setting(FERRY))
+    if cause.label not in MISSING:
+        assert said is None
+    else:
+        assert said is not None and MISSING[cause.label] in said
+    assert cause.missing(setting(TWIN)) is None
+
+
+def test_a_ship_without_screw_has_no_thrust_to_lose():
+    profile = SINGLE.model_copy(update={"actuators": SINGLE.actuators[:1]})
+    for label in ("thrust_loss", "thrust_drift"):
+        assert "screw" in (BY[label].missing(setting(profile)) or "")
+
+
+def test_a_ship_that_stays_has_no_map_of_the_bottom():
+    one = setting(TWIN, PLACES[:3])
+    assert "place" in (BY["shallow_water"].missing(one) or "")
+
+
+def test_sizes_follow_the_ship():
+    """Shares of her speed, length and mass; a ship twice as fast meets twice the current."""
+    plain = setting()
+    fast = replace(plain, scale={**plain.scale, "speed": 1.2, "length": 300.0})
+    assert Current().sizes(fast) == pytest.approx(2.0 * Current().sizes(plain))
+    antenna = BY["antenna_offset"]
+    assert antenna.sizes(fast) == pytest.approx(100.0 * antenna.sizes(plain))
+    low, high = Payload().bounds(plain)
+    assert low[0] == pytest.approx(-0.5 * 244.6) and high[0] == math.inf

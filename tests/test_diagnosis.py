@@ -1,0 +1,431 @@
+"""From logs to a verdict on the known ship, with seeds that nobody looked at before.
+
+One campaign of hers as she is and one with a current go the whole way through MCAP, the store and
+the pipelines; what is usual for her is learnt there once. Other trials are then judged against it.
+"""
+
+import json
+import math
+from dataclasses import replace
+from importlib import resources
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import sailing
+
+from pipelines import diagnose as pipeline
+from pipelines.identify import identify_run
+from pipelines.known_ship import cases, sensors
+from pipelines.prepare import ingest_logs
+from pipelines.split import choose_physical_split
+from shiplog import diagnose, record, reference, runs
+from shiplog import profile as profiles
+from shiplog.config import Config, Physics
+from shiplog.exceptions import RunError
+from shiplog.hypotheses import Trial
+from shiplog.ingest import ingest
+from shiplog.store import Store
+
+SEED = 7101
+PROFILE = profiles.load("esso-vectwin")
+NOMINAL = ("nominal_1", "nominal_3", "nominal_5", "nominal_6")  # 3400 s
+TIDE = """
+import jax.numpy as jnp
+from shiplog.causes import Cause, Parameter
+
+
+class Tide(Cause):
+    name = "far_tether"
+    kind = "environment"
+    story = "A long line pulls her."
+    equation = "X₀ = {north:.2f} N, Y₀ = {east:.2f} N along the earth's axes"
+    parameters = (Parameter("north", "N", 1.0, 0.1), Parameter("east", "N", 1.0, 0.1))
+
+    def force(self, p, state, at):
+        c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
+        return jnp.stack((c * p[0] + s * p[1], c * p[1] - s * p[0], 0.0 * c), -1)
+"""
+
+
+def hidden(cause: str, size: float = 1.0, **changes) -> cases.Case:
+    """This ship with something hidden for 500 s, two voyages; `changes` to what is hidden."""
+    case = cases.draw(SEED, cause=cause, size=size, seconds=500)
+    return replace(case, effects=replace(case.effects, **changes))
+
+
+def log(case: cases.Case, leg: cases.Leg, folder):
+    path = folder / f"{leg.name}.mcap"
+    sensors.write_voyage(path, cases.voyage(case, leg), seed=leg.seed, start=leg.start)
+    return path
+
+
+@pytest.fixture(scope="module")
+def sea(tmp_path_factory):
+    """The whole way, once: run, store, what is usual, the diagnosis of a trial with a current."""
+    work = tmp_path_factory.mktemp("sea")
+    (work / "logs").mkdir()
+    case = hidden("current")
+    paths = [log(case, leg, work / "logs") for leg in case.nominal if leg.name in NOMINAL]
+    paths += [log(case, leg, work / "logs") for leg in case.trial]
+    short = replace(case.trial[0], name="short", seconds=100.0)
+    paths.append(log(hidden("none"), short, work / "logs"))
+    store = Store(work / "store")
+    assert not ingest_logs(paths, "esso-vectwin", store).refused
+    split = choose_physical_split(store, ("nominal_*",), (), "ref", 100)
+    config = Config(model="mmg", split=split, physics=Physics(folds=2))
+    run, _ = identify_run(config, store, work / "mmg")
+    (work / "tide.py").write_text(TIDE, encoding="utf-8")
+    done = pipeline.diagnose_run(
+        run.path, store, ["trial_*"], work / "out", extend=work / "extended",
+        cause_files=[work / "tide.py"],
+    )  # fmt: skip
+    return SimpleNamespace(
+        work=work, store=store, run=run, done=done, case=case, usual=done.trial.reference
+    )
+
+
+def judged(usual, seen, numbers=None, fixed=()):
+    trial = Trial(usual, seen, tuple(fixed))
+    point = trial.at(numbers or {})
+    trial.robust(point)
+    return trial, diagnose.decide(trial, point)
+
+
+def labels(decision) -> list[str]:
+    return [n.cause.label for n in decision.named]
+
+
+def truth(case) -> dict:
+    return {k: v["value"] for k, v in case.causes[0].parameters.items()}
+
+
+def apart(a: float, b: float) -> float:
+    """Between two directions [deg]."""
+    return abs((a - b + 180.0) % 360.0 - 180.0)
+
+
+@pytest.fixture(scope="module")
+def trials(sea, tmp_path_factory):
+    """Cause → record of a trial with it hidden."""
+    kept = {}
+
+    def of(cause: str, **changes):
+        key = (cause, *sorted(changes))
+        if key not in kept:
+            case = hidden(cause, **changes)
+            folder = tmp_path_factory.mktemp("trial")
+            made = [ingest(log(case, leg, folder), PROFILE) for leg in case.trial]
+            kept[key] = record.read([v.table for v in made], [v.name for v in made], PROFILE)
+        return kept[key]
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def still(sea, trials):
+    return judged(sea.usual, trials("none"))
+
+
+@pytest.fixture(scope="module")
+def compass(sea, trials):
+    return judged(sea.usual, trials("heading_offset"))
+
+
+# --- the whole way
+
+
+def test_a_current_is_named_and_sized(sea):
+    (named,) = sea.done.decision.named
+    shown, true = named.shown, truth(sea.case)
+    assert sea.done.verdict.verdict == "named"
+    assert named.cause.label == "current"
+    assert named.probability > 0.9
+    assert shown["speed"].value == pytest.approx(true["speed"], rel=0.05)
+    assert apart(shown["direction"].value, true["direction"]) < 3.0
+    gain = sea.done.verdict.gain
+    assert gain.real and gain.reduction > 0.5
+    assert gain.windows == len(sea.done.windows)
+
+
+def test_the_extended_model_has_nothing_more_wrong(sea):
+    """Diagnosed again on the very same voyages: none; and its rollouts are better."""
+    again = runs.load(sea.work / "extended")
+    numbers = again.extension_numbers()
+    assert list(numbers) == ["current"]
+    _, decision = judged(sea.usual, sea.done.trial.record, numbers, tuple(numbers))
+    assert (decision.verdict, labels(decision)) == ("none", [])
+    extended = again.models()[0]
+    after = extended.losses(sea.done.windows).mean()
+    before = sea.done.before.losses(sea.done.windows).mean()
+    assert after < 0.5 * before
+    assert after == pytest.approx(sea.done.after.losses(sea.done.windows).mean(), rel=1e-9)
+
+
+CAUSES = [
+    "current",
+    "wind_force",
+    "shallow_water",
+    "bank",
+    "fouling",
+    "payload",
+    "cross_flow_drag",
+    "thrust_loss",
+    "thrust_drift",
+    "rudder_force",
+    "rudder_offset",
+    "rudder_lag",
+    "rudder_delay",
+    "side_thrust",
+    "heading_offset",
+    "yaw_rate_bias",
+    "yaw_rate_scale",
+    "clock_offset",
+    "antenna_offset",
+    "wind_direction_offset",
+    "wind_speed_scale",
+    "coverage",
+    "external",
+    "unknown",
+]
+FAMILIES = ("position", "heading", "time", "motion", "controls", "wind", "stochastic")
+
+
+def shaped(v: dict) -> None:
+    """The contract's section 5, as other programs rely on it."""
+    assert v["contract"] == 1
+    assert v["verdict"] in ("named", "none", "unknown", "coverage", "external")
+    assert (v["verdict"] == "named") == bool(v["causes"])
+    for cause in v["causes"]:
+        assert cause["name"] in CAUSES or cause.get("user")
+        assert 0.0 <= cause["probability"] <= 1.0
+        assert cause["sentence"] and cause["equation"]
+        assert isinstance(cause["indistinguishable_from"], list)
+        for one in cause["parameters"].values():
+            assert {"value", "low", "high", "unit"} <= set(one)
+            assert one["low"] <= one["value"] <= one["high"]
+    for key in ("ranking", "rejected", "traces", "wrong", "intervals"):
+        assert isinstance(v[key], list)
+    for one in v["ranking"]:
+        assert 0.0 <= one["probability"] <= 1.0
+    for one in v["rejected"]:
+        assert one["name"] and one["reason"]
+    for one in v["wrong"]:
+        assert {"channel", "share_of_error", "where"} <= set(one)
+    if v["verdict"] == "unknown":
+        assert v["structure"]["family"] in FAMILIES
+    if (gain := v.get("gain")) is not None:
+        assert {"before", "after", "reduction", "low", "high", "held_out_windows"} <= set(gain)
+        assert gain["low"] <= gain["reduction"] <= gain["high"]
+    assert set(v["base"]) >= {"run", "before_effect"}
+
+
+def test_the_answer_has_the_shape_of_the_contract(sea):
+    told = json.loads((sea.work / "out" / "verdict.json").read_text("utf-8"))
+    shaped(told)
+    assert told["causes"][0]["name"] == "current"
+    assert set(told["causes"][0]["parameters"]) == {"speed", "direction"}
+    assert told["base"] == {"run": "mmg", "before_effect": True}
+    assert sum(one["probability"] for one in told["ranking"]) == pytest.approx(1.0, abs=0.05)
+    report = (sea.work / "out" / "report.md").read_text("utf-8")
+    assert "steady current" in report and "Gain" in report
+
+
+def test_too_little_is_said_and_nothing_named(sea):
+    done = pipeline.diagnose_run(sea.run.path, sea.store, ["short"], sea.work / "short")
+    told = json.loads((sea.work / "short" / "verdict.json").read_text("utf-8"))
+    shaped(told)
+    assert done.verdict.verdict == "coverage" and told["causes"] == []
+    assert "Too little" in told["sentence"] and "100 s" in told["sentence"]
+
+
+def test_voyages_of_another_ship_are_refused(sea, tmp_path):
+    log_ = sailing.write(tmp_path / "other.mcap")
+    (tmp_path / "circle.toml").write_text(sailing.PROFILE, encoding="utf-8")
+    store = Store(tmp_path / "store")
+    assert not ingest_logs([log_], str(tmp_path / "circle.toml"), store).refused
+    with pytest.raises(RunError, match="'circle'"):
+        pipeline.diagnose_run(sea.run.path, store, ["other"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
+    """A model that nothing was fitted to, on voyages of that very season: what another fit would
+    absorb is not tested either. A hull alone compiles quickly."""
+    text = (resources.files("shiplog") / "profiles" / "esso-vectwin.toml").read_text("utf-8")
+    begin = text.index("[sensors.wind]")
+    profile = tmp_path / "calm.toml"
+    profile.write_text(text[:begin] + text[text.index("[[actuators]]") :], encoding="utf-8")
+    case = hidden("none")
+    store = Store(tmp_path / "store")
+    assert not ingest_logs([log(case, leg, tmp_path) for leg in case.trial], str(profile),
+                           store).refused  # fmt: skip
+    split = choose_physical_split(store, ("trial_1",), (), "ref", 100)
+    physics = Physics(fit=False, without=("propeller", "rudder"))
+    run, _ = identify_run(Config(model="mmg", split=split, physics=physics), store, tmp_path / "r")
+    done = pipeline.diagnose_run(run.path, store, ["trial_2"], tmp_path / "out")
+    told = done.verdict.as_json()
+    shaped(told)
+    assert told["base"] == {"run": "r", "before_effect": False}
+    why = {one["name"]: one["reason"] for one in told["rejected"]}
+    for name in ("wind_force", "wind_direction_offset", "wind_speed_scale"):
+        assert "no wind is recorded" in why[name]
+    for name in ("fouling", "payload", "cross_flow_drag", "thrust_loss"):
+        assert "absorbs" in why[name]
+    tested = {c.label for c in done.trial.reference.model.causes}
+    assert "current" in tested and "clock_offset:gnss" in tested
+    assert not tested & {"wind_force", "clock_offset:wind", "fouling", "payload"}
+    assert not any(one["name"] == "unknown:wind" for one in told["ranking"])
+
+
+# --- what is hidden, and what is not
+
+
+def test_nothing_hidden_is_nothing_named(still):
+    _, decision = still
+    assert (decision.verdict, labels(decision)) == ("none", [])
+    assert decision.pulses is None and decision.structure is None
+    assert max(decision.ranking, key=decision.ranking.get) == "none"
+
+
+def test_a_heading_offset_is_named_and_sized(compass):
+    _, decision = compass
+    assert (decision.verdict, labels(decision)) == ("named", ["heading_offset"])
+    angle = decision.named[0].shown["angle"]
+    assert angle.value == pytest.approx(truth(hidden("heading_offset"))["angle"], rel=0.08, abs=0.1)
+    assert angle.low < angle.value < angle.high
+
+
+def test_a_cause_of_the_users_own_is_named(sea, trials):
+    """A line to a point ten kilometres off: a constant pull along the earth's axes, 1.5 N."""
+    towards = {"tether_north": 8000.0, "tether_east": -6000.0}
+    _, decision = judged(sea.usual, trials("none", tether=1.5, **towards))
+    assert labels(decision) == ["far_tether"]
+    shown = decision.named[0].shown
+    assert shown["north"].value == pytest.approx(1.2, abs=0.12)
+    assert shown["east"].value == pytest.approx(-0.9, abs=0.12)
+    assert decision.named[0].cause.user
+
+
+# --- without any key: what must change with the data, and what must not
+
+
+def turned(seen):
+    """The pond turned by 90 deg: what was north is east."""
+    state = seen.state.copy()
+    state[:, 0], state[:, 2] = -seen.state[:, 2], seen.state[:, 0]
+    state[:, 4] += 0.5 * math.pi
+    return replace(seen, state=state)
+
+
+def mirrored(seen):
+    """Port is starboard: the ship, her rudders, the pond and the wind."""
+    state = seen.state * [1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+    actuator = seen.actuator[:, [1, 0, 2]] * [-1.0, -1.0, 1.0]
+    return replace(seen, state=state, actuator=actuator, wind=seen.wind * [1.0, -1.0])
+
+
+def test_turning_the_pond_turns_the_current(sea):
+    _, decision = judged(sea.usual, turned(sea.done.trial.record))
+    assert labels(decision) == ["current"]
+    before, after = (d.named[0].shown for d in (sea.done.decision, decision))
+    assert apart(after["direction"].value, before["direction"].value + 90.0) < 2.0
+    assert after["speed"].value == pytest.approx(before["speed"].value, rel=0.02)
+
+
+def test_turning_the_pond_leaves_the_compass(sea, compass):
+    trial, plain = compass
+    _, decision = judged(sea.usual, turned(trial.record))
+    assert labels(decision) == ["heading_offset"]
+    assert decision.named[0].numbers == pytest.approx(plain.named[0].numbers, rel=0.03)
+
+
+def test_mirroring_all_flips_the_current_across(sea):
+    """What was usual is learnt from the mirrored campaign too."""
+    start = sea.run.base()[1]
+    nominal = pipeline._record(sea.store, list(NOMINAL), PROFILE)
+    usual = reference.learn(sea.usual.model, sea.usual.setting, start, mirrored(nominal))
+    _, decision = judged(usual, mirrored(sea.done.trial.record))
+    assert labels(decision) == ["current"]
+    north, east = sea.done.decision.named[0].numbers
+    assert decision.named[0].numbers == pytest.approx([north, -east], abs=0.01)
+
+
+def test_taken_out_of_the_data_it_is_gone(sea, compass):
+    trial, decision = compass
+    named = decision.named[0]
+    _, after = judged(sea.usual, named.cause.read(trial.record, named.numbers))
+    assert (after.verdict, labels(after)) == ("none", [])
+
+
+def test_more_noise_makes_no_surer(sea):
+    """White noise as large as the instruments' own, on top of it: the same name, less evidence."""
+    seen = sea.done.trial.record
+    sigma = np.array([0.02, 0.01, 0.02, 0.01, math.radians(0.1), math.radians(0.1)])
+    rng = np.random.default_rng(0)
+    noisy = replace(seen, state=seen.state + sigma * rng.standard_normal(seen.state.shape))
+    _, decision = judged(sea.usual, noisy)
+    assert labels(decision) == ["current"]
+    assert decision.named[0].evidence < 1.02 * sea.done.decision.named[0].evidence
+    assert decision.named[0].probability <= sea.done.decision.named[0].probability + 1e-6
+
+
+# --- traps of DIAGNOSIS.md, section 2
+
+
+def test_one_wild_segment_does_not_decide(sea):
+    """A shove of 0.3 m/s for some seconds in one segment: it counts less, the others decide."""
+    seen = sea.done.trial.record
+    trial = sea.done.trial
+    row = trial.rows[5]
+    t = 0.1 * np.arange(300)
+    state = seen.state.copy()
+    state[row : row + 300, 3] += 0.3 * np.exp(-0.5 * ((t - 15.0) / 2.0) ** 2)
+    shoved, decision = judged(sea.usual, replace(seen, state=state))
+    assert shoved.weight[5] < 0.3
+    assert np.median(shoved.weight) == 1.0
+    assert "current" in labels(decision)
+    (current,) = (n for n in decision.named if n.cause.label == "current")
+    assert current.shown["speed"].value == pytest.approx(truth(sea.case)["speed"], rel=0.06)
+
+
+def test_masses_are_held_so_that_no_payload_eats_a_scale(sea, still):
+    """Forces and masses share one scale. Each mass with its added mass is known to 8 %, and the
+    load found on an ordinary day is small against the ship's 245 kg."""
+    _, start, model, _ = sea.run.base()
+    spread = dict(zip(model.names, start.spread, strict=True))
+    value = dict(zip(model.names, start.values, strict=True))
+    g = model.geometry
+    own = g.mass / (0.5 * g.density * g.length**2 * g.draught)
+    for name, least in (("body.m_x", own), ("body.m_y", own), ("body.i_j", 0.0)):
+        assert spread[name] <= 0.08 * (least + value[name])
+    trial, decision = still
+    payload = next(c for c in sea.usual.model.causes if c.label == "payload")
+    _, found = trial.scan(decision.first, [payload])
+    assert abs(found[0].numbers["payload"][0]) < 15.0
+    assert found[0].evidence < diagnose.LEAST
+
+
+def test_linearising_again_brings_no_evidence_of_its_own(sea, still):
+    """`Nothing` rests where it is, and a cause of no effect, settled as the named ones are, gains
+    nothing on it."""
+    trial, decision = still
+    point = trial.at({}, decision.first.path)
+    again, _ = trial.scan(point, ())
+    assert again.evidence == pytest.approx(decision.nothing.evidence, abs=3.0)
+    for label in ("heading_offset", "current", "yaw_rate_scale"):
+        cause = next(c for c in sea.usual.model.causes if c.label == label)
+        begin = {label: np.zeros(cause.count)}
+        _, found = trial.settle((label,), begin, decision.first.path)
+        assert -15.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
+
+
+def test_recorded_actuators_are_no_delay(still):
+    """No late rudder, no late clock on an ordinary day: evidence about zero or below."""
+    trial, decision = still
+    causes = [c for c in trial.reference.model.causes
+              if c.label in ("rudder_delay", "rudder_lag", "clock_offset:gnss")]  # fmt: skip
+    assert len(causes) == 3
+    for found in trial.scan(decision.first, causes)[1]:
+        assert found.evidence < 5.0
+        assert abs(found.numbers[found.name][0]) < 0.15

@@ -1,0 +1,206 @@
+"""The algebra of evidence against dense Gaussians, and sizes learnt from draws of the model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from shiplog import evidence
+from shiplog.evidence import Unrest
+from shiplog.reference import inflation, marginal
+from shiplog.segments import KNOT, Cut, Linear, Path
+
+NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
+UNREST = Unrest(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))
+
+
+def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed: int = 0) -> Linear:
+    """Random columns; a few observations unused."""
+    rng = np.random.default_rng(seed)
+    shape = (segments, bins, 6)
+    used = np.ones(shape, dtype=bool)
+    used[0, 1] = False
+    cut = Cut(np.arange(segments), np.zeros(shape), used, np.zeros((segments, 1, 1)),
+              np.zeros(segments, dtype=int), 0.2)  # fmt: skip
+    size = 6 + 3 * knots
+    z = rng.standard_normal((*shape, size)) * NOISE[:, None] * 5.0
+    j = rng.standard_normal((*shape, columns)) * NOISE[:, None] * 3.0
+    path = Path(np.zeros((segments, 6)), np.zeros((segments, 3, knots)))
+    return Linear(cut, path, rng.standard_normal(shape) * NOISE, z, j)
+
+
+def covariance(unrest: Unrest, knots: int) -> np.ndarray:
+    """Of z, written out: free start, and accelerations that stay for `time` seconds."""
+    at = KNOT * np.arange(knots)
+    stays = np.exp(-np.abs(at[:, None] - at) / unrest.time)
+    whole = np.zeros((6 + 3 * knots,) * 2)
+    whole[:6, :6] = np.diag(unrest.start**2)
+    for channel in range(3):
+        part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
+        whole[part, part] = unrest.push[channel] ** 2 * stays
+    if unrest.pulse is not None:
+        stays = np.exp(-np.abs(at[:, None] - at) / unrest.pulse_time)
+        whole[6:, 6:] += np.kron(np.outer(unrest.pulse, unrest.pulse), stays)
+    return whole
+
+
+def dense(given: Linear, unrest: Unrest, fitted: bool = False):
+    """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
+    `fitted`: without what the start adds to it."""
+    knots = (given.z.shape[-1] - 6) // 3
+    kernel = covariance(unrest, knots)
+    if fitted:
+        kernel[:6] = 0.0
+    for s in range(len(given.e)):
+        used = given.cut.used[s].ravel()
+        z = given.z[s].reshape(-1, given.z.shape[-1])[used]
+        noise = np.tile(unrest.noise, given.e.shape[1])[used]
+        c = np.diag(noise**2) + z @ kernel @ z.T
+        j = given.j[s].reshape(-1, given.j.shape[-1])[used]
+        yield given.e[s].ravel()[used], j, c
+
+
+PULSED = replace(UNREST, pulse=np.array([0.0, 0.9, -0.4]), pulse_time=12.0)
+BOTH = pytest.mark.parametrize("unrest", (UNREST, PULSED), ids=("plain", "pulse"))
+
+
+@BOTH
+def test_gram_is_the_dense_gaussian(unrest):
+    """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C; in log |C| the start counts as
+    fitted, so that it is that of the noise and the acceleration alone."""
+    given = linear(3)
+    found = evidence.gram(evidence.weighed(given, unrest.noise), unrest)
+    for s, (e, j, c) in enumerate(dense(given, unrest)):
+        block = np.concatenate((e[:, None], j), 1)
+        assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
+    logdet = sum(np.linalg.slogdet(c)[1] for _, _, c in dense(given, unrest, fitted=True))
+    assert found.logdet == pytest.approx(logdet, rel=1e-6)
+
+
+def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
+    """With a start that is nearly known, log N(e; Jd, C) itself: louder against quieter."""
+    given, d = linear(3), np.array([0.3, -0.7])
+    sure = replace(UNREST, start=np.full(6, 1e-4))
+    towards = np.concatenate(([1.0], -d))
+    found, wanted = [], []
+    for unrest in (sure, sure.louder(3.0)):
+        gram = evidence.gram(evidence.weighed(given, NOISE), unrest)
+        found.append(-0.5 * (towards @ gram.total @ towards + gram.logdet))
+        every = dense(given, unrest)
+        wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
+    assert abs(wanted[1] - wanted[0]) > 10.0
+    assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=0.01)
+
+
+def test_units_scale_columns_and_not_the_error():
+    given = linear(2)
+    found = evidence.gram(evidence.weighed(given, NOISE), UNREST)
+    unit = np.array([1e-3, 40.0])
+    bent = replace(given, j=given.j * unit)
+    direct = evidence.gram(evidence.weighed(bent, NOISE), UNREST)
+    assert found.scaled(unit).total == pytest.approx(direct.total, rel=1e-9)
+    assert found.scaled(unit).logdet == found.logdet
+
+
+def test_columns_may_be_others():
+    given = linear(2)
+    other = linear(2, columns=3, seed=9).j
+    found = evidence.gram(evidence.weighed(given, NOISE, other), UNREST)
+    direct = evidence.gram(evidence.weighed(replace(given, j=other), NOISE), UNREST)
+    assert found.total == pytest.approx(direct.total)
+
+
+@BOTH
+def test_start_and_knots_are_the_posterior_mean(unrest):
+    """K Zᵀ C⁻¹ (e - J d), written out."""
+    given, d = linear(3), np.array([0.3, -0.7])
+    found = evidence.starts_and_knots(given, d, unrest)
+    kernel = covariance(unrest, 3)
+    for s, (e, j, c) in enumerate(dense(given, unrest)):
+        z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
+        mean = kernel @ z.T @ np.linalg.solve(c, e - j @ d)
+        assert found[s] == pytest.approx(mean, rel=1e-5, abs=1e-7)
+
+
+def test_marginal_is_the_dense_gaussian():
+    """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
+    given = linear(3)
+    total = evidence.gram(evidence.weighed(given, NOISE), UNREST).total
+    found, wanted = [], []
+    for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
+        information = np.diag(sure)
+        found.append(marginal(total, information, information @ np.array(mean)))
+        e, j, c = (np.concatenate(parts) if i < 2 else parts
+                   for i, parts in enumerate(zip(*dense(given, UNREST), strict=True)))  # fmt: skip
+        whole = np.zeros((len(e), len(e)))
+        at = 0
+        for block in c:
+            whole[at : at + len(block), at : at + len(block)] = block
+            at += len(block)
+        whole += j @ np.diag(1.0 / np.array(sure)) @ j.T
+        wanted.append(multivariate_normal(mean=j @ np.array(mean), cov=whole).logpdf(e))
+    assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=1e-4)
+
+
+def test_a_pulse_pushes_all_channels_together():
+    """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the unrest's
+    own only within a channel."""
+    kernel = PULSED.kernel(4)
+    push, pulse = PULSED.push, np.array([0.0, 0.9, -0.4])
+    for a in range(3):
+        for b in range(3):
+            for i, k in ((0, 0), (0, 2), (3, 1)):
+                far = abs(i - k) * KNOT
+                value = pulse[a] * pulse[b] * np.exp(-far / 12.0)
+                if a == b:
+                    value += push[a] ** 2 * np.exp(-far / 5.0)
+                assert kernel[4 * a + i, 4 * b + k] == pytest.approx(value, abs=1e-7)
+    louder = PULSED.louder(3.0).kernel(4) - PULSED.kernel(4)
+    assert louder[0, 0] == pytest.approx(8.0 * push[0] ** 2)  # the pulse does not get louder
+    assert abs(louder[0, 4]) < 1e-12
+
+
+def test_precision_is_the_inverse_with_its_determinant():
+    found, logdet = PULSED.precision(3)
+    kernel = covariance(PULSED, 3)
+    assert found @ kernel == pytest.approx(np.eye(15), abs=1e-6)
+    assert logdet == pytest.approx(-np.linalg.slogdet(kernel[6:, 6:])[1], abs=1e-6)
+
+
+def test_sizes_are_learnt_from_draws_of_the_model():
+    """Noise and push as drawn, from a beginning that is wrong by a factor of three."""
+    rng = np.random.default_rng(11)
+    given = linear(250, bins=10, knots=5)
+    kernel = covariance(UNREST, 5)
+    z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
+    d = np.array([0.3, -0.7])
+    noise = NOISE * rng.standard_normal(given.e.shape)
+    e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
+    e[~given.cut.used] = 1e3  # nobody looks there
+    begin = replace(UNREST, noise=NOISE * 3.0, push=UNREST.push / 3.0)
+    found = evidence.learnt(replace(given, e=e), d, begin, rounds=25)
+    assert found.noise == pytest.approx(NOISE, rel=0.15)
+    assert found.push == pytest.approx(UNREST.push, rel=0.15)
+    assert found.time == UNREST.time and (found.start == UNREST.start).all()
+
+
+def test_one_campaign_is_believed_less_where_voyages_disagree():
+    """κ follows the scatter between voyages: twelve voyages, each with coefficients of its own."""
+    rng = np.random.default_rng(2)
+    count, sure = 24, 400.0  # each voyage knows its numbers to 1/20
+    prior, known = np.zeros(3), np.ones(3)
+
+    def grams(scatter):
+        each = np.zeros((count, 4, 4))
+        for s in range(count):
+            d = 0.2 + scatter * rng.standard_normal(3) + rng.standard_normal(3) / np.sqrt(sure)
+            j = np.sqrt(sure) * np.eye(3)
+            block = np.concatenate(((j @ d)[:, None], j), 1)
+            each[s] = block.T @ block
+        return each
+
+    voyage = np.arange(count)
+    assert inflation(grams(0.0), voyage, prior, known) == 11.0  # what is usual, at least
+    assert inflation(grams(0.4), voyage, prior, known) == 32.0
+    assert inflation(grams(0.4)[:2], voyage[:2], prior, known) == 11.0

@@ -1,0 +1,319 @@
+"""Short rollouts: order of the integration, derivatives against differences, what is cut."""
+
+from dataclasses import dataclass, replace
+
+import closed
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from shiplog import profile as profiles
+from shiplog import reference, segments
+from shiplog.causes import Cause, Setting
+from shiplog.causes.sensors import AntennaOffset, HeadingOffset
+from shiplog.causes.ship import RudderDelay, RudderLag
+from shiplog.record import Record
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Path, Wide
+
+PROFILE = profiles.load("esso-osaka")  # rudder and propeller
+SETTING = Setting(PROFILE, {"speed": 0.6, "length": 3.0}, np.zeros((1, 2)), 1.0)
+DRAG, TURN, DAMP = 0.05, 0.06, 0.4
+
+
+@jax.tree_util.register_static
+@dataclass(frozen=True)
+class Toy:
+    """u̇ = -a u |u| + w X_wind, v̇ = -a v - u r, ṙ = b δ - c r; numbers of causes come after."""
+
+    causes: tuple[Cause, ...] = ()
+    substeps: int = 1
+
+    @property
+    def names(self):
+        return ("a", "b", "c", "w")
+
+    def acceleration(self, theta, state, actuator, true_wind):
+        u, v, heading, r = (state[..., i] for i in (1, 3, 4, 5))
+        ahead = jnp.cos(heading) * true_wind[..., 0] + jnp.sin(heading) * true_wind[..., 1]
+        du = -theta[0] * u * jnp.sqrt(u * u + 1e-6) + theta[3] * ahead
+        dr = theta[1] * actuator[..., 0] - theta[2] * r
+        return jnp.stack((du, -theta[0] * v - u * r, dr), -1)
+
+
+@jax.tree_util.register_static
+@dataclass(frozen=True)
+class Coasting:
+    """ν̇ = -k ν: straight ahead, u = e^(-kt) and x = (1 - e^(-kt))/k."""
+
+    names: tuple[str, ...] = ("k",)
+    substeps: int = 1
+
+    def acceleration(self, theta, state, actuator, true_wind):
+        return -theta[0] * state[..., jnp.array([1, 3, 5])]
+
+
+THETA = np.array([DRAG, TURN, DAMP, 0.02])
+SEEN = closed.record(PROFILE)
+GRID = segments.grid(SEEN)
+ROWS = segments.begins(SEEN)
+WIDE = Wide(
+    np.array([0.02, 0.01, 0.02, 0.01, 0.003, 0.002]), np.array([1.0, 0.6, 1.0, 0.6, 0.3, 0.2]),
+    np.array([0.06, 0.06, 0.02]),
+)  # fmt: skip
+
+
+def test_the_integration_is_of_second_order():
+    """Half the step, a quarter of the error, in position and in speed."""
+    k, seconds = 0.3, 6.0
+    errors = []
+    for step in (0.2, 0.1, 0.05):
+        nodes = round(seconds / step) + 1
+        start = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
+        states = segments._path(
+            Coasting(), np.array([k]), start, np.zeros((1, nodes, 3)), np.zeros((1, nodes, 3)), step
+        )
+        last = np.asarray(states)[0, -1]
+        errors.append([last[0] - (1 - np.exp(-k * seconds)) / k, last[1] - np.exp(-k * seconds)])
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert ratios == pytest.approx(4.0, abs=0.5)
+    assert np.abs(errors[-1]).max() < 2e-4
+
+
+def test_a_push_is_an_acceleration():
+    """Constant push of a body without forces: ½ p t², but for the first step, which is Euler's."""
+    nodes, step = 61, 0.2
+    push = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
+    states = np.asarray(
+        segments._path(
+            Coasting(), np.zeros(1), np.zeros((1, 6)), push, np.zeros((1, nodes, 3)), step
+        )
+    )
+    t = step * np.arange(nodes)
+    assert states[0, :, 1] == pytest.approx(0.01 * t, abs=1e-12)
+    assert states[0, :, 3] == pytest.approx(-0.02 * t, abs=1e-12)
+    assert states[0, :, 0] == pytest.approx(0.005 * t**2, abs=0.01 * 0.5 * step**2 + 1e-12)
+
+
+# --- cutting
+
+
+def test_segments_lie_end_to_end_within_stretches():
+    starts = SEEN.starts.copy()
+    starts[500] = True  # 50 s, then 70.1 s: one segment, then two
+    found = segments.begins(replace(SEEN, starts=starts))
+    assert found.tolist() == [0, 500, 800]
+    assert segments.begins(SEEN).tolist() == [0, 300, 600, 900]
+    assert len(segments.begins(SEEN.pick(["one"]))) == 4
+
+
+def test_a_bin_is_the_mean_of_what_was_measured():
+    """Of a ramp, its middle; of the heading, closed form: ∫ψ over two seconds."""
+    cut = segments.cut(SEEN, ROWS)
+    assert cut.y.shape == (4, 15, 6)
+    t = 30.0 * np.arange(4)[:, None] + 2.0 * np.arange(15)
+    ramp = replace(SEEN, state=np.outer(SEEN.time, np.ones(6)))
+    middle = np.repeat((t + 1.0)[..., None], 6, -1)
+    assert segments.cut(ramp, ROWS).y == pytest.approx(middle, abs=1e-9)
+    whole = 0.4 + 0.02 * (t + 1.0) - 1.2 / 0.05 * (np.cos(0.05 * (t + 2)) - np.cos(0.05 * t)) / 2.0
+    assert cut.y[..., 4] == pytest.approx(whole, abs=1e-5)
+    assert cut.used.all() and cut.step == pytest.approx(0.2)
+
+
+def test_bins_that_were_hardly_seen_do_not_count():
+    seen = np.ones(len(SEEN), dtype=bool)
+    seen[302:320] = False  # most of the first bin of the second segment
+    seen[325:330] = False  # a quarter of the next
+    used = segments.cut(replace(SEEN, seen=seen), ROWS).used
+    assert not used[1, 0].any()
+    assert used.sum() == used.size - 6
+
+
+def test_what_drives_is_taken_between_nodes_too():
+    """Actuators, share and true wind at the nodes, ¼ ½ ¼; a ramp is left as it is."""
+    cut = segments.cut(SEEN, ROWS)
+    share = SEEN.share[ROWS[1] + NODE_ROWS * np.arange(GRID.nodes)]
+    assert cut.driven[1, 1:, 2] == pytest.approx(share[1:], abs=1e-12)
+    assert cut.driven[1, :, 3:] == pytest.approx(np.tile(closed.TRUE_WIND, (151, 1)), abs=1e-12)
+    spike = np.zeros((len(SEEN), 2))
+    spike[11] = 1.0  # between nodes 5 and 6
+    found = segments.cut(replace(SEEN, actuator=spike), ROWS).driven[0, :, 0]
+    assert found[[4, 5, 6, 7]].tolist() == [0.0, 0.25, 0.25, 0.0]
+
+
+# --- derivatives
+
+
+def path() -> Path:
+    rng = np.random.default_rng(0)
+    start = SEEN.state[ROWS]
+    return Path(start, 0.01 * rng.standard_normal((len(ROWS), 3, GRID.knots)))
+
+
+@pytest.fixture(scope="module")
+def linearised():
+    """A toy with two causes that read otherwise, about numbers that are not zero."""
+    model = Toy((AntennaOffset(), HeadingOffset(), RudderLag()))
+    numbers = {
+        "antenna_offset": np.array([0.4, -0.2]), "heading_offset": np.array([0.05]),
+        "rudder_lag": np.array([1.5]),
+    }  # fmt: skip
+    cut, moved, shown = reference.read(model, SETTING, SEEN, ROWS, numbers)
+    theta = np.concatenate((THETA, np.zeros(4)))
+    at = path()
+    return model, numbers, theta, at, segments.linear(model, theta, cut, GRID, at, moved, shown)
+
+
+def gap(model, theta, at: Path, numbers) -> np.ndarray:
+    """Measured less simulated [S, B, 6], from the nodes: the trapezium of each two seconds."""
+    cut, _, _ = reference.read(Toy(), SETTING, SEEN, ROWS)
+    record = reference.corrected(
+        model.causes, SEEN, reference.Columns(0, model.causes, np.ones(4)), numbers
+    )
+    cut = segments.cut(record, ROWS)
+    states = np.asarray(
+        segments._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
+    )
+    pairs = 0.5 * (states[:, 1:] + states[:, :-1])
+    return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)
+
+
+def test_residual_with_the_path_put_back(linearised):
+    model, numbers, theta, at, found = linearised
+    z = np.concatenate((np.zeros((4, 6)), at.push.reshape(4, -1)), 1)
+    back = np.einsum("sbcz,sz->sbc", found.z, z)
+    assert found.e == pytest.approx(gap(model, theta, at, numbers) + back, abs=1e-12)
+
+
+@pytest.mark.parametrize("column", range(6))
+def test_columns_of_the_start(linearised, column):
+    model, numbers, theta, at, found = linearised
+    h = 1e-5 * np.eye(6)[column]
+    more, less = (replace(at, start=at.start + s) for s in (h, -h))
+    slope = (gap(model, theta, more, numbers) - gap(model, theta, less, numbers)) / 2e-5
+    assert found.z[..., column] == pytest.approx(-slope, abs=2e-6)
+
+
+@pytest.mark.parametrize(("channel", "knot"), [(0, 0), (1, 7), (2, 3), (2, 15)])
+def test_columns_of_the_knots(linearised, channel, knot):
+    model, numbers, theta, at, found = linearised
+    h = np.zeros_like(at.push)
+    h[:, channel, knot] = 1e-5
+    more, less = (replace(at, push=at.push + s) for s in (h, -h))
+    slope = (gap(model, theta, more, numbers) - gap(model, theta, less, numbers)) / 2e-5
+    column = found.z[..., 6 + channel * GRID.knots + knot]
+    assert np.abs(column).max() > 0.1
+    assert column == pytest.approx(-slope, abs=2e-5)
+
+
+@pytest.mark.parametrize("column", range(4))
+def test_columns_of_the_coefficients(linearised, column):
+    model, numbers, theta, at, found = linearised
+    h = 1e-5 * np.eye(8)[column]
+    slope = (gap(model, theta + h, at, numbers) - gap(model, theta - h, at, numbers)) / 2e-5
+    assert np.abs(found.j[..., column]).max() > 0.1
+    assert found.j[..., column] == pytest.approx(-slope, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("label", "i", "column"),
+    [("antenna_offset", 0, 4), ("antenna_offset", 1, 5), ("heading_offset", 0, 6),
+     ("rudder_lag", 0, 7)],
+)  # fmt: skip
+def test_columns_of_causes_that_read(linearised, label, i, column):
+    """What they change of the measured, and of what drives, together."""
+    model, numbers, theta, at, found = linearised
+    sides = []
+    for sign in (1.0, -1.0):
+        near = numbers[label].copy()
+        near[i] += 1e-3 * sign
+        sides.append(gap(model, theta, at, numbers | {label: near}))
+    slope = (sides[0] - sides[1]) / 2e-3
+    assert np.abs(found.j[..., column]).max() > 0.02
+    assert found.j[..., column] == pytest.approx(-slope, rel=2e-3, abs=2e-4)
+
+
+# --- paths
+
+
+def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
+    """Segments whose measurements are the toy's own."""
+    cut = segments.cut(SEEN, ROWS)
+    y, _ = segments._run(Toy(), theta, cut, at, GRID)
+    return replace(cut, y=y)
+
+
+def test_nothing_is_left_of_what_the_model_made():
+    at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(at)
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    found = segments.linear(Toy(), THETA, cut, GRID, at, *none)
+    assert np.array_equal(found.e, np.zeros_like(found.e))
+    assert found.j.shape[-1] == 4
+    picked = found.pick(np.array([False, True, True, False]))
+    assert np.array_equal(picked.z, found.z[1:3]) and len(picked.cut) == 2
+
+
+def test_a_path_is_pulled_onto_a_known_push():
+    """Smooth accelerations of 0.02 m/s²: the path goes where they went, and finds them."""
+    t = KNOT * np.arange(GRID.knots)
+    push = np.stack((0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t)))
+    true = Path(SEEN.state[ROWS], np.tile(push, (4, 1, 1)))
+    cut = simulated(true)
+    found = segments.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
+    y, _ = segments._run(Toy(), THETA, cut, found, GRID)
+    assert y == pytest.approx(cut.y, abs=1e-4)
+    assert found.start == pytest.approx(true.start, abs=2e-3)
+    # within, where bins on both sides see a knot
+    assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
+
+
+def test_what_was_not_used_does_not_pull():
+    true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    used = cut.used.copy()
+    used[:, 6:8] = False
+    wrong = np.where(used, cut.y, 1e3)
+    bad = replace(cut, y=wrong, used=used)
+    found = segments.pulled(Toy(), THETA, bad, GRID, WIDE, true)
+    y, _ = segments._run(Toy(), THETA, bad, found, GRID)
+    assert y == pytest.approx(cut.y, abs=1e-6)
+
+
+# --- a trap: recorded actuators held instead of interpolated
+
+
+def weaving(late: float) -> Record:
+    """A ship that the toy is exactly, her rudder weaving 0.3 sin(0.8 t), acting `late`:
+    ṙ = b δ - c r in closed form; she lies still otherwise."""
+    t = SEEN.time
+    w, amplitude = 0.8, 0.3
+    phase = np.arctan2(w, DAMP)
+    size = TURN * amplitude / np.hypot(w, DAMP)
+    rate = size * np.sin(w * (t - late) - phase)
+    heading = -size / w * np.cos(w * (t - late) - phase)
+    state = np.zeros((len(t), 6))
+    state[:, 4], state[:, 5] = heading, rate
+    actuator = np.stack((amplitude * np.sin(w * t), np.zeros(len(t))), -1)
+    wind = np.zeros((len(t), 2))
+    return replace(SEEN, state=state, actuator=actuator, wind=wind)
+
+
+@pytest.mark.parametrize("late", (0.0, 0.3))
+def test_a_delay_is_what_it_is_and_zero_is_zero(late):
+    """Holding the recorded rudder over a step would show as 0.05 s here."""
+    record = weaving(late)
+    model = Toy((RudderDelay(),))
+    cut, moved, shown = reference.read(model, SETTING, record, ROWS)
+    theta = np.concatenate((THETA, [0.0]))
+    at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
+    found = segments.linear(model, theta, cut, GRID, at, moved, shown)
+    rows = found.e[..., 4:].ravel()  # heading and yaw rate
+    start = found.z[..., 4:, 4:6].reshape(len(rows), 2)
+    owned = np.zeros((len(rows), 8))  # each segment has a start of its own
+    for s in range(4):
+        part = slice(s * 30, s * 30 + 30)
+        owned[part, 2 * s : 2 * s + 2] = start[part]
+    columns = np.concatenate((found.j[..., 4:, -1].reshape(-1, 1), owned), 1)
+    delay = np.linalg.lstsq(columns, rows, rcond=None)[0][0]
+    assert delay == pytest.approx(late, abs=0.01)
