@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from shiplog import (
 )  # fmt: skip
 from shiplog import verdict as verdicts
 from shiplog.causes import Cause, Setting
-from shiplog.diagnose import Decision, Named
+from shiplog.diagnose import Decision
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.gain import Gain, gain, parts
@@ -67,6 +67,11 @@ class Diagnosis:
     before: ExtendedSimulator | None
     after: ExtendedSimulator | None
     folder: Path
+
+    @property
+    def recording(self) -> Path | None:
+        """Its pictures, where there is something to show."""
+        return None if self.decision is None else self.folder / "diagnosis.rrd"
 
 
 def diagnose_run(
@@ -118,7 +123,7 @@ def diagnose_run(
     decision = diagnose.decide(trial, point)
     cut = _windows(run, store, names, profile)
     before = run.extended(run.config.seeds[0], trial.reference.model.constants, recorded)
-    after, found, decision, dropped = _gain(trial, decision, cut, before, recorded)
+    after, found, decision, dropped = _gain(trial, decision, cut, before)
     verdict = _verdict(
         run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
         _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial, pushed,
@@ -154,13 +159,14 @@ def _trial(
     """Reference and trial; which causes cannot be tested, and why."""
     usual = nominal if nominal is not None else recorded
     setting = _setting(run, usual, recorded)
+    given = run.config.physical and not run.config.physics.fit
     every: tuple[Cause, ...] = (*catalogue.CATALOGUE, *user_causes.load(cause_files))
     untested: dict[str, str] = {}
     chosen = []
     for cause in every:
         missing = cause.missing(setting)
-        if missing is None and nominal is None and cause.absorbed:
-            missing = "a model fitted to these voyages, or to none, absorbs it"
+        if missing is None and nominal is None and cause.absorbed and not given:
+            missing = "a model fitted to these voyages absorbs it"
         if missing is not None:
             untested[cause.label] = missing
         else:
@@ -173,7 +179,7 @@ def _trial(
     if nominal is not None:
         known = reference.learn(model, setting, start, nominal)
     else:
-        known = reference.assume(model, setting, start, recorded)
+        known = reference.assume(model, setting, start, recorded, given=given)
     return Trial(known, recorded, tuple(run.extension_numbers())), untested
 
 
@@ -201,7 +207,6 @@ def _gain(
     decision: Decision,
     cut: Windows | None,
     before: ExtendedSimulator,
-    recorded: Record,
 ) -> tuple[ExtendedSimulator | None, Gain | None, Decision, dict[str, str]]:
     """Causes kept for what they are worth on held-out voyages; numbers without each voyage."""
     dropped: dict[str, str] = {}
@@ -212,42 +217,51 @@ def _gain(
     usual = parts(before.states(cut, before.theta) - measured, steps)
     voyages = cut.plan["voyage"].to_list()
 
-    def worth(named: tuple[Named, ...]) -> Gain:
-        after = np.empty_like(usual)
-        for voyage, rows in _folds(cut, recorded):
-            numbers = _without(trial, decision, named, voyage)
-            simulator = before.with_causes([n.cause for n in named], numbers, None)
-            part = cut.pick(rows)
-            states = simulator.states(part, simulator.theta)
-            after[rows.numpy()] = parts(states - part.state.double().numpy(), series(part).steps)
-        return gain(usual, after, voyages)
+    def worth(decided: Decision) -> Gain:
+        error = held_out(trial, decided, cut, before) - measured
+        return gain(usual, parts(error, steps), voyages)
 
+    found = worth(decision)
+    # a cause of the error makes it less; an instrument's fault is a fault whatever it is worth
+    while any(n.cause.kind != "sensor" for n in decision.named):
+        if found.real and len(decision.named) == 1:
+            break
+        tried = [
+            (worth(rest), rest, one)
+            for one in decision.named
+            if one.cause.kind != "sensor"
+            for rest in [diagnose.without(trial, decision, one)]
+        ]
+        best, rest, one = min(tried, key=lambda t: t[0].after)
+        if best.after >= found.after:
+            break
+        share = 1.0 - found.after / best.after
+        dropped[one.cause.label] = f"no gain on held-out voyages ({share:+.1%})"
+        decision, found = rest, best
     named = decision.named
-    found = worth(named)
-    if len(named) > 1:
-        for one in list(named):
-            rest = tuple(n for n in named if n is not one)
-            without = worth(rest)
-            if without.after < found.after and one.cause.moves:
-                dropped[one.cause.label] = (
-                    f"no gain on held-out voyages ({1.0 - found.after / without.after:+.1%})"
-                )
-                named, found = rest, without
-                break
-    elif named and not found.real and found.reduction < 0.0 and named[0].cause.moves:
-        dropped[named[0].cause.label] = f"no gain on held-out voyages ({found.reduction:+.1%})"
-        named = ()
     if not named:
-        verdict = "named" if decision.pulses else "none"
-        return None, None, replace(decision, named=(), verdict=verdict), dropped
+        return None, None, decision, dropped
     after = before.with_causes(
         [n.cause for n in named], {n.cause.label: n.numbers for n in named},
         {n.cause.label: n.covariance for n in named},
     )  # fmt: skip
-    return after, found, replace(decision, named=named), dropped
+    return after, found, decision, dropped
 
 
-def _folds(cut: Windows, recorded: Record):
+def held_out(
+    trial: Trial, decision: Decision, cut: Windows, before: ExtendedSimulator
+) -> np.ndarray:
+    """States [N, I, 6] of every window by the extended model whose numbers are fitted without
+    that window's voyage."""
+    states = np.empty(tuple(cut.state.shape))
+    for left, rows in _folds(cut):
+        numbers = _without(trial, decision, left)
+        simulator = before.with_causes([n.cause for n in decision.named], numbers, None)
+        states[rows.numpy()] = simulator.states(cut.pick(rows), simulator.theta)
+    return states
+
+
+def _folds(cut: Windows):
     """(what is left out of the fit, window rows): whole voyages, or the halves of one alone."""
     import torch
 
@@ -266,9 +280,7 @@ def _folds(cut: Windows, recorded: Record):
             yield (known[0], (middle, late)), rows
 
 
-def _without(
-    trial: Trial, decision: Decision, named: tuple[Named, ...], left: tuple
-) -> dict[str, np.ndarray]:
+def _without(trial: Trial, decision: Decision, left: tuple) -> dict[str, np.ndarray]:
     """Numbers of the named causes from the other voyages alone."""
     voyage, half = left
     segment = decision.point.linear.cut
@@ -277,8 +289,8 @@ def _without(
     if half is not None:
         middle, late = half
         out &= (trial.record.time[segment.rows] >= middle) == late
-    labels = tuple(n.cause.label for n in named)
-    included = (*trial.fixed, *labels)
+    labels = tuple(n.cause.label for n in decision.named)
+    included = tuple(decision.base.numbers)
     numbers = trial.without(decision.point, included, decision.louder, out)
     return {label: numbers[label] for label in labels}
 
@@ -448,6 +460,10 @@ def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: 
     _write(done)
     split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
     runs.write_json(done.folder / "provenance.json", provenance(store, split, began))
+    if done.recording is not None:
+        from pipelines import diagnosis_pictures  # which needs the names above
+
+        diagnosis_pictures.save(done, done.recording)
 
 
 def _extend(run: Run, done: Diagnosis, out: Path) -> None:
@@ -473,6 +489,10 @@ def diagnose_command(
         run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
     )
     text = f"{verdicts.markdown(done.verdict)}\nReport: {out / 'report.md'}"
+    content = done.verdict.as_json()
+    if done.recording is not None:
+        text += f"\nRecording: {done.recording}"
+        content["recording"] = str(done.recording)
     if extend is not None and done.after is not None:
         text += f"\nExtended model: {extend}"
-    return Answer(text, done.verdict.as_json())
+    return Answer(text, content)

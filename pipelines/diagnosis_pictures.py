@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from pathlib import Path
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
 from pipelines.diagnose import Diagnosis, held_out
-from shiplog import unexplained
+from shiplog import unexplained, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
 from shiplog.diagnose import PULSES, Decision
@@ -18,11 +22,18 @@ from shiplog.hypotheses import Trial
 from shiplog.models.mmg import body
 from shiplog.record import Record
 from shiplog.reference import corrected
+from shiplog.segments import KNOT
 from shiplog.sensitivity import series
 from shiplog.unexplained import Unexplained, around
 from shiplog.windows import Windows
 
+HALF = 8  # knots: half a segment
 FARTHEST = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
+
+
+def save(done: Diagnosis, path: Path) -> None:
+    """The recording of a diagnosis that came to a decision."""
+    viewer.save_diagnosis(exhibit(done), path)
 
 
 def exhibit(done: Diagnosis) -> Exhibit:
@@ -62,31 +73,47 @@ def _measured(record: Record) -> pl.DataFrame:
 def _residual(trial: Trial, decision: Decision) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
     ref, record = trial.reference, trial.record
-    found = unexplained.posterior(
-        decision.first.linear, ref.mean * ref.columns.unit,
-        trial.unrest.louder(decision.nothing.louder), record,
-    )  # fmt: skip
+    found = _unexplained(trial, decision)
     keep = unexplained.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
-    # columns: the force that one m/s² (rad/s²) takes
-    mass = np.asarray(body.forces_of(ref.coefficients, ref.model.stand_in.geometry, np.eye(3))).T
     mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
+    coefficients = {k: jnp.asarray(v) for k, v in ref.coefficients.items()}
+    # columns: the force that one m/s² (rad/s²) takes
+    mass = np.asarray(body.forces_of(coefficients, ref.model.stand_in.geometry, jnp.eye(3))).T
     names = [n.cause.label for n in decision.named if n.cause.kind != "sensor"]
     force = _caused(trial, decision, rows) @ mass.T
     if decision.pulses is not None:
         names.append(PULSES)
-        force = force + _pulses(trial, decision, found)[keep][order]
-    columns = zip(VELOCITY, (mean @ mass.T).T, np.sqrt(sd**2 @ mass.T**2).T, force.T, strict=True)
+        force = force + _pulses(trial, decision)[rows]
+    if not names:
+        force = np.full_like(force, np.nan)
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
+    columns = zip(VELOCITY, (mean @ mass.T).T, np.sqrt(sd**2 @ mass.T**2).T, force.T, strict=True)
     tables = [
         pl.DataFrame(index | {"force": left, "sd": doubt, "named": caused}).with_columns(
-            pl.lit(channel.name).alias("channel"),
-            pl.col("named") if names else pl.lit(None, pl.Float64).alias("named"),
+            pl.lit(channel.name).alias("channel"), pl.col("named").fill_nan(None)
         )
         for channel, left, doubt, caused in columns
     ]
     return pl.concat(tables), tuple(names)
+
+
+def _unexplained(trial: Trial, decision: Decision) -> Unexplained:
+    """What the model as it was made leaves, on the trial's segments and on others half a segment
+    on: a segment knows little of its ends, where what is left is drawn towards nothing."""
+    ref, record = trial.reference, trial.record
+    rows = trial.rows + HALF * round(KNOT / record.step)
+    rows = rows[rows + trial.grid.rows <= record.lasts[trial.rows]]
+    linears = [decision.first.linear]
+    if len(rows):
+        linears.append(trial.over(rows, decision.first.numbers))
+    unrest = trial.unrest.louder(decision.nothing.louder)
+    usual = ref.mean * ref.columns.unit
+    found = [unexplained.posterior(linear, usual, unrest, record) for linear in linears]
+    return Unexplained(
+        *(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Unexplained))
+    )
 
 
 def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
@@ -113,12 +140,14 @@ def _acceleration(model, theta, state, driven, wind):
     return model.acceleration(theta, state, driven, wind)
 
 
-def _pulses(trial: Trial, decision: Decision, found: Unexplained) -> np.ndarray:
-    """Force [S, J, 3] of the thruster that nobody records."""
+def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
+    """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
     force = trial.pulse_force(decision.point, decision.base, decision.pulses)
-    assert force.shape == found.rows.shape
-    return force[..., None] * np.array([0.0, 1.0, decision.pulses.lever])
+    apart = round(KNOT / trial.record.step)
+    whole = np.full(len(trial.record), np.nan)
+    whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force
+    return whole[:, None] * np.array([0.0, 1.0, decision.pulses.lever])
 
 
 # --- windows --------------------------------------------------------------------------------------
@@ -131,7 +160,7 @@ def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
         return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERRORS)
     states = {BEFORE: before.states(cut, before.theta)}
     if done.after is not None:
-        states[AFTER] = held_out(trial, decision, decision.named, cut, before)
+        states[AFTER] = held_out(trial, decision, cut, before)
     measured, steps = cut.state.double().numpy(), series(cut).steps
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),

@@ -16,8 +16,9 @@ import numpy as np
 from shiplog.causes import Cause, Shown
 from shiplog.hypotheses import Found, Point, Pulses, Trial
 
-LEAST = 15.0  # nats that the first cause must bring
-MORE = 25.0  # that each further one must: small evidence follows large ones about
+CONTENDS = 2.0  # nats from which on a cause is linearised again
+LEAST = 8.0  # nats that the first cause must bring
+MORE = 18.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
@@ -116,7 +117,7 @@ def decide(trial: Trial, point: Point) -> Decision:
                     point, [c for k, c in catalogue.items() if k not in included], included
                 )
                 continue
-        settled = _settle(trial, point, base, found, included, wanted)
+        settled = _settle(trial, point, base, found, included)
         strongest = max(remains, key=lambda f: f.evidence, default=None)
         stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
         if not ranking:
@@ -168,13 +169,43 @@ def decide(trial: Trial, point: Point) -> Decision:
     )  # fmt: skip
 
 
-def _settle(trial, point, base, found, included, wanted) -> list[tuple[Point, Found]]:
+def without(trial: Trial, decision: Decision, one: Named) -> Decision:
+    """The same verdict with one cause less, the others fitted again."""
+    named = tuple(n for n in decision.named if n is not one)
+    labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
+    if labels:
+        numbers = {n: decision.base.numbers[n] for n in labels}
+        point, base = trial.settle(labels, numbers, decision.point.path)
+    else:
+        point, base = decision.first, decision.nothing
+    again, at = [], 0
+    by = {n.cause.label: n for n in named}
+    for label in labels:
+        count = len(base.numbers[label])
+        part = slice(at, at + count)
+        at += count
+        if label in by:
+            assert base.covariance is not None
+            again.append(
+                replace(
+                    by[label],
+                    numbers=np.asarray(base.numbers[label]),
+                    covariance=base.covariance[part, part],
+                )
+            )
+    verdict = "named" if again or decision.pulses else "none"
+    return replace(
+        decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
+    )
+
+
+def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     """Contenders linearised where they are found, best first; those whose fit ran away left out."""
-    if not found or found[0].evidence < wanted:
-        return []
-    contenders = [f for f in found[:SETTLED] if f.evidence > max(wanted, SHARE * found[0].evidence)]
-    if not any(f is found[0] for f in contenders):
-        contenders = [found[0]]
+    contenders = [
+        f
+        for f in found[:SETTLED]
+        if f.evidence > CONTENDS and f.evidence >= SHARE * found[0].evidence
+    ]
     settled = []
     for one in contenders:
         numbers = dict(base.numbers) | dict(one.numbers)

@@ -22,7 +22,7 @@ from shiplog.reference import HELD, Reference, read
 from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
-QUIETER = 0.7
+QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = (1.15, 1.03)  # steps of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
@@ -154,7 +154,7 @@ class Trial:
         own misfit it would count as such."""
         if self._volume is None or self._volume[0] is not self.unrest:
             assert self._first is not None
-            at = (QUIETER / 2.0, QUIETER, *LOUDER, 2.0 * LOUDER[-1])
+            at = (0.5 * QUIETER[-1], *reversed(QUIETER), *LOUDER, 2.0 * LOUDER[-1])
             values = [evidence.log_volume(self._first.weighed, self.unrest.louder(v)) for v in at]
             self._volume = (self.unrest, CubicSpline(np.log(at), values))
         return float(self._volume[1](np.log(louder)))
@@ -218,8 +218,10 @@ class Trial:
             found.append(self.level(point, louder, included))
             if len(found) > 1 and found[-1].value < found[-2].value:
                 break
-        if len(found) == 2:
-            found.append(self.level(point, QUIETER, included))
+        for quieter in QUIETER if len(found) == 2 else ():
+            found.append(self.level(point, quieter, included))
+            if found[-1].value < max(found[:-1], key=lambda level: level.value).value:
+                break
         for apart in FINER:
             best = max(found, key=lambda level: level.value)
             sides = [self.level(point, best.louder * by, included) for by in (1.0 / apart, apart)]

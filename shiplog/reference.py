@@ -30,6 +30,7 @@ STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and n
 KAPPAS = (2.0, 4.0, 8.0, 16.0, 32.0)
 USUAL_KAPPA = 11.0  # DIAGNOSIS: one campaign's coefficients are some 3.3 times too sure
 UNREST_TIME = 4.0  # s
+GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 HELD = 1e8  # information that leaves a number where it is
 
 
@@ -148,9 +149,15 @@ def wide_of(setting: Setting) -> Wide:
 
 
 def learn(
-    model: Extended, setting: Setting, start: Start, record: Record, kappa: float | None = None
+    model: Extended,
+    setting: Setting,
+    start: Start,
+    record: Record,
+    kappa: float | None = None,
+    rounds: int = ROUNDS,
 ) -> Reference:
-    """From the nominal campaign. κ is chosen on its own voyages unless given."""
+    """From the nominal campaign. κ is chosen on its own voyages unless given; without rounds the
+    coefficients stay where they are."""
     columns = columns_of(model, setting, start)
     wide, g = wide_of(setting), segments.grid(record)
     rows = segments.begins(record)
@@ -161,7 +168,7 @@ def learn(
     path: Path | None = None
     hold = wide
     prior = np.zeros(len(unit))  # about wherever the coefficients stand
-    for round_ in range(ROUNDS + 1):
+    for round_ in range(rounds + 1):
         whole = np.concatenate((theta, np.zeros(len(unit) - base)))
         path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
@@ -174,7 +181,7 @@ def learn(
                 unrest = evidence.learnt(linear, found * unit, unrest, rounds=4)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
         far = float(np.abs(found[:base]).max(initial=0.0))
-        if round_ == ROUNDS or far < NEAR:
+        if round_ == rounds or far < NEAR:
             break
         moved_to = theta + found[:base] * unit[:base] * min(1.0, FARTHEST / far)
         edge = 1e-6 * (start.high - start.low)
@@ -291,10 +298,19 @@ def places(record: Record, count: int) -> tuple[np.ndarray, float]:
     return points, max(float(np.median(apart.min(0))), 1e-3)
 
 
-def assume(model: Extended, setting: Setting, start: Start, record: Record) -> Reference:
-    """Where no campaign shows what is usual: coefficients as free as they plausibly are, and the
-    unrest as large as it is on these very voyages."""
-    whole = learn(model, setting, start, record, kappa=USUAL_KAPPA)
+def assume(
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool
+) -> Reference:
+    """Where no campaign shows what is usual: the unrest is as large as it is on these voyages.
+
+    given   coefficients as somebody gave them, held to a tenth of their plausible spread; else a
+            fit to these voyages made them, and they are as free as they plausibly are
+    """
+    if given:
+        start = replace(start, spread=GIVEN * start.spread)
+        whole = learn(model, setting, start, record, kappa=USUAL_KAPPA, rounds=0)
+    else:
+        whole = learn(model, setting, start, record, kappa=USUAL_KAPPA)
     unit = whole.columns.unit
     information = np.diag(whole.columns.known.copy())
     prior = np.zeros(len(unit))

@@ -302,13 +302,7 @@ def drifting(heading, rate) -> np.ndarray:
 
 
 def test_a_ship_at_rest_in_the_water_drifts_with_the_current():
-    """No force: in earth axes nothing accelerates, whatever her heading."""
-    heading = np.linspace(-3.0, 3.0, 13)
-    found, _, _ = free_body(drifting(heading, np.zeros(13)))
-    assert found == pytest.approx(np.zeros((13, 3)), abs=1e-15)
-
-
-def test_hull_forces_feel_the_water_and_not_the_ground():
+    """Her hull feels the water and not the ground: adrift she keeps her way, held she does not."""
     heading = np.linspace(-3.0, 3.0, 13)
     model, values = extended([Current()], without=("propeller", "rudder", "wind"))
     still = np.zeros((13, 4)), np.zeros((13, 2))

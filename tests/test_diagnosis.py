@@ -162,32 +162,13 @@ def test_the_extended_model_has_nothing_more_wrong(sea):
     assert after == pytest.approx(sea.done.after.losses(sea.done.windows).mean(), rel=1e-9)
 
 
-CAUSES = [
-    "current",
-    "wind_force",
-    "shallow_water",
-    "bank",
-    "fouling",
-    "payload",
-    "cross_flow_drag",
-    "thrust_loss",
-    "thrust_drift",
-    "rudder_force",
-    "rudder_offset",
-    "rudder_lag",
-    "rudder_delay",
-    "side_thrust",
-    "heading_offset",
-    "yaw_rate_bias",
-    "yaw_rate_scale",
-    "clock_offset",
-    "antenna_offset",
-    "wind_direction_offset",
-    "wind_speed_scale",
-    "coverage",
-    "external",
-    "unknown",
-]
+CAUSES = (
+    "current", "wind_force", "shallow_water", "bank", "fouling", "payload", "cross_flow_drag",
+    "thrust_loss", "thrust_drift", "rudder_force", "rudder_offset", "rudder_lag",
+    "rudder_delay", "side_thrust", "heading_offset", "yaw_rate_bias", "yaw_rate_scale",
+    "clock_offset", "antenna_offset", "wind_direction_offset", "wind_speed_scale", "coverage",
+    "external", "unknown",
+)  # fmt: skip
 FAMILIES = ("position", "heading", "time", "motion", "controls", "wind", "stochastic")
 
 

@@ -67,15 +67,23 @@ BOTH = pytest.mark.parametrize("unrest", (UNREST, PULSED), ids=("plain", "pulse"
 
 @BOTH
 def test_gram_is_the_dense_gaussian(unrest):
-    """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C; in log |C| the start counts as
-    fitted, so that it is that of the noise and the acceleration alone."""
+    """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
+    restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
     given = linear(3)
     found = evidence.gram(evidence.weighed(given, unrest.noise), unrest)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         block = np.concatenate((e[:, None], j), 1)
         assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
-    logdet = sum(np.linalg.slogdet(c)[1] for _, _, c in dense(given, unrest, fitted=True))
-    assert found.logdet == pytest.approx(logdet, rel=1e-6)
+    logdet = 0.0
+    for s, (_, _, v) in enumerate(dense(given, unrest, fitted=True)):
+        used = given.cut.used[s].ravel()
+        start = given.z[s].reshape(-1, 15)[used, :6]
+        r = np.diag(np.tile(unrest.noise, given.e.shape[1])[used] ** 2)
+        felt = start.T @ np.linalg.solve(v, start) + np.diag(unrest.start**-2.0)
+        logdet += np.linalg.slogdet(v)[1] + np.linalg.slogdet(felt)[1]
+        logdet -= np.linalg.slogdet(start.T @ np.linalg.solve(r, start))[1]
+    assert found.logdet == pytest.approx(logdet, rel=1e-5)
+    assert evidence.log_volume(evidence.weighed(given, unrest.noise), unrest) == found.logdet
 
 
 def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():

@@ -65,7 +65,7 @@ def test_parts_add_up_to_the_evaluation_function():
     assert parts(only, steps)[:, 2] == pytest.approx(found[:, 2])
 
 
-@pytest.mark.parametrize("lost", (np.inf, np.nan, 1e300))
+@pytest.mark.parametrize("lost", (np.inf, np.nan, 1e300, 1e6))
 def test_a_rollout_that_ran_away_counts_as_runaway(lost):
     error = np.zeros((2, 5, 6))
     error[1, 3:, 1] = lost

@@ -12,7 +12,6 @@ import rerun.blueprint as rrb
 
 from shiplog import channels
 from shiplog.comparison import Comparison
-from shiplog.exceptions import listed
 from shiplog.exhibit import AFTER, BEFORE, Exhibit
 from shiplog.viewer import display, forces, style, timeline, trajectory
 from shiplog.viewer.display import Drawn
@@ -59,7 +58,7 @@ def pictured(exhibit: Exhibit) -> Pictured:
     """Tables as the other views take them."""
     models = {BEFORE: "before" if exhibit.extended else "the model"}
     if exhibit.extended:
-        models[AFTER] = f"with {listed(_spoken(exhibit.extended), most=2)}"
+        models[AFTER] = f"with {_spoken(exhibit.extended)}"
     closeups, measured, tracks = {}, [], []
     for row in exhibit.telling.to_dicts():
         begin, end = row["time"], row["time"] + row["seconds"]
@@ -95,8 +94,8 @@ def pictured(exhibit: Exhibit) -> Pictured:
     )  # fmt: skip
 
 
-def _spoken(names: tuple[str, ...]) -> list[str]:
-    return [name.replace("_", " ") for name in names]
+def _spoken(names: tuple[str, ...]) -> str:
+    return " and ".join(name.replace("_", " ") for name in names)
 
 
 def _pushed(exhibit: Exhibit) -> pl.DataFrame:
@@ -240,7 +239,7 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
             ("lacks", time, display.column(lacks, axis)[:, None], begins, [LACKS], style.MEASURED,
              1.5),
             ("named", time, display.column(named, axis)[:, None], begins,
-             [f"force of {listed(_spoken(picture.exhibit.named), most=2)}"], NAMED, 1.5),
+             [f"force of {_spoken(picture.exhibit.named)}"], NAMED, 1.5),
         ):  # fmt: skip
             if np.isfinite(values).any():
                 timeline.send_lines(

@@ -297,15 +297,16 @@ def extent(
     size = max(high - low for low, high in ranges)
     margin = max(0.08 * size, 1.5 * drawn.ship_length)
     (west, east), (south, north) = (
-        _widened(*ends, values, room * size) for ends, values in zip(ranges, followed, strict=True)
+        _widened(ends, values, room * size) for ends, values in zip(ranges, followed, strict=True)
     )
     return (west - margin, east + margin), (south - margin, north + margin)
 
 
 def _widened(
-    low: float, high: float, values: NDArray[np.float64], most: float
+    ends: tuple[float, float], values: NDArray[np.float64], most: float
 ) -> tuple[float, float]:
     """The range with these values in it, but wider by `most` on either side at most."""
+    low, high = ends
     values = values[np.isfinite(values)]
     if not len(values):
         return low, high

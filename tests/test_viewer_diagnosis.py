@@ -1,0 +1,209 @@
+"""The pictures of a diagnosis hold what was found, in the units and colours that they say."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from rerun.chunk import RrdReader
+
+from shiplog import viewer
+from shiplog.channels import STATE
+from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.viewer import diagnosis
+
+BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
+
+
+def straight(voyage, speed):
+    """North at a steady speed for 200 s; what is not said is zero."""
+    time = np.arange(0.0, 200.0)
+    known = {"x0": speed * time, "surge": np.full(200, speed)}
+    zero = {channel.name: np.zeros(200) for channel in STATE}
+    return pl.DataFrame({"voyage": [voyage] * 200, "time": time, **(zero | known)})
+
+
+def tracks(voyage, model, speed):
+    """Two windows of 100 s, each from where the ship was; she went 0.5 m/s."""
+    return straight(voyage, speed).select(
+        pl.lit(model).alias("model"), "voyage", (pl.col("time") // 100).cast(pl.Int64)
+        .alias("window"), "time",
+        pl.col("x0") + (0.5 - speed) * (pl.col("time") // 100) * 100,
+        *(c.name for c in STATE if c.name != "x0"),
+    ).select(TRACKS.keys())  # fmt: skip
+
+
+def forces(voyage, named=True):
+    """Knots of 2 s, except that nothing is known of 20 s to 40 s."""
+    time = np.array([t for t in np.arange(0.0, 200.0, 2.0) if not 20 <= t <= 40])
+    tables = [
+        pl.DataFrame({"voyage": [voyage] * len(time), "time": time}).with_columns(
+            channel=pl.lit(channel), force=pl.lit(force), sd=pl.lit(sd),
+            named=pl.lit(push if named else None, pl.Float64),
+        )
+        for channel, force, sd, push in (
+            ("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw_rate", 0.5, 0.1, 0.25),
+        )
+    ]  # fmt: skip
+    return pl.concat(tables)
+
+
+@pytest.fixture(scope="module")
+def exhibit():
+    rows = [  # the second window of `out` fell most, by 9900 - 99
+        ("home", 0, 0.0, 99.0, 396.0, 396.0), ("home", 1, 100.0, 99.0, 891.0, 99.0),
+        ("out", 0, 0.0, 99.0, 2475.0, 99.0), ("out", 1, 100.0, 99.0, 9900.0, 99.0),
+    ]  # fmt: skip
+    both = ("home", "out")
+    return Exhibit(
+        title="a ship: home, out",
+        ship_length=3.0,
+        ship_breadth=0.5,
+        measured=pl.concat([straight(v, 0.5) for v in both]),
+        residual=pl.concat([forces(v) for v in both]),
+        named=("current",),
+        extended=("current", "heading_offset"),
+        tracks=pl.concat(
+            [tracks(v, model, u) for model, u in ((BEFORE, 0.8), (AFTER, 0.6)) for v in both]
+        ),
+        errors=pl.DataFrame(rows, schema=ERRORS, orient="row"),
+        report="# Diagnosis\n\n    RᵀV of 0.1 m/s\n",
+    )
+
+
+@pytest.fixture(scope="module")
+def saved(exhibit, tmp_path_factory):
+    path = tmp_path_factory.mktemp("diagnosis") / "diagnosis.rrd"
+    viewer.save_diagnosis(exhibit, path)
+    return path
+
+
+def column(path, entity, component):
+    """A component's rows at an entity, in order of time."""
+    chunks = RrdReader(path).stream().filter(content=entity)
+    batches = [pl.DataFrame(pl.from_arrow(c.to_record_batch())) for c in chunks]
+    tables = [t for t in batches if component in t.columns]
+    assert tables, f"{entity} has no {component}"
+    table = pl.concat(tables)
+    table = table.sort("sim_time") if "sim_time" in table.columns else table
+    return table[component]
+
+
+def scalars(path, entity):
+    return column(path, entity, "Scalars:scalars").explode().to_numpy()
+
+
+def colour(path, entity):
+    return column(path, entity, "SeriesLines:colors").explode()[0]
+
+
+def entities(path):
+    return RrdReader(path).store().summary()
+
+
+def views(containers):
+    """Every view's name and origin, container by container."""
+    for part in containers:
+        if hasattr(part, "class_identifier"):
+            yield part.name, part.origin
+        else:
+            yield from views(part.contents)
+
+
+def test_the_window_that_improved_most_is_told_first(exhibit):
+    assert exhibit.telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]
+    unnamed = exhibit.errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
+    telling = replace(exhibit, errors=unnamed).telling
+    assert telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]  # the worst
+
+
+@pytest.mark.parametrize(
+    ("axis", "lacks", "sd", "named"),
+    [("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw", 0.5, 0.1, 0.25)],
+)
+def test_what_the_model_lacks_is_beside_the_named_force(saved, axis, lacks, sd, named):
+    path = f"/unexplained/home/{axis}"
+    values = scalars(saved, f"{path}/lacks")
+    assert len(values) == 89 + 1 and np.isnan(values[10])  # the gap is not bridged
+    assert np.delete(values, 10) == pytest.approx(lacks)
+    assert np.delete(scalars(saved, f"{path}/named"), 10) == pytest.approx(named)
+    low, high = column(saved, f"{path}/band", "Scalars:scalars")[0]
+    assert (low, high) == pytest.approx((lacks - 1.645 * sd, lacks + 1.645 * sd))
+    assert colour(saved, f"{path}/lacks") == BLACK
+    assert colour(saved, f"{path}/named") == ORANGE
+
+
+def test_errors_read_as_speeds(saved):
+    """√(9900 / 99 s) = 10: the weights of L make 1 of 1 cm/s."""
+    before = scalars(saved, "/errors/out/before")
+    assert before[[0, 1, 3, 4]] == pytest.approx([5.0, 5.0, 10.0, 10.0]) and np.isnan(before[2])
+    after = r"/errors/out/with\ current\ and\ heading\ offset"
+    assert np.delete(scalars(saved, after), 2) == pytest.approx(1.0)
+    assert (colour(saved, "/errors/out/before"), colour(saved, after)) == (BLUE, ORANGE)
+
+
+def test_charts_show_the_telling_window_and_the_whole_voyage(saved):
+    window = r"/track/out\,\ 100\ to\ 199\ s"
+    of = "LineStrips2D:strips"
+    (track,) = column(saved, f"{window}/simulated/before", of)[0]
+    assert np.array(track.to_list())[[0, -1]].tolist() == [
+        pytest.approx([0.0, -50.0]), pytest.approx([0.0, -129.2])  # 50 m + 99 s of 0.8 m/s
+    ]  # fmt: skip
+    (track,) = column(saved, f"{window}/measured", of)[0]
+    assert track.to_list()[-1] == pytest.approx([0.0, -99.5])
+    assert len(column(saved, "/track/out/simulated/before", of)[0]) == 2
+    drawn = column(saved, f"{window}/simulated/before", "LineStrips2D:colors")
+    assert drawn.explode()[0] == BLUE
+
+
+def test_each_voyage_has_its_tab_with_units_and_colours_said(exhibit):
+    tabs = diagnosis.blueprint(diagnosis.pictured(exhibit))
+    assert [tab.name for tab in tabs] == ["out", "home"]
+    assert [name for name, _ in views(tabs[:1])] == [
+        "Most improved, 100 to 199 s [m]: measured black, before blue, "
+        "with current and heading offset orange",
+        "Whole voyage", "Report", "surge force [N], positive ahead",
+        "sway force [N], positive to starboard", "yaw moment [N m], positive bow to starboard",
+        "velocity error of each held-out window, root mean square [cm/s, or 0.1 deg/s]",
+    ]  # fmt: skip
+
+
+def test_a_verdict_that_names_nothing_shows_what_is_left(exhibit, tmp_path):
+    nothing = replace(
+        exhibit,
+        residual=forces("out", named=False),
+        named=(),
+        extended=(),
+        tracks=exhibit.tracks.filter(pl.col("model") == BEFORE),
+        errors=exhibit.errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER)),
+    )
+    viewer.save_diagnosis(nothing, tmp_path / "nothing.rrd")
+    text = entities(tmp_path / "nothing.rrd")
+    assert "/unexplained/out/surge/lacks" in text and "/named" not in text
+    assert r"/errors/out/the\ model" in text and r"/with\ " not in text
+    names = [name for name, _ in views(diagnosis.blueprint(diagnosis.pictured(nothing)))]
+    assert names[0] == "Worst, 100 to 199 s [m]: measured black, the model blue"
+    assert names.count("surge force [N], positive ahead") == 1  # nothing is known at home
+
+
+def test_too_short_for_a_window_no_panel_is_empty(exhibit, tmp_path):
+    short = replace(
+        exhibit, tracks=pl.DataFrame(schema=TRACKS), errors=pl.DataFrame(schema=ERRORS), extended=()
+    )
+    viewer.save_diagnosis(short, tmp_path / "short.rrd")
+    names = [name for name, _ in views(diagnosis.blueprint(diagnosis.pictured(short)))]
+    assert [n for n in names if "window" in n or "Worst" in n or "Most" in n] == []
+
+
+def test_a_rollout_that_ran_away_does_not_flatten_the_errors(exhibit):
+    errors = diagnosis.pictured(exhibit).errors  # before: 2, 3, 5, 10
+    assert diagnosis.error_range(errors) == pytest.approx((-0.4, 10.8))
+    ran = errors.with_columns(pl.col(AFTER).replace(1.0, 3e4))
+    assert diagnosis.error_range(ran)[1] == pytest.approx(1.08 * 4.0 * 4.0)
+    assert math.isfinite(diagnosis.error_range(ran)[0])
+
+
+def test_the_report_is_written_in_letters_that_rerun_has(saved):
+    (said,) = column(saved, "/report", "TextDocument:text").explode()
+    assert said == "# Diagnosis\n\n    R'V of 0.1 m/s\n"
