@@ -23,7 +23,8 @@ from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
 QUIETER = (0.7, 0.5, 0.35, 0.25)
-FINER = (1.15, 1.03)  # steps of λ about the best one
+FINER = 1.08  # step of λ about the best one
+LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
 REST = 0.02  # of a number's size: it rests
@@ -210,34 +211,42 @@ class Trial:
         levels = self.levels(point, included)
         return max(levels, key=lambda level: level.value).louder
 
-    def levels(self, point: Point, included: Sequence[str] = ()) -> list[Level]:
+    def levels(
+        self, point: Point, included: Sequence[str] = (), near: float | None = None
+    ) -> list[Level]:
         """From the usual unrest upwards, until it is too much; below it, if that is better; and
-        finely about the best, since thousands of knots make λ sharp."""
+        finely about the best, since thousands of knots make λ sharp. `near`: about there only."""
         found: list[Level] = []
-        for louder in LOUDER:
-            found.append(self.level(point, louder, included))
-            if len(found) > 1 and found[-1].value < found[-2].value:
-                break
-        for quieter in QUIETER if len(found) == 2 else ():
-            found.append(self.level(point, quieter, included))
-            if found[-1].value < max(found[:-1], key=lambda level: level.value).value:
-                break
-        for apart in FINER:
-            best = max(found, key=lambda level: level.value)
-            sides = [self.level(point, best.louder * by, included) for by in (1.0 / apart, apart)]
-            found += sides
-            below, here, above = sides[0].value, best.value, sides[1].value
-            bend = below - 2.0 * here + above
-            if here >= max(below, above) and bend < 0.0:
-                top = best.louder * apart ** (0.5 * (below - above) / bend)
-                found.append(self.level(point, top, included))
+        if near is not None:
+            found.append(self.level(point, near, included))
+        else:
+            for louder in LOUDER:
+                found.append(self.level(point, louder, included))
+                if len(found) > 1 and found[-1].value < found[-2].value:
+                    break
+            for quieter in QUIETER if len(found) == 2 else ():
+                found.append(self.level(point, quieter, included))
+                if found[-1].value < max(level.value for level in found[:-1]):
+                    break
+        best = max(found, key=lambda level: level.value)
+        sides = [self.level(point, best.louder * by, included) for by in (1.0 / FINER, FINER)]
+        found += sides
+        below, here, above = sides[0].value, best.value, sides[1].value
+        bend = below - 2.0 * here + above
+        if bend < 0.0:  # the top of the parabola through them
+            off = np.clip(0.5 * (below - above) / bend, -2.0, 2.0)
+            found.append(self.level(point, best.louder * FINER**off, included))
         return found
 
     def scan(
-        self, point: Point, candidates: Sequence[Cause], included: Sequence[str] = ()
+        self,
+        point: Point,
+        candidates: Sequence[Cause],
+        included: Sequence[str] = (),
+        near: float | None = None,
     ) -> tuple[Found, list[Found]]:
         """The base hypothesis, and each candidate besides it, each at its own best λ."""
-        levels = self.levels(point, included)
+        levels = self.levels(point, included, near)
         best = max(levels, key=lambda level: level.value)
         # a cause that explains makes the unrest fall: every λ from the usual one to the base's
         found = []
@@ -286,12 +295,12 @@ class Trial:
     ) -> tuple[Point, Found]:
         """These causes together, linearised where they are until they rest."""
         by = {cause.label: cause for cause in self.reference.model.causes}
-        point, louder = None, 1.0
+        point, louder, near = None, 1.0, None
         for _ in range(ROUNDS):
             point = self.at(numbers, path, louder)
             path = point.path
-            base, _ = self.scan(point, (), included)
-            louder = base.louder
+            base, _ = self.scan(point, (), included, near)
+            louder = near = base.louder
             moved = {}
             for name in included:
                 low, high = by[name].bounds(self.reference.setting)
@@ -362,7 +371,7 @@ class Trial:
             best = max(
                 (
                     one
-                    for louder in sorted({1.0, base.louder})
+                    for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
                     for one in self._structure(family, weighed, before, point, included, louder)
                 ),
                 key=lambda f: f.evidence,

@@ -231,8 +231,8 @@ def test_voyages_of_another_ship_are_refused(sea, tmp_path):
 
 
 def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
-    """A model that nothing was fitted to, on voyages of that very season: what another fit would
-    absorb is not tested either. A hull alone compiles quickly."""
+    """A model that nothing was fitted to, on another voyage of that season: it has absorbed
+    nothing, so that all else is tested. A hull alone compiles quickly."""
     text = (resources.files("shiplog") / "profiles" / "esso-vectwin.toml").read_text("utf-8")
     begin = text.index("[sensors.wind]")
     profile = tmp_path / "calm.toml"
@@ -251,11 +251,9 @@ def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
     why = {one["name"]: one["reason"] for one in told["rejected"]}
     for name in ("wind_force", "wind_direction_offset", "wind_speed_scale"):
         assert "no wind is recorded" in why[name]
-    for name in ("fouling", "payload", "cross_flow_drag", "thrust_loss"):
-        assert "absorbs" in why[name]
     tested = {c.label for c in done.trial.reference.model.causes}
-    assert "current" in tested and "clock_offset:gnss" in tested
-    assert not tested & {"wind_force", "clock_offset:wind", "fouling", "payload"}
+    assert tested >= {"current", "clock_offset:gnss", "fouling", "payload"}
+    assert not tested & {"wind_force", "clock_offset:wind", "wind_speed_scale"}
     assert not any(one["name"] == "unknown:wind" for one in told["ranking"])
 
 
@@ -378,8 +376,8 @@ def test_masses_are_held_so_that_no_payload_eats_a_scale(sea, still):
     value = dict(zip(model.names, start.values, strict=True))
     g = model.geometry
     own = g.mass / (0.5 * g.density * g.length**2 * g.draught)
-    for name, least in (("body.m_x", own), ("body.m_y", own), ("body.i_j", 0.0)):
-        assert spread[name] <= 0.08 * (least + value[name])
+    for name in ("body.m_x", "body.m_y"):
+        assert spread[name] <= 0.08 * (own + value[name])
     trial, decision = still
     payload = next(c for c in sea.usual.model.causes if c.label == "payload")
     _, found = trial.scan(decision.first, [payload])

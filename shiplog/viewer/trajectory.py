@@ -208,19 +208,20 @@ def _send_moving_hull(
     zero = np.zeros(int(valid.sum()))
     half = heading[valid] / 2.0  # about Rerun's z, which points into the chart: clockwise
     path = entity("track", voyage, "now", whose)
-    recording.log(
+    time = display.column(rows, "time")[valid]
+    recording.send_columns(  # from the first instant on: before it a hull would lie at the origin
         path,
-        rr.LineStrips2D(
-            list(hulls(NORTHWARD, outline(drawn))),
-            colors=colour,
-            radii=rr.Radius.ui_points(1.5),
+        indexes=[rr.TimeColumn(style.TIMELINE, duration=time[:1])],
+        columns=rr.LineStrips2D.columns(
+            strips=list(hulls(NORTHWARD, outline(drawn))),
+            colors=[colour],
+            radii=-1.5,  # negative: points of the screen, as Radius.ui_points makes them
             draw_order=30.0,
         ),
-        static=True,
     )
     recording.send_columns(
         path,
-        indexes=[rr.TimeColumn(style.TIMELINE, duration=display.column(rows, "time")[valid])],
+        indexes=[rr.TimeColumn(style.TIMELINE, duration=time)],
         columns=rr.Transform3D.columns(
             translation=points[valid],
             quaternion=np.column_stack((zero, zero, np.sin(half), np.cos(half))),
