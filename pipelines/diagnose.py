@@ -51,6 +51,7 @@ log = logging.getLogger(__name__)
 LEAST_S = 240.0  # of unbroken record, below which nothing can be said
 PLACES = 12  # of a map of the bottom
 UNCOVERED = 0.5  # share of a window's seconds outside the training data
+REFUTED = 3  # times that the verdict is looked for again without what did not hold
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
 SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
@@ -120,10 +121,15 @@ def diagnose_run(
     )  # fmt: skip
     point = trial.begin(run.extension_numbers())
     pushed = _external(trial, point)
-    decision = diagnose.decide(trial, point)
     cut = _windows(run, store, names, profile)
     before = run.extended(run.config.seeds[0], trial.reference.model.constants, recorded)
-    after, found, decision, dropped = _gain(trial, decision, cut, before)
+    dropped: dict[str, str] = {}
+    for _ in range(REFUTED):  # what held-out voyages refute may have hidden what they do not
+        decision = diagnose.decide(trial, point, dropped)
+        after, found, decision, refuted = _gain(trial, decision, cut, before)
+        dropped |= refuted
+        if not refuted:
+            break
     verdict = _verdict(
         run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
         _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial, pushed,
@@ -132,7 +138,7 @@ def diagnose_run(
     done = Diagnosis(verdict, decision, trial, cut, before, after, out)
     _save(done, run, store, names, began)
     if extend is not None:
-        _extend(run, done, extend)
+        _extend(run, done, extend, cause_files)
     return done
 
 
@@ -356,7 +362,7 @@ def _verdict(
         run=run.name,
         before_effect=before_effect,
         causes=tuple(causes),
-        ranking=verdicts.ranking_json(decision),
+        ranking=verdicts.ranking_json(decision, said, dropped),
         rejected=tuple({"name": k.split(":")[0], "reason": why} for k, why in rejected.items()),
         traces=tuple(traces),
         structure=structure if said == "unknown" else None,
@@ -466,12 +472,12 @@ def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: 
         diagnosis_pictures.save(done, done.recording)
 
 
-def _extend(run: Run, done: Diagnosis, out: Path) -> None:
+def _extend(run: Run, done: Diagnosis, out: Path, cause_files: Sequence[Path]) -> None:
     """The named causes as a run of its own; none, and nothing is written."""
     if done.after is None or done.decision is None:
         log.info("nothing was named that a model can take in: %s is not written", out)
         return
-    runs.extend(run, out, done.after)
+    runs.extend(run, out, done.after, cause_files)
     log.info("extended model in %s", out)
 
 

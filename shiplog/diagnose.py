@@ -8,7 +8,7 @@ beats them all, is large enough to matter, and did not come out of a fit that fa
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -88,12 +88,17 @@ class Decision:
     remains: tuple[Found, ...] = field(default=())
 
 
-def decide(trial: Trial, point: Point) -> Decision:
-    """From a trial linearised as the model stands, with what it has of causes (`Trial.fixed`)."""
+def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision:
+    """From a trial linearised as the model stands, with what it has of causes (`Trial.fixed`).
+
+    banned   labels that held-out voyages have refuted already
+    """
     ref = trial.reference
     fixed = trial.fixed
-    catalogue = {c.label: c for c in ref.model.causes if c.label not in fixed}
+    known = {c.label: c for c in ref.model.causes if c.label not in fixed}
+    catalogue = {label: cause for label, cause in known.items() if label not in banned}
     first_point = point
+    trial.unrest = ref.unrest
     included: tuple[str, ...] = fixed
     base, found = trial.scan(point, tuple(catalogue.values()), included)
     nothing = base

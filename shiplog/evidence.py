@@ -96,7 +96,8 @@ def weighed(linear: Linear, noise: np.ndarray, columns: np.ndarray | None = None
 
 @dataclass(frozen=True)
 class Gram:
-    """[e | J]ᵀ C⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and log |C| of all."""
+    """[e | J]ᵀ C⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and log |C| of all, restricted to
+    what no start explains."""
 
     each: np.ndarray
     logdet: float

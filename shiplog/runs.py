@@ -35,6 +35,7 @@ from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog import config as configuration
+from shiplog import user_causes
 from shiplog.band import Band
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
@@ -124,7 +125,8 @@ class Run:
             return None
         told = json.loads(path.read_text("utf-8"))
         arrays = _arrays(self.path / "extension.safetensors")
-        return Extension.of(told, arrays)
+        own = user_causes.load(sorted(self.path.glob("extension-*.py")))
+        return Extension.of(told, arrays, own)
 
     def base(self) -> tuple[Any, Start, MMG, np.ndarray]:
         """What a diagnosis bends: the plain model, its coefficients, and an MMG of the ship whose

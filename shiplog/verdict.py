@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from shiplog.channels import VELOCITY
@@ -156,10 +156,14 @@ def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
     }  # fmt: skip
 
 
-def ranking_json(decision: Decision) -> tuple[dict, ...]:
-    """Causes of one name together, and what is none of them."""
+def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> tuple[dict, ...]:
+    """Causes of one name together, and what is none of them. What was refuted, or too small to be
+    named, counts for none: the probabilities go through the verdict's own gates."""
     of: dict[str, float] = {}
+    gated = {*dropped, *(n.cause.label for n in decision.traces)}
     for label, share in decision.ranking.items():
+        if label in gated or (verdict == "none" and not label.startswith("unknown:")):
+            label = "none"
         name = label if label.startswith("unknown:") else label.split(":")[0]
         of[name] = of.get(name, 0.0) + share
     kept = [(n, p) for n, p in of.items() if p >= SHARE_SAID]
