@@ -52,6 +52,7 @@ LEAST_S = 240.0  # of unbroken record, below which nothing can be said
 PLACES = 12  # of a map of the bottom
 UNCOVERED = 0.5  # share of a window's seconds outside the training data
 REFUTED = 3  # times that the verdict is looked for again without what did not hold
+WORTH = 0.02  # of the error, that each of several causes must take off held-out windows
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
 SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
@@ -229,17 +230,18 @@ def _gain(
 
     found = worth(decision)
     # a cause of the error makes it less; an instrument's fault is a fault whatever it is worth
-    while any(n.cause.kind != "sensor" for n in decision.named):
+    while any(not n.cause.only_read for n in decision.named):
         if found.real and len(decision.named) == 1:
             break
         tried = [
             (worth(rest), rest, one)
             for one in decision.named
-            if one.cause.kind != "sensor"
+            if not one.cause.only_read
             for rest in [diagnose.without(trial, decision, one)]
         ]
         best, rest, one = min(tried, key=lambda t: t[0].after)
-        if best.after >= found.after:
+        least = WORTH if len(decision.named) > 1 else 0.0
+        if best.after * (1.0 - least) >= found.after:
             break
         share = 1.0 - found.after / best.after
         dropped[one.cause.label] = f"no gain on held-out voyages ({share:+.1%})"

@@ -18,7 +18,7 @@ from shiplog.hypotheses import Found, Point, Pulses, Trial
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 LEAST = 8.0  # nats that the first cause must bring
-MORE = 18.0  # that each further one must: small evidence follows large ones about
+MORE = 25.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said

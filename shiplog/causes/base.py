@@ -89,7 +89,6 @@ class Cause:
     parameters: ClassVar[tuple[Parameter, ...]]
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     absorbed: ClassVar[bool] = False  # by any model that is fitted to the affected data
-    moves: ClassVar[bool] = True  # False where only a reading is wrong, not the motion
     user: ClassVar[bool] = False
 
     @property
@@ -106,6 +105,12 @@ class Cause:
         """Whether a ship may have some of it always: false where coefficients, or another cause,
         already stand for that."""
         return not self.absorbed
+
+    @property
+    def only_read(self) -> bool:
+        """Whether an instrument of the motion is at fault: a fault whatever knowing it is worth.
+        What the wind's instrument says drives the ship in the simulation."""
+        return self.kind == "sensor" and "wind" not in self.label
 
     @property
     def reads(self) -> bool:

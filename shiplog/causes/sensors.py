@@ -39,7 +39,6 @@ class YawRateBias(Cause):
     equation = "r_measured = r {value:+.3f} deg/s"
     parameters = (Parameter("value", "deg/s", np.radians(0.3), np.radians(0.01)),)
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
-    moves = False
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         seen = sighted(record)
@@ -57,7 +56,6 @@ class YawRateScale(Cause):
     equation = "r_measured = {value:.3f} r"
     parameters = (Parameter("value", "1", 0.065, 0.003, low=-0.9),)
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
-    moves = False
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         seen = sighted(record)
