@@ -363,9 +363,10 @@ def _verdict(
         said=verdicts.sentence(said, causes, structure, found, decision.louder),
         run=run.name,
         before_effect=before_effect,
+        made=_made(run, before_effect),
         causes=tuple(causes),
         ranking=verdicts.ranking_json(decision, said, dropped),
-        rejected=tuple({"name": k.split(":")[0], "reason": why} for k, why in rejected.items()),
+        rejected=verdicts.rejected_json(rejected),
         traces=tuple(traces),
         structure=structure if said == "unknown" else None,
         intervals=(*pushed, *uncovered),
@@ -443,6 +444,12 @@ def _pulses(trial: Trial, decision: Decision) -> list[dict]:
             else:
                 found.append({"voyage": name, "start_s": at, "end_s": at, "force_N": float(value)})
     return found
+
+
+def _made(run: Run, before_effect: bool) -> str:
+    if run.config.physical and not run.config.physics.fit:
+        return "of coefficients that were not fitted to these voyages"
+    return "on voyages before these" if before_effect else "on these very voyages"
 
 
 def _too_little(run: Run, recorded: Record, before_effect: bool, out: Path) -> Diagnosis:

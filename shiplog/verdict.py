@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shiplog.channels import VELOCITY
@@ -45,6 +45,7 @@ class Verdict:
     said: str
     run: str
     before_effect: bool
+    made: str = "on voyages before these"
     causes: tuple[dict, ...] = ()
     ranking: tuple[dict, ...] = ()
     rejected: tuple[dict, ...] = ()
@@ -218,6 +219,15 @@ def unseen_json(row: Dependence) -> dict:
     }  # fmt: skip
 
 
+def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
+    """Label → why not. Of a cause with several channels, the reason says which."""
+    found = []
+    for label, why in reasons.items():
+        name, _, channel = label.partition(":")
+        found.append({"name": name, "reason": f"{channel}: {why}" if channel else why})
+    return tuple(found)
+
+
 def remains(decision: Decision, verdict: str) -> list[str]:
     """What is left where something was named."""
     strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
@@ -232,9 +242,7 @@ def remains(decision: Decision, verdict: str) -> list[str]:
 def markdown(verdict: Verdict) -> str:
     """One page."""
     lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
-    lines += [f"Model: {verdict.run}, made on " + (
-        "voyages before these." if verdict.before_effect else "these very voyages."
-    ), ""]  # fmt: skip
+    lines += [f"Model: {verdict.run}, made {verdict.made}.", ""]
     for cause in verdict.causes:
         lines += [
             f"## {cause['name']} (probability {cause['probability']:.2f})", "",
