@@ -418,7 +418,8 @@ def test_a_case_goes_the_whole_way_once(tmp_path, stubs):
     steps = json.loads((folder / "steps.json").read_text())
     assert [step["step"] for step in steps] == ["logs", "ingest", "train", "diagnose"]
     assert all(step["wall_s"] > 0 and step["cpu_s"] > 0 for step in steps)
-    assert 1.0 < steps[-1]["peak_mb"] < 1000.0
+    # no upper bound: a forked child's peak begins at its parent's, here the whole test session's
+    assert steps[-1]["peak_mb"] > 1.0
     assert steps[-1]["stderr"] == "words on stderr\n"
 
     run.run(out, planned, stubs())
