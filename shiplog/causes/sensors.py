@@ -115,9 +115,6 @@ class ClockOffset(Cause):
             seen = replace(seen, yaw_rate=record.later(seen.yaw_rate, late))
         return reduced(record, seen)
 
-    def told(self, p: np.ndarray, covariance: np.ndarray, draws: int = 4000) -> dict:
-        return super().told(p, covariance, draws)
-
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         late = shown["time"].value
         what = {"gnss": "position and velocity", "yaw_rate": "the yaw rate"}.get(
