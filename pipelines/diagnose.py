@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import torch
 
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
@@ -32,7 +33,7 @@ from shiplog import (
 )  # fmt: skip
 from shiplog import verdict as verdicts
 from shiplog.causes import Cause, Setting
-from shiplog.diagnose import Decision
+from shiplog.diagnose import Decision, Named
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.gain import Gain, gain, parts
@@ -123,7 +124,7 @@ def diagnose_run(
     point = trial.begin(run.extension_numbers())
     pushed = _external(trial, point)
     cut = _windows(run, store, names, profile)
-    before = run.extended(run.config.seeds[0], trial.reference.model.constants, recorded)
+    before = run.extended(run.config.seeds[0], recorded)
     dropped: dict[str, str] = {}
     for _ in range(REFUTED):  # what held-out voyages refute may have hidden what they do not
         decision = diagnose.decide(trial, point, dropped)
@@ -167,10 +168,16 @@ def _trial(
     usual = nominal if nominal is not None else recorded
     setting = _setting(run, usual, recorded)
     given = run.config.physical and not run.config.physics.fit
-    every: tuple[Cause, ...] = (*catalogue.CATALOGUE, *user_causes.load(cause_files))
+    extension = run.extension
+    held = {} if extension is None else {c.label: c for c in extension.causes}
+    others = (*catalogue.CATALOGUE, *user_causes.load(cause_files))
+    every: list[Cause] = [*held.values(), *(c for c in others if c.label not in held)]
     untested: dict[str, str] = {}
     chosen = []
     for cause in every:
+        if cause.label in held:  # it is in the model, testable here or not
+            chosen.append(cause)
+            continue
         missing = cause.missing(setting)
         if missing is None and nominal is None and cause.absorbed and not given:
             missing = "a model fitted to these voyages absorbs it"
@@ -181,13 +188,15 @@ def _trial(
     constants: dict[str, np.ndarray] = {}
     for cause in chosen:
         constants |= cause.constants(setting)
+    if extension is not None:
+        constants |= extension.constants
     base, start, stand_in, values = run.base()
     model = Extended(base, tuple(chosen), stand_in, values, constants)
     if nominal is not None:
         known = reference.learn(model, setting, start, nominal)
     else:
         known = reference.assume(model, setting, start, recorded, given=given)
-    return Trial(known, recorded, tuple(run.extension_numbers())), untested
+    return Trial(known, recorded, tuple(held)), untested
 
 
 def _setting(run: Run, usual: Record, recorded: Record) -> Setting:
@@ -251,7 +260,7 @@ def _gain(
         return None, None, decision, dropped
     after = before.with_causes(
         [n.cause for n in named], {n.cause.label: n.numbers for n in named},
-        {n.cause.label: n.covariance for n in named},
+        {n.cause.label: n.covariance for n in named}, _constants(trial, named),
     )  # fmt: skip
     return after, found, decision, dropped
 
@@ -264,15 +273,23 @@ def held_out(
     states = np.empty(tuple(cut.state.shape))
     for left, rows in _folds(cut):
         numbers = _without(trial, decision, left)
-        simulator = before.with_causes([n.cause for n in decision.named], numbers, None)
+        simulator = before.with_causes(
+            [n.cause for n in decision.named], numbers, None, _constants(trial, decision.named)
+        )
         states[rows.numpy()] = simulator.states(cut.pick(rows), simulator.theta)
     return states
 
 
+def _constants(trial: Trial, named: Sequence[Named]) -> dict[str, np.ndarray]:
+    """What the named causes' forces need, and no more: it is kept with an extended run."""
+    needed: dict[str, np.ndarray] = {}
+    for one in named:
+        needed |= one.cause.constants(trial.reference.setting)
+    return needed
+
+
 def _folds(cut: Windows):
     """(what is left out of the fit, window rows): whole voyages, or the halves of one alone."""
-    import torch
-
     names = cut.plan["voyage"].to_list()
     known = list(dict.fromkeys(names))
     if len(known) > 1:
@@ -337,7 +354,7 @@ def _verdict(
 ) -> Verdict:  # fmt: skip
     causes = [verdicts.cause_json(n) for n in decision.named]
     if decision.pulses is not None:
-        share = decision.ranking.get(diagnose.PULSES, 0.95)
+        share = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
         causes.append(verdicts.pulses_json(decision, _pulses(trial, decision), share))
     structure = verdicts.structure_json(decision, run.profile.actuator_names)
     said = "named" if causes else decision.verdict
@@ -419,9 +436,9 @@ def _unseen(trial: Trial, decision: Decision) -> list[dict]:
 
 
 def _pulses(trial: Trial, decision: Decision) -> list[dict]:
-    """When the unrecorded thruster worked: voyage, start_s, end_s, force_N."""
+    """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
     assert decision.pulses is not None
-    force = trial.pulse_force(decision.point, decision.base, decision.pulses)
+    force, sd = trial.pulse_force(decision.point, decision.base, decision.pulses)
     rows = trial.rows
     found: list[dict] = []
     strongest = float(np.quantile(np.abs(force), 0.98))
@@ -440,9 +457,13 @@ def _pulses(trial: Trial, decision: Decision) -> list[dict]:
             if joined:
                 assert last is not None
                 last["end_s"] = at
-                last["force_N"] = max(last["force_N"], float(value), key=abs)
+                if abs(value) > abs(last["force_N"]):
+                    last |= {"force_N": float(value), "sd_N": float(sd[i, k])}
             else:
-                found.append({"voyage": name, "start_s": at, "end_s": at, "force_N": float(value)})
+                found.append(
+                    {"voyage": name, "start_s": at, "end_s": at, "force_N": float(value),
+                     "sd_N": float(sd[i, k])}
+                )  # fmt: skip
     return found
 
 

@@ -143,7 +143,7 @@ def _acceleration(model, theta, state, driven, wind):
 def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
-    force = trial.pulse_force(decision.point, decision.base, decision.pulses)
+    force, _ = trial.pulse_force(decision.point, decision.base, decision.pulses)
     apart = round(KNOT / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
     whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force

@@ -24,7 +24,7 @@ UNKNOWN = 60.0  # nats that it must bring where no cause is named
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
 LOUD = 1.4  # times the usual unrest, from which on it is asked where it comes from
 PULSED = 40.0  # nats that pulses must bring beyond louder unrest
-TEMPERATURE = 3.0  # nats: calibrates probabilities
+TEMPERATURE = 3.0  # nats: a guess, until the blind cases have calibrated it
 ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 SETTLED = 3  # contenders that are linearised again
@@ -127,6 +127,9 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
         stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
         if not ranking:
             ranking = _ranked(settled, found, remains, base, wanted, stochastic)
+            if pulses is not None:
+                sure = odds(pulses.gain, PULSED)
+                ranking = {PULSES: sure} | {k: (1.0 - sure) * v for k, v in ranking.items()}
         best = settled[0] if settled else None
         gain = best[1].evidence - base.evidence if best else -math.inf
         if strongest and strongest.evidence > max(UNKNOWN, gain + FLEXIBLE):
@@ -241,6 +244,11 @@ def _ranked(settled, found, remains, base, wanted, stochastic) -> dict[str, floa
     return {names[i]: float(share[i]) for i in order}
 
 
+def odds(gain: float, wanted: float) -> float:
+    """Probability of what brings so many nats where so many are wanted."""
+    return 1.0 / (1.0 + math.exp(min((wanted - gain) / TEMPERATURE, 50.0)))
+
+
 def _structure(trial: Trial, point: Point, found: Found) -> Structure:
     acts = trial.acts_on(point, found)
     return Structure(found.name, found.evidence, acts)
@@ -277,8 +285,8 @@ def _named(trial, included, fixed, base, steps, ranking) -> tuple[Named, ...]:
             continue
         gain, alike = steps[label]
         first = len(found) == 0
-        odds = 1.0 / (1.0 + math.exp(min((MORE - gain) / TEMPERATURE, 50.0)))
-        probability = ranking.get(label, odds) if first else odds
+        sure = odds(gain, MORE)
+        probability = ranking.get(label, sure) if first else sure
         found.append(
             Named(
                 cause, gain, probability, np.asarray(base.numbers[label]),

@@ -168,12 +168,15 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> U
     return unrest
 
 
-def starts_and_knots(linear: Linear, d: np.ndarray, unrest: Unrest) -> np.ndarray:
-    """Expected z [S, Z] of every segment, the numbers d [C] given."""
+def starts_and_knots(
+    linear: Linear, d: np.ndarray, unrest: Unrest
+) -> tuple[np.ndarray, np.ndarray]:
+    """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
     count, size = len(linear.e), linear.z.shape[-1]
     left = (linear.e - linear.j @ d).reshape(count, -1, 1)
     weight = np.where(linear.cut.used, unrest.noise**-2.0, 0.0).reshape(count, -1, 1)
     prior, _ = unrest.precision((size - 6) // 3)
     z = linear.z.reshape(count, -1, size)
     zt = np.swapaxes(z * weight, 1, 2)
-    return np.linalg.solve(zt @ z + prior, zt @ left)[..., 0]
+    covariance = np.linalg.inv(zt @ z + prior)
+    return (covariance @ (zt @ left))[..., 0], covariance

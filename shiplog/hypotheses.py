@@ -34,7 +34,8 @@ REST = 0.02  # of a number's size: it rests
 class Found:
     """One hypothesis.
 
-    evidence   log marginal likelihood, nats above `nothing but louder unrest`
+    evidence   log marginal likelihood [nats]: of a candidate and of a structure, above the base
+               hypothesis it stands beside; of a base hypothesis itself, as it is
     louder     λ at which it is best
     numbers    of each cause in it, as a change from what is usual, with their covariance
     """
@@ -248,8 +249,7 @@ class Trial:
         """The base hypothesis, and each candidate besides it, each at its own best λ."""
         levels = self.levels(point, included, near)
         best = max(levels, key=lambda level: level.value)
-        # a cause that explains makes the unrest fall: every λ from the usual one to the base's
-        found = []
+        found = []  # a cause that explains makes the unrest fall: each λ is tried
         for cause in candidates:
             tried = [self._with(level, cause.label) for level in levels]
             found.append(max(tried, key=lambda f: f.evidence))
@@ -464,17 +464,23 @@ class Trial:
         assert best is not None
         return best
 
-    def pulse_force(self, point: Point, base: Found, pulses: Pulses) -> np.ndarray:
-        """[S, J] force of the unrecorded thruster at the knots [N], as far as the data tell."""
+    def pulse_force(
+        self, point: Point, base: Found, pulses: Pulses
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
         d = self.solved(point, base)
         unrest = self.unrest.louder(base.louder)
-        z = evidence.starts_and_knots(point.linear, d, unrest)
+        z, covariance = evidence.starts_and_knots(point.linear, d, unrest)
         knots = self.grid.knots
         kernel = unrest.kernel(knots)
         pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
         share = pulse @ np.linalg.inv(kernel)
         pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
-        return pushed[:, 1] / pulses.unit[1]
+        sway = slice(knots, 2 * knots)
+        left = (pulse - share @ pulse)[sway, sway]
+        known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
+        variance = np.diagonal(known + left, axis1=1, axis2=2)
+        return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
 
 
 @dataclass(frozen=True)

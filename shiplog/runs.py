@@ -21,7 +21,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -158,12 +158,11 @@ class Run:
     def extended(
         self,
         seed: int,
-        constants: Mapping[str, Any] | None = None,
         record: Record | None = None,
     ) -> ExtendedSimulator:
         """The run's model, with its extension if it has one, ready to take in causes.
 
-        constants   what further causes need; record: the campaign they are found in
+        record   the campaign in which further ones are found
         """
         held = self.extension
         own = self.simulator(seed) if self.config.physical else None
@@ -172,7 +171,7 @@ class Run:
             base = network.compiled(self.model(seed))
         theta = start.values if own is None else own.theta
         covariance = np.zeros((len(theta),) * 2) if own is None else own.covariance
-        model = Extended(base if own is None else own.model, (), stand_in, values, constants or {})
+        model = Extended(base if own is None else own.model, (), stand_in, values, {})
         shares, lengths = campaign(record) if record is not None else ({}, {})
         plain = ExtendedSimulator(model, theta, covariance, self.profile, shares, lengths)
         if held is None:

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from shiplog import segments
-from shiplog.evidence import Unrest
+from shiplog.evidence import Unrest, starts_and_knots
 from shiplog.record import Record
 from shiplog.segments import KNOT, Linear
 
@@ -55,12 +55,8 @@ def posterior(linear: Linear, d: np.ndarray, unrest: Unrest, record: Record) -> 
     """
     count, size = len(linear.e), linear.z.shape[-1]
     knots = (size - 6) // 3
-    weight = np.where(linear.cut.used, unrest.noise**-2.0, 0.0).reshape(count, -1)
-    flat = linear.z.reshape(count, -1, size)
-    scaled = np.swapaxes(flat * weight[..., None], 1, 2)
-    left = (linear.e - linear.j @ d).reshape(count, -1, 1)
-    covariance = np.linalg.inv(scaled @ flat + unrest.precision(knots)[0])
-    mean = (covariance @ (scaled @ left))[:, 6:, 0]
+    z, covariance = starts_and_knots(linear, d, unrest)
+    mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
     rows = linear.cut.rows[:, None] + round(KNOT / record.step) * np.arange(knots)
     return Unexplained(

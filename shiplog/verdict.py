@@ -13,6 +13,7 @@ from shiplog.gain import Gain
 from shiplog.unseen import Dependence
 
 SHARE_SAID = 0.01  # of a ranking
+NINETY = 1.645  # standard deviations to either end of a 90 % interval
 
 
 @dataclass(frozen=True)
@@ -125,11 +126,15 @@ def equation(named: Named) -> str:
 
 
 def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
-    """The thruster that nobody records."""
+    """The thruster that nobody records. `times`: voyage, start_s, end_s, force_N, sd_N."""
     found = decision.pulses
     assert found is not None
-    peak = max((abs(t["force_N"]) for t in times), default=found.force)
-    size = {"value": peak, "low": 0.7 * peak, "high": 1.3 * peak, "unit": "N"}
+    strongest = max(times, key=lambda t: abs(t["force_N"]), default=None)
+    peak, sd = (found.force, found.force) if strongest is None else (
+        abs(strongest["force_N"]), strongest["sd_N"],
+    )  # fmt: skip
+    low, high = max(peak - NINETY * sd, 0.0), peak + NINETY * sd
+    size = {"value": peak, "low": low, "high": high, "unit": "N"}
     where = "ahead of" if found.lever >= 0.0 else "abaft"
     return {
         "name": PULSES,

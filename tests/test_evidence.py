@@ -123,7 +123,7 @@ def test_columns_may_be_others():
 def test_start_and_knots_are_the_posterior_mean(unrest):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
-    found = evidence.starts_and_knots(given, d, unrest)
+    found, _ = evidence.starts_and_knots(given, d, unrest)
     kernel = covariance(unrest, 3)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
