@@ -3,6 +3,8 @@
     python -m pipelines.extrapolation trials FRT-DS-ESSO --out extrapolation [--seeds 5]
     python -m pipelines.extrapolation samples --out extrapolation
 
+With `--without network` the physics alone, in minutes instead of hours.
+
 `trials`: the published 3 m Esso Osaka trials (NAOE-5thLab, CC BY-NC 4.0, not shipped). Published
 and identified physics on Wakita's split and over five folds of whole files; then, with equal
 data, physics, hybrid and the paper's network learn from two random manoeuvres and meet two others
@@ -40,7 +42,7 @@ EPOCHS = 10_000
 PICTURE = ("turn_14-Oct-2020_15_06_53", "zigzag_31-Jul-2020_13_42_53")
 
 
-def trials(folder: Path, out: Path, seeds: int) -> str:
+def trials(folder: Path, out: Path, seeds: int, network: bool = True) -> str:
     """The published trials: three tables in Markdown, and a recording of unseen manoeuvres."""
     store = trials_store(folder, out)
     every = tuple(n for n in store.select() if n != TWIN)
@@ -62,13 +64,8 @@ def trials(folder: Path, out: Path, seeds: int) -> str:
     runs = [published] + [
         physics(store, out / f"equal-{model}", EQUAL, model) for model in ("mmg", "hybrid")
     ]
-    network = out / "equal-paper"
-    if not network.exists():
-        config = {"recipe": "paper", "seeds": tuple(range(seeds)), "split": EQUAL}
-        train_run(
-            Config.model_validate(config | {"paper": {"most_epochs": EPOCHS}}), store, network
-        )
-    runs.append(network)
+    if network:
+        runs.append(paper(store, out / "equal-paper", seeds))
     unseen = tuple(n for n in every if n.startswith(("turn", "zigzag")))
     lines += [
         "Equal data (two random voyages): other random voyages, and manoeuvres never seen:", "",
@@ -80,13 +77,13 @@ def trials(folder: Path, out: Path, seeds: int) -> str:
     return "\n".join(lines)
 
 
-def samples(out: Path) -> str:
+def samples(out: Path, network: bool = True) -> str:
     """The sample logs: the test voyages' winds are outside of what voyages 1 and 2 met."""
     store = Store(out / "samples")
     ingest_logs(sorted(sample_logs().glob("voyage_*.mcap")), None, store)
     split = choose_split(store, (), (), "ref", 100)
     runs = []
-    for model in ("feedforward", "mmg", "hybrid"):
+    for model in ("feedforward", "mmg", "hybrid")[0 if network else 1 :]:
         path = out / f"samples-{model}"
         runs.append(path)
         if path.exists():
@@ -106,6 +103,14 @@ def physics(store: Store, path: Path, split: Split, model: str = "mmg", fit: boo
     if not path.exists():
         config = Config.model_validate({"model": model, "split": split, "physics": {"fit": fit}})
         identify_run(config, store, path)
+    return path
+
+
+def paper(store: Store, path: Path, seeds: int) -> Path:
+    """A run of the paper's network on equal data, made unless it is there."""
+    if not path.exists():
+        config = {"recipe": "paper", "seeds": tuple(range(seeds)), "split": EQUAL}
+        train_run(Config.model_validate(config | {"paper": {"most_epochs": EPOCHS}}), store, path)
     return path
 
 
@@ -152,14 +157,16 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--without", choices=("network",))
     arguments = parser.parse_args()
+    network = arguments.without != "network"
     logging.basicConfig(format="%(message)s", level=logging.INFO)
     if arguments.what == "samples":
-        print(samples(arguments.out))
+        print(samples(arguments.out, network))
     elif arguments.folder is None:
         parser.error("trials needs the folder of FRT-DS-ESSO")
     else:
-        print(trials(arguments.folder, arguments.out, arguments.seeds))
+        print(trials(arguments.folder, arguments.out, arguments.seeds, network))
 
 
 if __name__ == "__main__":

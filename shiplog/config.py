@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -60,6 +60,8 @@ class Physics(Section):
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
     substeps: int = Field(default=1, ge=1)  # Euler steps within each measured one
     folds: int = Field(default=5, ge=2)
+    # on the plausible spreads, for the ridge; to choose from on validation voyages
+    ridges: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
     width: int = Field(default=8, gt=0)  # of the hybrid's residual network
     strengths: tuple[float, ...] = (0.1, 0.3, 1.0)  # of it, to choose from on held-out voyages
 

@@ -68,3 +68,26 @@ def cross_validate(
     for held, (simulated, unsure) in zip(parts, results, strict=True):
         states[held], own[held] = simulated[held], unsure[held]
     return CrossValidated(np.array(list(groups)), states, own, state_losses(states, data))
+
+
+def as_good(judged: dict[float, np.ndarray]) -> list[float]:
+    """Which settings are not worse than the best by more than chance; none where fewer than two
+    windows can be judged.
+
+    judged   setting → L of each window that it has not seen [N], infinite where that ran away
+
+    One standard error (Breiman et al. 1984) of paired windows. A setting that lets more windows
+    run away than another is no choice; windows that every choice loses say nothing.
+    """
+    lost = {one: int((~np.isfinite(loss)).sum()) for one, loss in judged.items()}
+    able = [one for one in judged if lost[one] == min(lost.values())]
+    kept = np.isfinite(np.stack([judged[one] for one in able])).all(0)
+    if kept.sum() < 2:
+        return []
+    losses = {one: judged[one][kept] for one in able}
+    best = min(losses, key=lambda one: float(losses[one].mean()))
+    worse = {one: loss - losses[best] for one, loss in losses.items()}
+    return [
+        one for one, more in worse.items()
+        if more.mean() <= more.std(ddof=1) / np.sqrt(len(more))
+    ]  # fmt: skip

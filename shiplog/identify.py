@@ -60,6 +60,7 @@ def identify(
     bounds: tuple[np.ndarray, np.ndarray] | None = None,
     free: np.ndarray | None = None,
     begin: np.ndarray | None = None,
+    factor: float = 1.0,
     most: int = MOST_EVALUATIONS,
     rounds: int = ROUNDS,
 ) -> Identified:
@@ -69,26 +70,29 @@ def identify(
     bounds          [P], [P]  physical range
     free            [P]  which may move; all
     begin           [P]  where to begin, if not at `start`
+    factor          on the spreads in the ridge: 2 holds a quarter as firmly; what is plausible,
+                    and so what an untouched parameter's standard error is, stays `spread`
     most, rounds    evaluations a round; rounds of weighing the ridge by the noise left over
 
     Raises ModelError where the windows run away from the start, and from what shorter ones give.
     """
     free = (np.ones(len(start), dtype=bool) if free is None else free) & (spread > 0.0)
+    held = factor * spread
     values = np.array(start if begin is None else begin, dtype=float)
     endless = np.full(len(start), np.inf)
     low, high = bounds if bounds is not None else (-endless, endless)
     weight = data.weight
     before = _used(losses(model, np.array(start, dtype=float), data), weight)
     if not np.isfinite(_used(losses(model, values, data), weight)).all():
-        values = _from_short_windows(model, start, spread, data, (low, high), free, values)
+        values = _from_short_windows(model, start, held, data, (low, high), free, values)
     samples = 3.0 * float((weight * data.dt.sum(1)).sum())
     loss = float(weight @ _used(losses(model, values, data), weight))
     noise = max(CORRELATION * loss / samples, TINY)
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
-        problem = _Problem(model, start, spread, data, free, noise)
-        guess = (values - start)[free] / spread[free]
-        side = [(b - start)[free] / spread[free] for b in (low, high)]
+        problem = _Problem(model, start, held, data, free, noise)
+        guess = (values - start)[free] / held[free]
+        side = [(b - start)[free] / held[free] for b in (low, high)]
         inside = np.clip(guess, side[0] + 1e-9, side[1] - 1e-9)
         done = least_squares(
             problem.residual,
@@ -114,7 +118,7 @@ def identify(
     total = weight.sum()
     return Identified(
         values=values,
-        covariance=covariance(model, values, spread, data, free, noise),
+        covariance=covariance(model, values, spread, data, free, noise, factor),
         free=free,
         noise=noise,
         loss=(float(weight @ before / total), float(weight @ after / total)),
@@ -239,21 +243,26 @@ def covariance(
     data: Series,
     free: np.ndarray,
     noise: float,
+    factor: float = 1.0,
 ) -> np.ndarray:
     """[P, P] of the estimate: the ridge's and the data's information, with each window one
-    observation of its own gradient (the sandwich of Huber 1967 and White 1980, shrunk)."""
+    observation of its own gradient (the sandwich of Huber 1967 and White 1980, shrunk).
+
+    A ridge of another firmness (`factor`) moves the estimate, and not how far from the truth the
+    starting values plausibly are: that stays `spread`."""
     found = normal(model, values, data, _indices(free))
     scale = spread[free]
-    information = found.gram * np.outer(scale, scale) / noise + np.eye(len(scale))
+    told = found.gram * np.outer(scale, scale) / noise  # by the data
+    firm = np.eye(len(scale)) / factor**2  # the ridge
+    information = told + firm
     pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
     # Few windows say little about how their gradients vary: the expected scatter counts as much
     # more windows as there are parameters that the data determine.
-    expected = information - np.eye(len(scale))
-    determined = float(np.trace(expected @ inverse))
+    determined = float(np.trace(told @ inverse))
     count = float(data.weight.sum())
-    scatter = (count * pulls.T @ pulls + determined * expected) / (count + determined)
-    meat = count / max(count - 1.0, 1.0) * scatter + np.eye(len(scale))
+    scatter = (count * pulls.T @ pulls + determined * told) / (count + determined)
+    meat = count / max(count - 1.0, 1.0) * scatter + firm @ firm
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))
     whole[np.ix_(free, free)] = sandwich * np.outer(scale, scale)

@@ -8,6 +8,7 @@ import numpy as np
 
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.coverage import independent_distance
+from shiplog.crossvalidation import as_good
 from shiplog.identify import Identified, identify
 from shiplog.models.hybrid import Hybrid, Residual, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG
@@ -87,15 +88,6 @@ def choose(judged: dict[float, np.ndarray]) -> float:
     judged   strength → L of each held-out window [N]; strength 0 is the physics alone, and the
              answer where fewer than two windows can be judged
 
-    The one-standard-error rule (Breiman et al. 1984) on paired windows.
+    The one-standard-error rule on paired windows.
     """
-    kept = np.isfinite(np.stack(list(judged.values()))).all(0)
-    if kept.sum() < 2:
-        return 0.0  # nothing to judge by
-    losses = {strength: loss[kept] for strength, loss in judged.items()}
-    winner = min(losses, key=lambda s: float(losses[s].mean()))
-    for strength in sorted(losses):
-        worse = losses[strength] - losses[winner]
-        if worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)):
-            return strength
-    return winner
+    return min(as_good(judged), default=0.0)

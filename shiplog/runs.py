@@ -1,6 +1,7 @@
 """Run folders: a model, one dataset, all its seeds. The only module that writes them.
 
-    <run>/config.toml  provenance.json      every resolved value; versions, hashes, times
+    <run>/config.toml  provenance.json      every resolved value; versions, hashes, times, and what
+                                            held-out voyages chose
     <run>/profile.json                      the ship the run is of
     <run>/windows.parquet                     which windows it learned from
     <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from

@@ -143,17 +143,19 @@ def test_it_may_begin_elsewhere_and_the_ridge_still_holds_to_the_start(exact):
     assert elsewhere.values[2] == pytest.approx(START[2], abs=1e-6)
 
 
-@pytest.mark.parametrize("tight", [0.002, 0.02])
-def test_the_ridge_holds_as_firmly_as_the_closed_form_says(tight):
-    """|r₀ + J s x|²/σ² + |x|² is least at x = -(sJᵀJs/σ² + 1)⁻¹ sJᵀr₀/σ²; σ² of the start."""
-    spread = np.array([tight, 3 * tight, tight])
+@pytest.mark.parametrize(("tight", "factor"), [(0.002, 1.0), (0.02, 1.0), (0.004, 0.5)])
+def test_the_ridge_holds_as_firmly_as_the_closed_form_says(tight, factor):
+    """|r₀ + J s x|²/σ² + |x|² is least at x = -(sJᵀJs/σ² + 1)⁻¹ sJᵀr₀/σ²; σ² of the start.
+
+    s is the spread in the ridge, `factor` times the plausible one."""
+    spread = factor * np.array([tight, 3 * tight, tight])
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=2)
     start = np.array([0.05, 0.03, 0.0])
     at = sensitivity.normal(Straight(), start, data)
     noise = CORRELATION * at.loss.sum() / (3 * COUNT * (SIZE - 1.0))
     gram = at.gram * np.outer(spread, spread) / noise
     wanted = -np.linalg.solve(gram + np.eye(3), at.pull.sum(0) * spread / noise)
-    held = identify(Straight(), start, spread, data, rounds=1)
+    held = identify(Straight(), start, spread / factor, data, factor=factor, rounds=1)
     assert (held.values - start) / spread == pytest.approx(wanted, rel=1e-3, abs=1e-4)
     assert np.abs(wanted).max() > 0.1
 
@@ -323,15 +325,24 @@ def test_standard_errors_cover_white_noise():
     assert np.abs(np.mean(z, axis=0)).max() < 0.8  # and no bias to speak of
 
 
-@pytest.mark.parametrize("weight", [1.0, 2.0])
-def test_the_covariance_is_the_closed_form_of_one_window(weight):
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_a_ridge_of_any_firmness_knows_no_more_of_what_no_data_touch(exact, factor):
+    """How far from the truth a start may be is its plausible spread, however it is held."""
+    done = identify(Boat(), START, WIDE, exact, factor=factor)
+    assert done.values[2] == START[2]
+    assert done.standard_error[2] == pytest.approx(WIDE[2])
+
+
+@pytest.mark.parametrize(("weight", "factor"), [(1.0, 1.0), (2.0, 1.0), (1.0, 0.5), (1.0, 3.0)])
+def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
     """u_k = u₀ + push Σ n dt. With J the sum, in the loss's cm/s and trapezoidal seconds:
-    s² (w S + 1) / (w s²JᵀJ/σ² + 1)², S between the gradient's square and what is expected of it."""
+    s² (w S + 1/f⁴) / (w s²JᵀJ/σ² + 1/f²)², S between the gradient's square and what is expected
+    of it, f how many times the plausible spread s the ridge allows."""
     whole = measured(Straight(), (0.02, -0.01, 0.005), driven(2))
     data = noisy(sensitivity.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
     free, spread = np.array([True, False, False]), np.array([0.03, 1.0, 1.0])
     start = np.array([0.05, -0.01, 0.005])
-    done = identify(Straight(), start, spread, data, free=free, rounds=1)
+    done = identify(Straight(), start, spread, data, free=free, factor=factor, rounds=1)
     trapezoid = np.ones(SIZE)
     trapezoid[[0, -1]] = 0.5
     slope = np.concatenate(([0.0], np.cumsum(data.actuator[0, :-1, 0])))
@@ -345,11 +356,11 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight):
     rest += (trapezoid[:, None] * others**2).sum()
     assert done.loss[1] == pytest.approx(rest)
     assert noise == pytest.approx(30.0 * rest / (3.0 * 39.0))  # three channels, 39 s
-    bread = weight * s**2 * gram / noise + 1.0
-    expected = bread - 1.0
+    expected = weight * s**2 * gram / noise
+    bread = expected + 1.0 / factor**2
     told = expected / bread  # of one number: how much the data determine it
     scatter = (weight * weight * (s * pull / noise) ** 2 + told * expected) / (weight + told)
-    meat = weight * scatter + 1.0  # n/(n - 1), its divisor held at 1
+    meat = weight * scatter + 1.0 / factor**4  # n/(n - 1), its divisor held at 1
     assert done.covariance[0, 0] == pytest.approx(s**2 * meat / bread**2, rel=1e-9)
 
 

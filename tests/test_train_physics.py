@@ -16,7 +16,8 @@ from test_cli import call
 from pipelines import known_ship
 from pipelines.identify import identify_run
 from pipelines.split import choose_physical_split
-from shiplog import runs
+from shiplog import identify as identification
+from shiplog import ridge, runs
 from shiplog.config import Config, Split
 from shiplog.exceptions import RunError
 from shiplog.ingest import ingest
@@ -230,6 +231,74 @@ def test_a_validation_voyage_is_where_the_band_comes_from(store, tmp_path):
     assert loaded.config.split.validation == ("trip_2",)
     assert loaded.training()["voyage"].unique().to_list() == ["trip_1"]
     assert loaded.band() is not None
+
+
+# ---------------------------------------------------------------- how firm the ridge is
+
+
+@pytest.fixture(scope="module")
+def validated(store):
+    """Learned from one voyage, validated on another: run folder and text."""
+    out = store.parent / "validated"
+    code, said, _ = train(store, out, "--model", "mmg", "--voyages", "trip_1", "--validation",
+                          "trip_2", "--free", "hull.*", *HULL)  # fmt: skip
+    assert code == 0
+    return out, said
+
+
+def test_validation_voyages_choose_the_ridge_and_it_is_kept(validated):
+    run, said = validated
+    (line,) = [s for s in said.splitlines() if s.startswith("Ridge of ")]
+    assert "3 validation windows" in line
+    chosen = answer(run / "provenance.json")["chosen"]["ridge"]
+    assert list(chosen["held_out_loss"]) == ["0.25", "0.5", "1", "2", "4", "8"]
+    assert f"{chosen['value']:g}" in chosen["held_out_loss"]
+    assert f"L {chosen['held_out_loss']['1']:.0f}" in line or "with the plausible ones" in line
+
+
+def test_without_validation_voyages_the_ridge_is_the_plausible_one(fitted):
+    run, said, content = fitted
+    assert answer(run / "provenance.json")["chosen"] == {
+        "ridge": {"value": 1.0, "held_out_loss": {}}
+    }
+    assert "Ridge of" not in said and not any("Ridge" in s for s in content["notes"])
+
+
+def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
+    """Made to choose a quarter, it is the identification with a quarter of every spread, and so
+    are the fits without each voyage."""
+    monkeypatch.setattr(ridge, "choose", lambda judged: 0.25)
+    asked = []
+    plain = identification.identify
+
+    def heard(*given, **named):
+        asked.append((named["factor"], named["begin"] is None))
+        return plain(*given, **named)
+
+    monkeypatch.setattr(identification, "identify", heard)
+    run = tmp_path / "firm"
+    code, said, _ = train(store, run, "--model", "mmg", *BOTH, "--validation", "trip_3",
+                          "--free", "hull.*", *HULL)  # fmt: skip
+    assert code == 0 and "Ridge of 0.25 times the plausible spreads, chosen on 3" in said
+    assert answer(run / "provenance.json")["chosen"]["ridge"]["value"] == 0.25
+    assert [factor for factor, _ in asked[:6]] == [1.0, 2.0, 4.0, 8.0, 0.5, 0.25]
+    assert asked[6:] == [(0.25, True)] * 2  # a fold begins at the start: it knows nothing of all
+    found, loose = runs.load(run).identified(), runs.load(validated[0]).identified()
+    away = (pl.col("value") - pl.col("start")).abs() / pl.col("spread")
+    moved = found.filter("free").select(away.mean()).item()
+    assert 0.0 < moved < loose.filter("free").select(away.mean()).item()
+
+
+def test_a_validation_voyage_without_a_window_is_refused(logs, tmp_path):
+    short = known_ship.sail(20.0, seed=9, wind=known_ship.Wind(3.0, 9))
+    begun = datetime(2026, 5, 2, 10, 0, tzinfo=UTC)
+    (tmp_path / "logs").mkdir()
+    known_ship.write_voyage(tmp_path / "logs" / "short.mcap", short, seed=9, start=begun)
+    shutil.copy(logs / "trip_1.mcap", tmp_path / "logs")
+    assert call("ingest", tmp_path / "logs", "--store", tmp_path / "store")[0] == 0
+    code, _, said = train(tmp_path / "store", tmp_path / "r", "--model", "mmg", "--voyages",
+                          "trip_1", "--validation", "short", *HULL)  # fmt: skip
+    assert code == 1 and "No window of 25 s in short" in said and "--window" in said
 
 
 # ---------------------------------------------------------------- what is refused

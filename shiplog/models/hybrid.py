@@ -55,6 +55,12 @@ class Residual:
         }
 
     @property
+    def fixed(self) -> dict[str, np.ndarray]:
+        """All but the width, as a run folder keeps it."""
+        names = ("mean", "std", "bound", "anchors", "radius", "limit")
+        return {name: np.asarray(getattr(self, name)) for name in names}
+
+    @property
     def count(self) -> int:
         return sum(int(np.prod(shape)) for shape in self.shapes.values())
 
