@@ -22,6 +22,7 @@ from shiplog import (
     external,
     record,
     reference,
+    remembered,
     runs,
     segments,
     table,
@@ -41,7 +42,9 @@ from shiplog.hypotheses import Point, Trial
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.record import Record
+from shiplog.reference import Start
 from shiplog.runs import Run
+from shiplog.segments import Linear
 from shiplog.sensitivity import series
 from shiplog.store import Store
 from shiplog.verdict import Interval, Verdict
@@ -66,6 +69,7 @@ class Diagnosis:
     verdict: Verdict
     decision: Decision | None
     trial: Trial | None
+    whole: Linear | None  # as the model stood, on overlapping segments
     windows: Windows | None
     before: ExtendedSimulator | None
     after: ExtendedSimulator | None
@@ -122,7 +126,8 @@ def diagnose_run(
         trial.reference.kappa,
     )  # fmt: skip
     point = trial.begin(run.extension_numbers())
-    pushed = _external(trial, point)
+    whole = trial.covering(point)
+    pushed = _external(trial, point, whole)
     cut = _windows(run, store, names, profile)
     before = run.extended(run.config.seeds[0], recorded)
     dropped: dict[str, str] = {}
@@ -135,9 +140,9 @@ def diagnose_run(
     verdict = _verdict(
         run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
         _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial, pushed,
-        _wrong(trial, before, cut, profile), _unseen(trial, decision),
+        _wrong(trial, before, cut, profile), _unseen(trial, decision, whole),
     )  # fmt: skip
-    done = Diagnosis(verdict, decision, trial, cut, before, after, out)
+    done = Diagnosis(verdict, decision, trial, whole, cut, before, after, out)
     _save(done, run, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
@@ -170,33 +175,45 @@ def _trial(
     given = run.config.physical and not run.config.physics.fit
     extension = run.extension
     held = {} if extension is None else {c.label: c for c in extension.causes}
-    others = (*catalogue.CATALOGUE, *user_causes.load(cause_files))
-    every: list[Cause] = [*held.values(), *(c for c in others if c.label not in held)]
+    own = [c for c in catalogue.CATALOGUE if c.label not in held]
+    others = [c for c in user_causes.load(cause_files) if c.label not in held]
     untested: dict[str, str] = {}
-    chosen = []
-    for cause in every:
-        if cause.label in held:  # it is in the model, testable here or not
-            chosen.append(cause)
-            continue
-        missing = cause.missing(setting)
-        if missing is None and nominal is None and cause.absorbed and not given:
-            missing = "a model fitted to these voyages absorbs it"
+    chosen = list(held.values())  # they are in the model, testable here or not
+    for cause in (*own, *others):
+        missing = _missing(cause, setting, absorbed=nominal is None and not given)
         if missing is not None:
             untested[cause.label] = missing
         else:
             chosen.append(cause.on(setting))
-    constants: dict[str, np.ndarray] = {}
-    for cause in chosen:
-        constants |= cause.constants(setting)
-    if extension is not None:
-        constants |= extension.constants
-    base, start, stand_in, values = run.base()
-    model = Extended(base, tuple(chosen), stand_in, values, constants)
-    if nominal is not None:
-        known = reference.learn(model, setting, start, nominal)
-    else:
+    model, start = _model(run, chosen, setting)
+    if nominal is None:
         known = reference.assume(model, setting, start, recorded, given=given)
+        return Trial(known, recorded, tuple(held)), untested
+    # where the nominal voyages settle depends on them alone, so that it can be kept
+    before = _setting(run, nominal, nominal)
+    testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
+    at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
+    known = reference.learn(model, setting, start, nominal, at)
     return Trial(known, recorded, tuple(held)), untested
+
+
+def _missing(cause: Cause, setting: Setting, absorbed: bool) -> str | None:
+    """Why a cause cannot be tested."""
+    missing = cause.missing(setting)
+    if missing is None and absorbed and cause.absorbed:
+        return "a model fitted to these voyages absorbs it"
+    return missing
+
+
+def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
+    """The run's model with room for these causes, and where its coefficients stand."""
+    base, start, stand_in, values = run.base()
+    constants: dict[str, np.ndarray] = {}
+    for cause in causes:
+        constants |= cause.constants(setting)
+    if run.extension is not None:
+        constants |= run.extension.constants
+    return Extended(base, tuple(causes), stand_in, values, constants), start
 
 
 def _setting(run: Run, usual: Record, recorded: Record) -> Setting:
@@ -394,10 +411,9 @@ def _verdict(
     )
 
 
-def _external(trial: Trial, point: Point) -> list[Interval]:
+def _external(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
     """Stretches that no force of the ship explains; no hypothesis is judged on them."""
     ref = trial.reference
-    whole = trial.over(unexplained.covering(trial.record), point.numbers)
     base, _ = trial.scan(point, (), trial.fixed)
     found = external.find(
         whole, trial.solved(point, base), trial.unrest.louder(base.louder), trial.record,
@@ -424,10 +440,10 @@ def _wrong(trial: Trial, before: ExtendedSimulator, cut: Windows | None, profile
     return [c.as_json() for c in wrong.explain(error, series(cut), plan_, profile).channels]
 
 
-def _unseen(trial: Trial, decision: Decision) -> list[dict]:
+def _unseen(trial: Trial, decision: Decision, whole: Linear) -> list[dict]:
     """What the model cannot see and the residual depends on."""
     found = unexplained.posterior(
-        decision.first.linear, trial.solved(decision.first, decision.nothing),
+        whole, trial.solved(decision.first, decision.nothing),
         trial.unrest.louder(decision.nothing.louder), trial.record,
     )  # fmt: skip
     knots = unexplained.table(found, trial.record)
@@ -481,7 +497,7 @@ def _too_little(run: Run, recorded: Record, before_effect: bool, out: Path) -> D
         "more, with turns both ways, a stop, and runs on several headings."
     )
     verdict = Verdict("coverage", said, run.name, before_effect)
-    done = Diagnosis(verdict, None, None, None, None, None, out)
+    done = Diagnosis(verdict, None, None, None, None, None, None, out)
     _write(done)
     return done
 

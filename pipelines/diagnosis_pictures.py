@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 
 import jax
@@ -22,12 +21,11 @@ from shiplog.hypotheses import Trial
 from shiplog.models.mmg import body
 from shiplog.record import Record
 from shiplog.reference import corrected
-from shiplog.segments import KNOT
+from shiplog.segments import KNOT, Linear
 from shiplog.sensitivity import series
-from shiplog.unexplained import Unexplained, around
+from shiplog.unexplained import around
 from shiplog.windows import Windows
 
-HALF = 8  # knots: half a segment
 FARTHEST = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
 
 
@@ -38,10 +36,10 @@ def save(done: Diagnosis, path: Path) -> None:
 
 def exhibit(done: Diagnosis) -> Exhibit:
     """Of a diagnosis that came to a decision."""
-    trial, decision = done.trial, done.decision
-    assert trial is not None and decision is not None
+    trial, decision, whole = done.trial, done.decision, done.whole
+    assert trial is not None and decision is not None and whole is not None
     profile = trial.record.profile
-    residual, named = _residual(trial, decision)
+    residual, named = _residual(trial, decision, whole)
     tracks, errors = _before_and_after(done)
     return Exhibit(
         title=f"{profile.ship.name}: {listed(trial.record.names, most=3)}",
@@ -70,10 +68,13 @@ def _measured(record: Record) -> pl.DataFrame:
 # --- forces ---------------------------------------------------------------------------------------
 
 
-def _residual(trial: Trial, decision: Decision) -> tuple[pl.DataFrame, tuple[str, ...]]:
+def _residual(
+    trial: Trial, decision: Decision, whole: Linear
+) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
     ref, record = trial.reference, trial.record
-    found = _unexplained(trial, decision)
+    usual, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
+    found = unexplained.posterior(whole, usual, unrest, record)
     keep = unexplained.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
@@ -99,23 +100,6 @@ def _residual(trial: Trial, decision: Decision) -> tuple[pl.DataFrame, tuple[str
     return pl.concat(tables), tuple(names)
 
 
-def _unexplained(trial: Trial, decision: Decision) -> Unexplained:
-    """What the model as it was made leaves, on the trial's segments and on others half a segment
-    on: a segment knows little of its ends, where what is left is drawn towards nothing."""
-    ref, record = trial.reference, trial.record
-    rows = trial.rows + HALF * round(KNOT / record.step)
-    rows = rows[rows + trial.grid.rows <= record.lasts[trial.rows]]
-    linears = [decision.first.linear]
-    if len(rows):
-        linears.append(trial.over(rows, decision.first.numbers))
-    unrest = trial.unrest.louder(decision.nothing.louder)
-    usual = ref.mean * ref.columns.unit
-    found = [unexplained.posterior(linear, usual, unrest, record) for linear in linears]
-    return Unexplained(
-        *(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Unexplained))
-    )
-
-
 def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     """ν̇ [n, 3] that the named causes add where the ship was: a wrong instrument adds none."""
     ref = trial.reference
@@ -127,7 +111,7 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     def acceleration(numbers: dict[str, np.ndarray]) -> np.ndarray:
         theta = usual.copy()
         theta[ref.columns.base :] += ref.columns.numbers(numbers)
-        was = corrected(ref.model.causes, trial.record, ref.columns, numbers)
+        was = corrected(ref.model.causes, trial.record, numbers)
         driven = np.concatenate((was.actuator, was.share[:, None]), 1)
         state, driven, wind = (around(was, v, rows) for v in (was.state, driven, was.true_wind))
         return np.asarray(_acceleration(ref.model, theta, state, driven, wind))

@@ -15,7 +15,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from shiplog import report
+from shiplog import cache, report
 from shiplog.exceptions import ShiplogError
 
 app = typer.Typer(
@@ -46,9 +46,8 @@ STORE = Path("store")
 def main() -> None:
     """Entry point: a fault of the input is a message and exit code 1, never a traceback."""
     # What JAX compiled for one ship serves every later command: some ten seconds each.
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog" / "jax"
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.folder() / "jax"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)

@@ -10,7 +10,6 @@ eliminated segment by segment; what is left of all data is one small matrix over
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -102,10 +101,6 @@ class Gram:
     each: np.ndarray
     logdet: float
 
-    @cached_property
-    def total(self) -> np.ndarray:
-        return self.each.sum(0)
-
     def scaled(self, unit: np.ndarray) -> Gram:
         """Of numbers in these units [C]: matrices of numbers that differ by 1e6 do not invert."""
         by = np.concatenate(([1.0], unit))
@@ -120,6 +115,15 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
     solved = np.linalg.solve(root, weighed.zd)
     each = weighed.dd - np.swapaxes(solved, 1, 2) @ solved
     return Gram(each, _volume(weighed, prior, logdet, root))
+
+
+def total(weighed: Weighed, unrest: Unrest, weight: np.ndarray) -> np.ndarray:
+    """[1 + C, 1 + C] sum of `gram`'s matrices, weighted [S], without making each of them."""
+    prior, _ = unrest.precision(weighed.knots)
+    root = np.linalg.cholesky(weighed.zz + prior)
+    solved = np.linalg.solve(root, weighed.zd) * np.sqrt(weight)[:, None, None]
+    flat = solved.reshape(-1, solved.shape[-1])
+    return np.tensordot(weight, weighed.dd, 1) - flat.T @ flat
 
 
 def log_volume(weighed: Weighed, unrest: Unrest) -> float:

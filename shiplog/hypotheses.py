@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from shiplog import evidence, segments, structure
+from shiplog import evidence, segments, structure, unexplained
 from shiplog.causes import Cause
-from shiplog.evidence import Gram, Weighed
+from shiplog.evidence import Weighed
 from shiplog.models.mmg import body
 from shiplog.record import Record
 from shiplog.reference import HELD, Reference, read
@@ -124,13 +124,16 @@ class Trial:
         base, _ = self.scan(point, (), self.fixed)
         return self.at(numbers, point.path, base.louder)
 
-    def over(self, rows: np.ndarray, numbers: Mapping[str, np.ndarray]) -> Linear:
-        """The same for segments that begin at other rows, around paths of their own."""
+    def covering(self, point: Point) -> Linear:
+        """The point's segments and those between them: what is left, known as well everywhere."""
         ref = self.reference
-        cut, moved, shown = read(ref.model, ref.setting, self.record, rows, dict(numbers))
-        whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
+        rows = np.setdiff1d(unexplained.covering(self.record), self.rows)
+        numbers = dict(point.numbers)
+        cut, moved, shown = read(ref.model, ref.setting, self.record, rows, numbers)
+        whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
         path = segments.pulled(ref.model, whole, cut, self.grid, ref.wide)
-        return segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        between = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        return point.linear.beside(between)
 
     def robust(self, point: Point) -> None:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
@@ -145,10 +148,8 @@ class Trial:
 
     # --- algebra ---
 
-    def gram(self, point: Point, louder: float) -> Gram:
-        ref = self.reference
-        found = evidence.gram(point.weighed, self.unrest.louder(louder)).scaled(ref.columns.unit)
-        return Gram(found.each * self.weight[:, None, None], self.volume(louder))
+    def total(self, weighed: Weighed, louder: float) -> np.ndarray:
+        return evidence.total(weighed, self.unrest.louder(louder), self.weight)
 
     def volume(self, louder: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
@@ -164,9 +165,10 @@ class Trial:
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: what is usual, and the included causes free."""
         ref = self.reference
-        gram = self.gram(point, louder)
+        by = np.concatenate(([1.0], ref.columns.unit))
+        total = self.total(point.weighed, louder) * np.outer(by, by)
         return self._solved(
-            gram.total, gram.logdet, louder, point, included, ref.information, ref.pull
+            total, self.volume(louder), louder, point, included, ref.information, ref.pull
         )
 
     def _solved(self, total, logdet, louder, point, included, information, pull) -> Level:
@@ -337,7 +339,7 @@ class Trial:
         features = basis.features(here)
         columns = structure.columns(point.linear, features, ref.unrest.push)
         weighed = evidence.weighed(point.linear, self.unrest.noise, columns)
-        total = (evidence.gram(weighed, self.unrest).each * self.weight[:, None, None]).sum(0)
+        total = self.total(weighed, 1.0)
         weights = np.linalg.solve(
             total[1:, 1:] + np.eye(len(total) - 1) / structure.SIZES[1] ** 2, total[1:, 0]
         )
@@ -365,9 +367,8 @@ class Trial:
             if usual is not None and ref.nominal is not None and family != "time":
                 added = structure.columns(ref.nominal, basis.features(usual), ref.unrest.push)
                 joined = np.concatenate((ref.nominal.j, added), -1)
-                before = evidence.gram(
-                    evidence.weighed(ref.nominal, ref.unrest.noise, joined), ref.unrest
-                ).total
+                weighed_then = evidence.weighed(ref.nominal, ref.unrest.noise, joined)
+                before = evidence.total(weighed_then, ref.unrest, np.ones(len(joined)))
             best = max(
                 (
                     one
@@ -384,9 +385,8 @@ class Trial:
         ref = self.reference
         unit = ref.columns.unit
         count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
-        gram = evidence.gram(weighed, self.unrest.louder(louder))
         volume = self.volume(louder)
-        whole = (gram.each * self.weight[:, None, None]).sum(0)
+        whole = self.total(weighed, louder)
         for size in structure.SIZES:
             by = np.concatenate(([1.0], unit, np.full(more, size)))
             total = whole * np.outer(by, by)
@@ -415,8 +415,7 @@ class Trial:
             return held, np.concatenate((ref.pull, np.zeros(more)))
         seen = before * np.outer(by, by) / ref.kappa
         sure = np.diag(np.concatenate((ref.columns.known, np.ones(more))))
-        prior = np.concatenate((ref.prior, np.zeros(more)))
-        return seen[1:, 1:] + sure, seen[1:, 0] + prior
+        return seen[1:, 1:] + sure, seen[1:, 0]
 
     def solved(self, point: Point, base: Found) -> np.ndarray:
         """[C] numbers around the point, under a hypothesis of that point: what is usual of the

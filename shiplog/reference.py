@@ -8,7 +8,7 @@ it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from shiplog import evidence, segments
 from shiplog.causes import Cause, Setting
-from shiplog.evidence import Gram, Unrest
+from shiplog.evidence import Unrest
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
 from shiplog.record import Record
@@ -90,7 +90,7 @@ class Columns:
 class Reference:
     """θ that all is linearised about, and what the nominal campaign says around it.
 
-    information  [C, C]  and pull [C], in units of `columns.unit`, prior included, κ applied
+    information  [C, C]  and pull [C], in units of `columns.unit`, κ applied
     nominal      None where the model was made on the very data that are diagnosed
     """
 
@@ -102,10 +102,8 @@ class Reference:
     wide: Wide
     information: np.ndarray
     pull: np.ndarray
-    prior: np.ndarray  # [C] the pull of what was known before any data
     kappa: float
     nominal: Linear | None
-    grams: Gram | None
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -148,50 +146,81 @@ def wide_of(setting: Setting) -> Wide:
     )  # fmt: skip
 
 
-def learn(
-    model: Extended,
-    setting: Setting,
-    start: Start,
-    record: Record,
-    kappa: float | None = None,
-    rounds: int = ROUNDS,
-) -> Reference:
-    """From the nominal campaign. κ is chosen on its own voyages unless given; without rounds the
-    coefficients stay where they are."""
+@dataclass(frozen=True)
+class Settled:
+    """Where a campaign is linearised, and how unrestful it is there.
+
+    theta  [P] coefficients; path of each segment; unrest
+    """
+
+    theta: np.ndarray
+    path: Path
+    unrest: Unrest
+
+
+def settled(
+    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS
+) -> Settled:
+    """Coefficients moved to where they are linearised, all causes' numbers beside them; without
+    rounds they stay where they are."""
     columns = columns_of(model, setting, start)
     wide, g = wide_of(setting), segments.grid(record)
-    rows = segments.begins(record)
-    cut, moved, shown = read(model, setting, record, rows)
+    cut, moved, shown = read(model, setting, record, segments.begins(record))
     base, unit = columns.base, columns.unit
     theta = np.clip(start.values, start.low, start.high)
     unrest = Unrest(wide.noise, 0.04 * wide.push, UNREST_TIME, wide.start)
     path: Path | None = None
     hold = wide
-    prior = np.zeros(len(unit))  # about wherever the coefficients stand
     for round_ in range(rounds + 1):
         whole = np.concatenate((theta, np.zeros(len(unit) - base)))
         path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
-        for again in range(3):
-            grams = evidence.gram(evidence.weighed(linear, unrest.noise), unrest).scaled(unit)
-            found = np.linalg.solve(
-                grams.total[1:, 1:] + np.diag(columns.known), grams.total[1:, 0] + prior
-            )
-            if again < 2:
-                unrest = evidence.learnt(linear, found * unit, unrest, rounds=4)
+        for _ in range(2):
+            unrest = evidence.learnt(linear, _solved(linear, unrest, columns), unrest, rounds=4)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
-        far = float(np.abs(found[:base]).max(initial=0.0))
+        found = _solved(linear, unrest, columns)[:base]
+        far = float(np.abs(found / unit[:base]).max(initial=0.0))
         if round_ == rounds or far < NEAR:
             break
-        moved_to = theta + found[:base] * unit[:base] * min(1.0, FARTHEST / far)
+        moved_to = theta + found * min(1.0, FARTHEST / far)
         edge = 1e-6 * (start.high - start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         theta = np.clip(moved_to, start.low + edge, start.high - edge)
-    chosen = kappa or inflation(grams.each, linear.cut.voyage, prior, columns.known)
-    information = grams.total[1:, 1:] / chosen + np.diag(columns.known)
+    assert path is not None
+    return Settled(theta, path, unrest)
+
+
+def _solved(linear: Linear, unrest: Unrest, columns: Columns) -> np.ndarray:
+    """[C] numbers that the campaign itself and what was known of them ask for."""
+    unit, by = columns.unit, np.concatenate(([1.0], columns.unit))
+    total = evidence.total(evidence.weighed(linear, unrest.noise), unrest, np.ones(len(linear.e)))
+    total *= np.outer(by, by)
+    return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0]) * unit
+
+
+def learn(
+    model: Extended,
+    setting: Setting,
+    start: Start,
+    record: Record,
+    at: Settled | None = None,
+    kappa: float | None = None,
+) -> Reference:
+    """From the nominal campaign, linearised `at` where it settles. κ is chosen on its own voyages
+    unless given."""
+    at = at or settled(model, setting, start, record)
+    columns = columns_of(model, setting, start)
+    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    unit = columns.unit
+    whole = np.concatenate((at.theta, np.zeros(len(unit) - columns.base)))
+    linear = segments.linear(model, whole, cut, segments.grid(record), at.path, moved, shown)
+    grams = evidence.gram(evidence.weighed(linear, at.unrest.noise), at.unrest).scaled(unit)
+    chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known)
+    total = grams.each.sum(0)
+    information = total[1:, 1:] / chosen + np.diag(columns.known)
     return Reference(
-        model, setting, theta, columns, unrest, wide, information,
-        grams.total[1:, 0] / chosen + prior, prior, chosen, linear, grams,
+        model, setting, at.theta, columns, at.unrest, wide_of(setting), information,
+        total[1:, 0] / chosen, chosen, linear,
     )  # fmt: skip
 
 
@@ -200,10 +229,10 @@ def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
     return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
 
 
-def inflation(each: np.ndarray, voyage: np.ndarray, prior: np.ndarray, known: np.ndarray) -> float:
+def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray) -> float:
     """κ that predicts each voyage best from the others; never less than is usual.
 
-    each [S, 1 + C, 1 + C], voyage [S], prior and its information [C]: all in units
+    each [S, 1 + C, 1 + C], voyage [S], `known` [C] before any data: all in units
     """
     names = np.unique(voyage)
     if len(names) < 3:
@@ -216,7 +245,7 @@ def inflation(each: np.ndarray, voyage: np.ndarray, prior: np.ndarray, known: np
         for left in of.values():
             rest = total - left
             before = rest[1:, 1:] / kappa + np.diag(known)
-            score += marginal(left, before, rest[1:, 0] / kappa + prior)
+            score += marginal(left, before, rest[1:, 0] / kappa)
         said.append(score)
     return max(USUAL_KAPPA, KAPPAS[int(np.argmax(said))])
 
@@ -233,9 +262,7 @@ def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> flo
 # --- what causes read otherwise -------------------------------------------------------------------
 
 
-def corrected(
-    causes: Sequence[Cause], record: Record, columns: Columns, numbers: dict[str, np.ndarray]
-) -> Record:
+def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
     """The record as those causes' numbers have it, in the catalogue's order."""
     for cause in causes:
         values = numbers.get(cause.label)
@@ -259,7 +286,7 @@ def read(
     given = numbers or {}
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
-    base = segments.cut(corrected(model.causes, record, columns, given), rows)
+    base = segments.cut(corrected(model.causes, record, given), rows)
     count = len(columns.unit)
     if known is None:
         moved = np.zeros((*base.driven.shape, count))
@@ -274,9 +301,7 @@ def read(
             step = np.zeros(cause.count)
             step[i] = STEP * sizes[cause.label][i]
             more, less = (
-                segments.cut(
-                    corrected(model.causes, record, columns, given | {cause.label: here + s}), rows
-                )
+                segments.cut(corrected(model.causes, record, given | {cause.label: here + s}), rows)
                 for s in (step, -step)
             )
             moved[..., column] = (more.driven - less.driven) / (2.0 * step[i])
@@ -308,16 +333,12 @@ def assume(
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
-        whole = learn(model, setting, start, record, kappa=USUAL_KAPPA, rounds=0)
-    else:
-        whole = learn(model, setting, start, record, kappa=USUAL_KAPPA)
+    at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
+    whole = learn(model, setting, start, record, at, kappa=USUAL_KAPPA)
     unit = whole.columns.unit
     information = np.diag(whole.columns.known.copy())
-    prior = np.zeros(len(unit))
     base = whole.columns.base
     causes = slice(base, len(unit))
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD
-    return replace(
-        whole, information=information, pull=prior, prior=prior, nominal=None, grams=None
-    )
+    return replace(whole, information=information, pull=np.zeros(len(unit)), nominal=None)

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog import variational
 from shiplog.record import Record
 from shiplog.sensitivity import Physical, rate
 
@@ -27,6 +28,7 @@ BIN = 2.0  # s that one observation averages
 KNOT = 2.0  # s between knots of the acceleration
 NODE_ROWS = 2  # rows of the record to a step of the integration
 CHUNK = 64  # segments at a time
+PER_SEGMENT = ("rows", "y", "used", "driven", "voyage")  # of a Cut
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,7 @@ def _path(model, theta, start, push, driven, step):
 def _slopes(model, theta, states, driven, coefficients):
     """∂ν̇ by state [S, K, 3, 6], by what drives [S, K, 3, D] and by θ [S, K, 3, P or 0]."""
     by = (0, 1, 2) if coefficients else (0, 1)
+    none = jnp.zeros((*states.shape[:2], 3, 0))
 
     def one(state, now, values):
         return model.acceleration(values, state, now[:-2], now[-2:])
@@ -148,68 +151,7 @@ def _slopes(model, theta, states, driven, coefficients):
         return jax.jacrev(one, argnums=by)(state, now, theta)
 
     found = jax.vmap(jax.vmap(each))(states, driven)
-    return found if coefficients else (*found, None)
-
-
-@partial(jax.jit, static_argnames=("bins", "coefficients"))
-def _linear(model, theta, start, push, driven, moved, hats, step, bins, coefficients):
-    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P + Q)]: start, knots, θ, what drives.
-
-    moved   [S, K, D, Q]  how what drives changes with each of Q numbers
-    """
-    states = _path(model, theta, start, push, driven, step)
-    by_state, by_driven, by_theta = _slopes(model, theta, states, driven, coefficients)
-    count, nodes = states.shape[:2]
-    knots = hats.shape[1]
-    per = (nodes - 1) // bins
-
-    def forcing(k):
-        """[S, 3, C] of node k."""
-        hat = jnp.zeros((3, 3 * knots))
-        for channel in range(3):
-            hat = hat.at[channel, channel * knots : (channel + 1) * knots].set(hats[k])
-        parts = [jnp.zeros((count, 3, 6)), jnp.broadcast_to(hat, (count, 3, 3 * knots))]
-        if coefficients:
-            parts.append(by_theta[:, k])
-            parts.append(jnp.einsum("sad,sdq->saq", by_driven[:, k], moved[:, k]))
-        return jnp.concatenate(parts, -1)
-
-    def slope(k, now):
-        """d(columns)/dt [S, 6, C]."""
-        state = states[:, k]
-        c, s = jnp.cos(state[:, 4, None]), jnp.sin(state[:, 4, None])
-        u, v = state[:, 1, None], state[:, 3, None]
-        du, dv, dpsi, dr = (now[:, i] for i in (1, 3, 4, 5))
-        motion = by_state[:, k] @ now + forcing(k)
-        return jnp.stack(
-            (
-                c * du - s * dv - (s * u + c * v) * dpsi, motion[:, 0],
-                s * du + c * dv + (c * u - s * v) * dpsi, motion[:, 1],
-                dr, motion[:, 2],
-            ), 1,
-        )  # fmt: skip
-
-    width = 6 + 3 * knots + (by_theta.shape[-1] + moved.shape[-1] if coefficients else 0)
-    first = jnp.broadcast_to(jnp.eye(6, width), (count, 6, width))
-
-    def within(i, carry):
-        now, before, total, at = carry
-        change = slope(at, now)
-        after = now + step * _ab2(change, before, at == 0)
-        return after, change, total + 0.5 * (now + after), at + 1
-
-    def bin_(carry, _):
-        now, before, at = carry
-        now, before, total, at = jax.lax.fori_loop(
-            0, per, within, (now, before, jnp.zeros_like(now), at)
-        )
-        return (now, before, at), total / per
-
-    _, columns = jax.lax.scan(bin_, (first, jnp.zeros_like(first), 0), None, length=bins)
-    whole = states.reshape(count, nodes, 6)
-    pairs = 0.5 * (whole[:, 1:] + whole[:, :-1])
-    y = pairs.reshape(count, bins, per, 6).mean(2)
-    return y, jnp.moveaxis(columns, 0, 1)
+    return found if coefficients else (*found, none)
 
 
 # --- in numpy: one record, in flat memory ---------------------------------------------------------
@@ -245,10 +187,20 @@ class Linear:
         """Some of the segments."""
         chosen = replace(
             self.cut,
-            **{n: getattr(self.cut, n)[keep] for n in ("rows", "y", "used", "driven", "voyage")},
+            **{n: getattr(self.cut, n)[keep] for n in PER_SEGMENT},
         )
         path = Path(self.path.start[keep], self.path.push[keep])
         return Linear(chosen, path, self.e[keep], self.z[keep], self.j[keep])
+
+    def beside(self, other: Linear) -> Linear:
+        """These segments and others of the same record."""
+        cut = replace(self.cut, **{n: _both(self.cut, other.cut, n) for n in PER_SEGMENT})
+        path = Path(*(_both(self.path, other.path, n) for n in ("start", "push")))
+        return Linear(cut, path, *(_both(self, other, n) for n in ("e", "z", "j")))
+
+
+def _both(one: object, other: object, name: str) -> np.ndarray:
+    return np.concatenate((getattr(one, name), getattr(other, name)))
 
 
 @dataclass(frozen=True)
@@ -335,8 +287,8 @@ def linear(
     y, columns = _run(model, theta, segments, path, g, moved)
     size = 6 + 3 * g.knots
     read = moved.shape[-1]
-    z, j = columns[..., :size], columns[..., size : size + len(theta)].copy()
-    j[..., len(theta) - read :] += columns[..., size + len(theta) :] - shown
+    z, j = columns[..., :size].copy(), columns[..., size:].copy()
+    j[..., len(theta) - read :] -= shown
     at = np.concatenate(
         (np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1
     )  # the start is free: its own value is its mean
@@ -345,10 +297,12 @@ def linear(
 
 
 def _run(model, theta, segments, path, g, moved=None):
-    """Chunk by chunk, padded: one compilation serves all."""
-    hats = g.weights
-    coefficients = moved is not None
+    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ.
+
+    Chunk by chunk, padded: one compilation serves all.
+    """
     push = path.at_nodes(g)
+    per = (g.nodes - 1) // g.bins
     ys, columns = [], []
     for at in range(0, len(segments), CHUNK):
         part = slice(at, at + CHUNK)
@@ -360,12 +314,21 @@ def _run(model, theta, segments, path, g, moved=None):
             return np.concatenate((values, np.repeat(values[-1:], lack, axis=0)))
 
         driven = filled(segments.driven[part])
-        how = filled(moved[part]) if moved is not None else np.zeros((CHUNK, *driven.shape[1:], 0))
-        y, c = _linear(
-            model, theta, filled(path.start[part]), filled(push[part]), driven, how, hats,
-            segments.step, g.bins, coefficients,
-        )  # fmt: skip
-        keep = CHUNK - lack
-        ys.append(np.asarray(y)[:keep])
-        columns.append(np.asarray(c)[:keep])
+        states = _path(
+            model, theta, filled(path.start[part]), filled(push[part]), driven, segments.step
+        )
+        keep = slice(CHUNK - lack)
+        by_state, by_driven, by_theta = (
+            np.asarray(found)[keep]
+            for found in _slopes(model, theta, states, driven, moved is not None)
+        )
+        states = np.asarray(states)[keep]
+        how = moved[part] if moved is not None else np.zeros((*driven[keep].shape, 0))
+        pairs = 0.5 * (states[:, 1:] + states[:, :-1])
+        ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
+        columns.append(
+            variational.columns(
+                states, by_state, by_driven, by_theta, how, g.weights, segments.step, g.bins
+            )
+        )
     return np.concatenate(ys), np.concatenate(columns)

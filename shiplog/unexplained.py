@@ -16,6 +16,7 @@ from shiplog.evidence import Unrest, starts_and_knots
 from shiplog.record import Record
 from shiplog.segments import KNOT, Linear
 
+HALF = 8  # knots: half a segment
 ACCELERATIONS = ("surge_acceleration", "sway_acceleration", "yaw_acceleration")
 
 
@@ -37,15 +38,19 @@ class Unexplained:
 
 
 def covering(record: Record) -> np.ndarray:
-    """Rows at which segments begin so that each stretch is covered to its end.
+    """Rows at which segments begin so that each stretch is covered twice and to its end.
 
-    `segments.begins` leaves up to a segment at the end unread, which evidence can spare; whoever
-    looks for an event cannot. The last segment of a stretch overlaps the one before it.
+    A segment knows little of its own ends, where what is left is drawn towards nothing, and
+    `segments.begins` leaves up to a segment at the end of a stretch unread. Evidence can spare
+    that; whoever looks for an event cannot.
     """
     size = segments.grid(record).rows
+    begins = segments.begins(record)
+    between = begins + HALF * round(KNOT / record.step)
+    between = between[between + size <= record.lasts[begins]]
     ends = np.append(np.flatnonzero(record.starts)[1:], len(record)) - 1 - size
     lasts = ends[(ends >= 0) & (record.firsts[np.maximum(ends, 0)] == record.firsts[ends + size])]
-    return np.unique(np.concatenate((segments.begins(record), lasts)))
+    return np.unique(np.concatenate((begins, between, lasts)))
 
 
 def posterior(linear: Linear, d: np.ndarray, unrest: Unrest, record: Record) -> Unexplained:

@@ -94,7 +94,7 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
     found, wanted = [], []
     for unrest in (sure, sure.louder(3.0)):
         gram = evidence.gram(evidence.weighed(given, NOISE), unrest)
-        found.append(-0.5 * (towards @ gram.total @ towards + gram.logdet))
+        found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
         every = dense(given, unrest)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
     assert abs(wanted[1] - wanted[0]) > 10.0
@@ -107,7 +107,7 @@ def test_units_scale_columns_and_not_the_error():
     unit = np.array([1e-3, 40.0])
     bent = replace(given, j=given.j * unit)
     direct = evidence.gram(evidence.weighed(bent, NOISE), UNREST)
-    assert found.scaled(unit).total == pytest.approx(direct.total, rel=1e-9)
+    assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
     assert found.scaled(unit).logdet == found.logdet
 
 
@@ -116,7 +116,15 @@ def test_columns_may_be_others():
     other = linear(2, columns=3, seed=9).j
     found = evidence.gram(evidence.weighed(given, NOISE, other), UNREST)
     direct = evidence.gram(evidence.weighed(replace(given, j=other), NOISE), UNREST)
-    assert found.total == pytest.approx(direct.total)
+    assert found.each == pytest.approx(direct.each)
+
+
+def test_the_total_is_the_weighted_sum():
+    given, weight = linear(3), np.array([1.0, 0.0, 0.4])
+    weighed = evidence.weighed(given, NOISE)
+    each = evidence.gram(weighed, UNREST.louder(2.0)).each
+    whole = evidence.total(weighed, UNREST.louder(2.0), weight)
+    assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
 
 
 @BOTH
@@ -134,7 +142,7 @@ def test_start_and_knots_are_the_posterior_mean(unrest):
 def test_marginal_is_the_dense_gaussian():
     """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
     given = linear(3)
-    total = evidence.gram(evidence.weighed(given, NOISE), UNREST).total
+    total = evidence.total(evidence.weighed(given, NOISE), UNREST, np.ones(len(given.e)))
     found, wanted = [], []
     for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
         information = np.diag(sure)
@@ -197,7 +205,7 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
     """κ follows the scatter between voyages: twelve voyages, each with coefficients of its own."""
     rng = np.random.default_rng(2)
     count, sure = 24, 400.0  # each voyage knows its numbers to 1/20
-    prior, known = np.zeros(3), np.ones(3)
+    known = np.ones(3)
 
     def grams(scatter):
         each = np.zeros((count, 4, 4))
@@ -209,6 +217,6 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
         return each
 
     voyage = np.arange(count)
-    assert inflation(grams(0.0), voyage, prior, known) == 11.0  # what is usual, at least
-    assert inflation(grams(0.4), voyage, prior, known) == 32.0
-    assert inflation(grams(0.4)[:2], voyage[:2], prior, known) == 11.0
+    assert inflation(grams(0.0), voyage, known) == 11.0  # what is usual, at least
+    assert inflation(grams(0.4), voyage, known) == 32.0
+    assert inflation(grams(0.4)[:2], voyage[:2], known) == 11.0

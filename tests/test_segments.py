@@ -168,9 +168,7 @@ def linearised():
 
 def gap(model, theta, at: Path, numbers) -> np.ndarray:
     """Measured less simulated [S, B, 6], from the nodes: the trapezium of each two seconds."""
-    record = reference.corrected(
-        model.causes, SEEN, reference.Columns(0, model.causes, np.ones(4)), numbers
-    )
+    record = reference.corrected(model.causes, SEEN, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
         segments._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
