@@ -19,7 +19,7 @@ from pipelines.identify import identify_run
 from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
-from shiplog import diagnose, record, reference, runs
+from shiplog import diagnose, record, reference, runs, structure
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
@@ -349,7 +349,78 @@ def test_more_noise_makes_no_surer(sea):
     assert decision.named[0].probability <= sea.done.decision.named[0].probability + 1e-6
 
 
-# --- traps of DIAGNOSIS.md, section 2
+def test_half_the_data_has_the_same_name(sea):
+    """One of the two voyages alone: less evidence, a wider interval."""
+    whole = sea.done.decision.named[0]
+    _, decision = judged(sea.usual, sea.done.trial.record.pick(["trial_2"]))
+    assert labels(decision) == ["current"]
+    half = decision.named[0]
+    assert half.evidence < 0.8 * whole.evidence
+    assert np.linalg.det(half.covariance) > 1.2 * np.linalg.det(whole.covariance)
+
+
+def test_reversing_the_campaign_turns_a_drift_round(sea, trials):
+    """Thrust 1 + p s becomes (1 + p) (1 - p s / (1 + p)): a loss with a recovery."""
+    seen = trials("thrust_drift")
+    trial, plain = judged(sea.usual, seen)
+    assert labels(plain) == ["thrust_drift"]
+    back = Trial(sea.usual, replace(seen, share=1.0 - seen.share))
+    point = back.begin({})
+    both = ("thrust_loss", "thrust_drift")
+    _, found = back.settle(both, {n: np.zeros(1) for n in both}, point.path)
+    loss, drift = (found.numbers[n][0] for n in both)
+    sure = np.sqrt(np.diag(found.covariance))
+    (slope,) = plain.named[0].numbers
+    assert loss == pytest.approx(slope, abs=2.0 * sure[0])
+    assert drift == pytest.approx(-slope / (1.0 + slope), abs=2.0 * sure[1])
+    assert drift > 2.0 * sure[1]
+
+
+def test_of_shuffled_time_nothing_drifts(sea, trials):
+    """Each half minute of the campaign at another's place in it: a loss, and no drift beside it."""
+    seen = trials("thrust_drift")
+    drift = next(c for c in sea.usual.model.causes if c.label == "thrust_drift")
+    pieces = np.array_split(seen.share, round(len(seen) * seen.step / 30.0))
+    order = np.random.default_rng(0).permutation(len(pieces))
+    shuffled = np.concatenate([np.resize(pieces[i], len(p)) for i, p in zip(order, pieces)])
+    gained = []
+    for share in (seen.share, shuffled):
+        trial = Trial(sea.usual, replace(seen, share=share))
+        _, (found,) = trial.scan(trial.begin({}), [drift], ("thrust_loss",))
+        gained.append(found.evidence)
+    assert gained[0] > 4.0 and gained[1] < 1.0
+
+
+def test_in_each_others_places_nothing_depends_on_position(sea, trials, monkeypatch):
+    """A line to a bollard amid the pond; each voyage with the other's places."""
+    seen = trials("none")
+    north, east = seen.state[:, 0].mean(), seen.state[:, 2].mean()
+    pulled = trials("none", tether=3.0, tether_north=float(north), tether_east=float(east))
+    trial = Trial(sea.usual, pulled)
+    point = trial.begin({})
+    base, _ = trial.scan(point, ())
+
+    def explained() -> float:
+        found = trial.structures(point, base, ())
+        return next(f.evidence for f in found if f.name == "position")
+
+    before = explained()
+    plain = structure.at_knots
+
+    def exchanged(cut, grid):
+        knots = plain(cut, grid)
+        if len(cut) != len(trial.rows):
+            return knots
+        state = knots.state.copy()
+        state[..., [0, 2]] = np.roll(state[..., [0, 2]], len(cut) // 2, axis=0)
+        return structure.Knots(state, knots.driven)
+
+    monkeypatch.setattr(structure, "at_knots", exchanged)
+    assert before > diagnose.UNKNOWN
+    assert explained() < 0.5 * before
+
+
+# --- traps that make simpler methods invent causes
 
 
 def test_one_wild_segment_does_not_decide(sea):

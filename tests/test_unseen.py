@@ -97,7 +97,7 @@ def test_what_the_model_sees_is_no_finding():
 
 @pytest.mark.parametrize(("variable", "columns"), [("position", ["x0", "y0"]), ("time", ["share"])])
 def test_exchanged_between_voyages_it_vanishes(variable, columns):
-    """The negative control of DIAGNOSIS.md, 4.4: the same forces, the wrong voyage's values."""
+    """The negative control: the same forces, the wrong voyage's values."""
     knots = campaign()
     knots = planted(knots, effect(knots, variable), "surge")
     assert asked(knots)[variable].significant

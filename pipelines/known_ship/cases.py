@@ -183,7 +183,7 @@ def _turbulence(rng: np.random.Generator, size: float) -> Drawn:
 
 
 _BOTH = (-1.0, 1.0)
-CATALOGUE: dict[str, Draw] = {  # the contract's names; sizes of DIAGNOSIS.md, section 3
+CATALOGUE: dict[str, Draw] = {  # the contract's names; realistic sizes
     "current": _current,
     "wind_force": _wind_force,
     "shallow_water": _shallow_water,
