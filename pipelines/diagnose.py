@@ -119,7 +119,7 @@ def diagnose_run(
                 f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
                 "this ship is not known, and causes that another fit would absorb are not tested."
             )
-    trial, untested = _trial(run, nominal, recorded, cause_files)
+    trial, untested = trial_of(run, nominal, recorded, cause_files)
     log.info(
         "%s against %s: %d segments of %d s, κ %.0f",
         listed(names, most=4), run.name, len(trial.rows), segments.SECONDS,
@@ -166,7 +166,7 @@ def _record(store: Store, names: Sequence[str], profile) -> Record:
     return record.read([frame.collect() for frame in store.tables(names)], names, profile)
 
 
-def _trial(
+def trial_of(
     run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path]
 ) -> tuple[Trial, dict[str, str]]:
     """Reference and trial; which causes cannot be tested, and why."""
@@ -382,6 +382,7 @@ def _verdict(
         said = "coverage"
     if said == "none" and pushed:
         said = "external"
+    limits = verdicts.limits_json(decision, trial.reference.model.causes, trial.reference.setting)
     rejected = dict(decision.rejected) | dropped
     rejected |= {k: f"not testable: {why}" for k, why in untested.items()}
     traces = [
@@ -407,6 +408,7 @@ def _verdict(
         gain=found if causes else None,
         wrong=tuple(wrongs),
         unseen=tuple(depends),
+        limits=limits if said in ("none", "unknown") else (),
         notes=(*notes, *verdicts.remains(decision, said)),
     )
 

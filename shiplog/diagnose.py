@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shiplog.causes import Cause, Shown
-from shiplog.hypotheses import Found, Point, Pulses, Trial
+from shiplog.hypotheses import Found, Point, Pulses, Told, Trial
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 LEAST = 8.0  # nats that the first cause must bring
@@ -29,6 +29,8 @@ ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 SETTLED = 3  # contenders that are linearised again
 SHARE = 0.3  # of the best one's evidence that makes a contender
+CHANGED = 2.0 / 3.0  # before any data: whoever asks has a reason to
+SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as likely
 PULSES = "side_thrust"
 
 
@@ -71,6 +73,7 @@ class Decision:
     point, base      the trial linearised with what is named, and that hypothesis
     first, nothing   the same with nothing named
     remains    families of structure, with what they would still explain
+    told       label → what these data would tell of each cause, were it there
     """
 
     verdict: str
@@ -86,6 +89,24 @@ class Decision:
     first: Point
     nothing: Found
     remains: tuple[Found, ...] = field(default=())
+    told: Mapping[str, Told] = field(default_factory=dict)
+
+    @property
+    def hidden(self) -> dict[str, float]:
+        """Label → share of its plausible sizes at which these data would not show it."""
+        low, high = (math.log(size) for size in SIZES)
+        return {
+            label: min(max((math.log(told.together(LEAST)) - low) / (high - low), 0.0), 1.0)
+            for label, told in self.told.items()
+        }
+
+    @property
+    def nothing_there(self) -> float:
+        """Probability that nothing changed where nothing was found: of what may have, some is too
+        small for these data."""
+        hidden = list(self.hidden.values())
+        missed = CHANGED * (sum(hidden) / len(hidden)) if hidden else CHANGED
+        return (1.0 - CHANGED) / (1.0 - CHANGED + missed)
 
 
 def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision:
@@ -102,6 +123,7 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
     included: tuple[str, ...] = fixed
     base, found = trial.scan(point, tuple(catalogue.values()), included)
     nothing = base
+    told = {f.name: f.told for f in found if f.told is not None}
     rejected: dict[str, str] = {}
     ranking: dict[str, float] = {}
     steps: dict[str, tuple[float, tuple[str, ...]]] = {}
@@ -173,7 +195,7 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
         structure = Structure("stochastic", stochastic, ("surge", "sway", "yaw_rate"))
     return Decision(
         verdict, real, structure, pulses, traces, rejected, ranking, base.louder, point, base,
-        first_point, nothing, tuple(remains),
+        first_point, nothing, tuple(remains), told,
     )  # fmt: skip
 
 
@@ -235,7 +257,10 @@ def _ranked(settled, found, remains, base, wanted, stochastic) -> dict[str, floa
     for _, one in settled:
         value[one.name.split("+")[-1]] = one.evidence - base.evidence
     value |= {f"unknown:{f.name}": f.evidence - FLEXIBLE for f in remains}
-    value["unknown:stochastic"] = min(stochastic - STOCHASTIC, wanted)
+    if base.louder >= LOUD:  # said where nothing is named
+        value["unknown:stochastic"] = wanted + stochastic - STOCHASTIC
+        if settled and settled[0][1].evidence - base.evidence > wanted:
+            value["unknown:stochastic"] = min(value["unknown:stochastic"], wanted)
     names = list(value)
     of = np.array([value[n] for n in names]) / TEMPERATURE
     share = np.exp(of - of.max())

@@ -38,6 +38,7 @@ class Found:
                hypothesis it stands beside; of a base hypothesis itself, as it is
     louder     λ at which it is best
     numbers    of each cause in it, as a change from what is usual, with their covariance
+    told       of a candidate: how much these data tell of it, were it there
     """
 
     name: str
@@ -45,6 +46,24 @@ class Found:
     louder: float
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
     covariance: np.ndarray | None = None
+    told: Told | None = None
+
+
+@dataclass(frozen=True)
+class Told:
+    """What evidence a cause may be expected to bring: ½ Σ each s² - cost, for numbers s in units of
+    their realistic size."""
+
+    each: np.ndarray
+    cost: float
+
+    def least(self, nats: float) -> np.ndarray:
+        """Of each number alone, the size that would bring so much [realistic sizes]."""
+        return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
+
+    def together(self, nats: float) -> float:
+        """The size that would, had all its numbers that size."""
+        return float(np.sqrt(2.0 * (nats + self.cost) / max(self.each.sum(), 1e-12)))
 
 
 @dataclass(frozen=True)
@@ -269,11 +288,16 @@ class Trial:
         pull = level.gram[1:, 0][columns] - joined.T @ level.solution
         own = joined[columns] - joined.T @ level.inverse @ joined + np.eye(len(columns))
         value = np.linalg.solve(own, pull)
-        gained = 0.5 * float(pull @ value) - 0.5 * float(np.linalg.slogdet(own)[1])
+        cost = 0.5 * float(np.linalg.slogdet(own)[1])
+        gained = 0.5 * float(pull @ value) - cost
         unit = self.reference.columns.unit[columns]
+        left = np.linalg.inv(own)
+        information = own - np.eye(len(columns))
+        shrunk = information @ left
+        told = Told(np.diagonal(shrunk @ information).copy(), cost - 0.5 * float(np.trace(shrunk)))
         return Found(
             label, level.value + gained, level.louder, {label: value * unit},
-            np.linalg.inv(own) * np.outer(unit, unit),
+            left * np.outer(unit, unit), told,
         )  # fmt: skip
 
     def _numbers(

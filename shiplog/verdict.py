@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from shiplog.causes import Cause, Setting, si
 from shiplog.channels import VELOCITY
-from shiplog.diagnose import PULSES, UNKNOWN, Decision, Named
+from shiplog.diagnose import LEAST, PULSES, UNKNOWN, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.findings import CONTRACT
 from shiplog.gain import Gain
@@ -56,6 +57,7 @@ class Verdict:
     intervals: tuple[Interval, ...] = ()
     gain: Gain | None = None
     unseen: tuple[dict, ...] = ()
+    limits: tuple[dict, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
     def as_json(self) -> dict:
@@ -70,6 +72,7 @@ class Verdict:
             "wrong": list(self.wrong),
             "intervals": [i.as_json() for i in self.intervals],
             "unseen": list(self.unseen),
+            "limits": list(self.limits),
             "notes": list(self.notes),
             "base": {"run": self.run, "before_effect": self.before_effect},
         }
@@ -164,7 +167,8 @@ def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
 
 def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> tuple[dict, ...]:
     """Causes of one name together, and what is none of them. What was refuted, or too small to be
-    named, counts for none: the probabilities go through the verdict's own gates."""
+    named, counts for none: the probabilities go through the verdict's own gates. And of `none`,
+    something is the causes' that these data would not show."""
     of: dict[str, float] = {}
     gated = {*dropped, *(n.cause.label for n in decision.traces)}
     for label, share in decision.ranking.items():
@@ -172,8 +176,34 @@ def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> 
             label = "none"
         name = label if label.startswith("unknown:") else label.split(":")[0]
         of[name] = of.get(name, 0.0) + share
+    if verdict == "none" and "none" in of:
+        missed = (1.0 - decision.nothing_there) * of["none"]
+        of["none"] -= missed
+        for label, share in decision.hidden.items():
+            name = label.split(":")[0]
+            of[name] = of.get(name, 0.0) + missed * share / sum(decision.hidden.values())
     kept = [(n, p) for n, p in of.items() if p >= SHARE_SAID]
     return tuple({"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1]))
+
+
+def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
+    """The smallest size of each cause that these data would show, best known first: of each number
+    alone, and as a share of the realistic size."""
+    by = {c.label: c for c in causes}
+    found = []
+    for label, told in decision.told.items():
+        cause, least = by[label], told.least(LEAST)
+        sizes = least * cause.sizes(setting)
+        if len(cause.parameters) == len(sizes):
+            parts = zip(cause.parameters, sizes, strict=True)
+            shown = {p.name: (size / si(p.unit), p.unit) for p, size in parts}
+        else:  # as many as the ship has rudders, or the map places
+            shown = cause.shown(sizes)
+        numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
+        found.append({"name": cause.name, "share": told.together(LEAST), "parameters": numbers})
+        if label != cause.name:
+            found[-1]["channel"] = label.partition(":")[2]
+    return tuple(sorted(found, key=lambda one: one["share"]))
 
 
 def sentence(
@@ -287,6 +317,21 @@ def markdown(verdict: Verdict) -> str:
             lines += [f"## {title}", ""]
             lines += [f"- {r['name']}: {r.get('reason') or r.get('sentence')}" for r in rows]
             lines.append("")
+    if verdict.limits:
+        lines += [
+            "## What these data would not show", "",
+            "Smaller than this, a cause may be there: of each number alone, and all its numbers "
+            "together as a share of what is realistic.", "",
+            "| cause | from | of realistic |", "| --- | --- | ---: |",
+        ]  # fmt: skip
+        for one in verdict.limits:
+            numbers = ", ".join(
+                f"{k.replace('_', ' ')} {v['value']:.2g} {v['unit']}".removesuffix(" 1")
+                for k, v in one["parameters"].items()
+            )
+            label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
+            lines.append(f"| {label} | {numbers} | {one['share']:.0%} |")
+        lines.append("")
     if verdict.wrong:
         lines += ["## Where it is wrong", ""]
         lines += [

@@ -23,9 +23,10 @@ from shiplog import diagnose, record, reference, runs, structure
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
-from shiplog.hypotheses import Trial
+from shiplog.hypotheses import Told, Trial
 from shiplog.ingest import ingest
 from shiplog.store import Store
+from shiplog.verdict import limits_json, ranking_json
 
 SEED = 7101
 PROFILE = profiles.load("esso-vectwin")
@@ -111,7 +112,7 @@ def trials(sea, tmp_path_factory):
     kept = {}
 
     def of(cause: str, **changes):
-        key = (cause, *sorted(changes))
+        key = (cause, *sorted(changes.items()))
         if key not in kept:
             case = hidden(cause, **changes)
             folder = tmp_path_factory.mktemp("trial")
@@ -267,6 +268,40 @@ def test_nothing_hidden_is_nothing_named(still):
     assert max(decision.ranking, key=decision.ranking.get) == "none"
 
 
+def test_of_what_is_too_small_to_be_seen_the_size_is_told(sea, still):
+    """Put into quiet data either way round, the least size that is said to show brings what it was
+    said to: noise, which helps one and hinders the other, falls out of their mean."""
+    trial, decision = still
+    cause = next(c for c in sea.usual.model.causes if c.label == "heading_offset")
+    told = decision.told["heading_offset"]
+    least = told.least(diagnose.LEAST) * cause.sizes(sea.usual.setting)
+    gained = []
+    for p in (0.0 * least, least, -least):
+        seen = cause.read(trial.record, p)
+        again = Trial(sea.usual, seen)
+        _, (found,) = again.scan(again.begin({}), [cause])
+        gained.append(found.evidence)
+    brought = 0.5 * (gained[1] + gained[2]) - gained[0]
+    assert brought == pytest.approx(diagnose.LEAST + told.cost, rel=0.15)
+
+
+def test_nothing_is_said_with_what_may_be_too_small(sea, still):
+    """Each cause's sizes that would not show, a decade of them as likely as another."""
+    _, decision = still
+    assert {"bank", "current", "payload"} <= set(decision.hidden)
+    one = replace(decision, told={"bank": Told(np.array([2.0 * 8.0 / 0.1]), 0.0)})  # 0.1^0.5
+    assert one.hidden == pytest.approx({"bank": 0.5})
+    assert one.nothing_there == pytest.approx((1 / 3) / (1 / 3 + 2 / 3 * 0.5))
+    ranked = {r["name"]: r["probability"] for r in ranking_json(one, "none", ())}
+    assert ranked["none"] == pytest.approx(0.5, abs=0.02)
+    assert ranked["bank"] == pytest.approx(0.5, abs=0.02)
+    said = limits_json(decision, sea.usual.model.causes, sea.usual.setting)
+    shares = [limit["share"] for limit in said]
+    assert shares == sorted(shares)
+    turned = next(limit for limit in said if limit["name"] == "heading_offset")
+    assert 0.1 < turned["parameters"]["angle"]["value"] < 5.0  # deg
+
+
 def test_a_heading_offset_is_named_and_sized(compass):
     _, decision = compass
     assert (decision.verdict, labels(decision)) == ("named", ["heading_offset"])
@@ -362,7 +397,7 @@ def test_half_the_data_has_the_same_name(sea):
 def test_reversing_the_campaign_turns_a_drift_round(sea, trials):
     """Thrust 1 + p s becomes (1 + p) (1 - p s / (1 + p)): a loss with a recovery."""
     seen = trials("thrust_drift")
-    trial, plain = judged(sea.usual, seen)
+    _, plain = judged(sea.usual, seen)
     assert labels(plain) == ["thrust_drift"]
     back = Trial(sea.usual, replace(seen, share=1.0 - seen.share))
     point = back.begin({})
@@ -382,7 +417,9 @@ def test_of_shuffled_time_nothing_drifts(sea, trials):
     drift = next(c for c in sea.usual.model.causes if c.label == "thrust_drift")
     pieces = np.array_split(seen.share, round(len(seen) * seen.step / 30.0))
     order = np.random.default_rng(0).permutation(len(pieces))
-    shuffled = np.concatenate([np.resize(pieces[i], len(p)) for i, p in zip(order, pieces)])
+    shuffled = np.concatenate(
+        [np.resize(pieces[i], len(p)) for i, p in zip(order, pieces, strict=True)]
+    )
     gained = []
     for share in (seen.share, shuffled):
         trial = Trial(sea.usual, replace(seen, share=share))

@@ -163,7 +163,7 @@ class Cause:
 
     def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         """The contract's parameters and units, of numbers [..., count]."""
-        return {q.name: (p[..., i] / _unit(q.unit), q.unit) for i, q in enumerate(self.parameters)}
+        return {q.name: (p[..., i] / si(q.unit), q.unit) for i, q in enumerate(self.parameters)}
 
     def told(self, p: np.ndarray, covariance: np.ndarray, draws: int = 4000) -> dict[str, Shown]:
         """The contract's parameters with 90 % intervals."""
@@ -192,5 +192,6 @@ class Cause:
         return bool((np.abs(p) >= least).any())
 
 
-def _unit(unit: str) -> float:
+def si(unit: str) -> float:
+    """How many of the SI's one of these is."""
     return {"deg": DEGREE, "deg/s": DEGREE}.get(unit, 1.0)
