@@ -331,6 +331,9 @@ class Trial:
             for name in included:
                 low, high = by[name].bounds(self.reference.setting)
                 moved[name] = np.clip(base.numbers[name], low, high)
+            if not all(np.isfinite(values).all() for values in moved.values()):
+                base = replace(base, evidence=-np.inf)  # the fit ran away
+                break
             size = {n: self.reference.columns.unit[self.reference.columns.of[n]] for n in included}
             far = max(float(np.abs((moved[n] - numbers[n]) / size[n]).max()) for n in included)
             numbers = moved
@@ -439,7 +442,7 @@ class Trial:
             return held, np.concatenate((ref.pull, np.zeros(more)))
         seen = before * np.outer(by, by) / ref.kappa
         sure = np.diag(np.concatenate((ref.columns.known, np.ones(more))))
-        return seen[1:, 1:] + sure, seen[1:, 0]
+        return seen[1:, 1:] + sure, seen[1:, 0] + np.concatenate((ref.anchor, np.zeros(more)))
 
     def solved(self, point: Point, base: Found) -> np.ndarray:
         """[C] numbers around the point, under a hypothesis of that point: what is usual of the

@@ -24,7 +24,7 @@ from shiplog.segments import Cut, Linear, Path, Wide
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
-NEAR = 0.1  # plausible spreads that need no further round
+NEAR = 0.35  # plausible spreads that need no further round
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (2.0, 4.0, 8.0, 16.0, 32.0)
@@ -90,7 +90,8 @@ class Columns:
 class Reference:
     """θ that all is linearised about, and what the nominal campaign says around it.
 
-    information  [C, C]  and pull [C], in units of `columns.unit`, κ applied
+    information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
+                 latter is the run's own coefficients'
     nominal      None where the model was made on the very data that are diagnosed
     """
 
@@ -102,6 +103,7 @@ class Reference:
     wide: Wide
     information: np.ndarray
     pull: np.ndarray
+    anchor: np.ndarray
     kappa: float
     nominal: Linear | None
 
@@ -173,12 +175,15 @@ def settled(
     hold = wide
     for round_ in range(rounds + 1):
         whole = np.concatenate((theta, np.zeros(len(unit) - base)))
+        held = _anchor(start, theta, columns)
         path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
         for _ in range(2):
-            unrest = evidence.learnt(linear, _solved(linear, unrest, columns), unrest, rounds=4)
+            unrest = evidence.learnt(
+                linear, _solved(linear, unrest, columns, held), unrest, rounds=8
+            )
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
-        found = _solved(linear, unrest, columns)[:base]
+        found = _solved(linear, unrest, columns, held)[:base]
         far = float(np.abs(found / unit[:base]).max(initial=0.0))
         if round_ == rounds or far < NEAR:
             break
@@ -190,12 +195,23 @@ def settled(
     return Settled(theta, path, unrest)
 
 
-def _solved(linear: Linear, unrest: Unrest, columns: Columns) -> np.ndarray:
+def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
+    """[C] how the run's own coefficients pull on those that stand elsewhere, in units.
+
+    Forces and masses share a scale: held to where they last stood, and not to the run's, masses
+    halve in a few rounds, and a load is found to weigh less than it does.
+    """
+    pull = np.zeros(len(columns.unit))
+    pull[: columns.base] = (start.values - theta) / columns.unit[: columns.base]
+    return pull
+
+
+def _solved(linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray) -> np.ndarray:
     """[C] numbers that the campaign itself and what was known of them ask for."""
     unit, by = columns.unit, np.concatenate(([1.0], columns.unit))
     total = evidence.total(evidence.weighed(linear, unrest.noise), unrest, np.ones(len(linear.e)))
     total *= np.outer(by, by)
-    return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0]) * unit
+    return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0] + held) * unit
 
 
 def learn(
@@ -215,12 +231,13 @@ def learn(
     whole = np.concatenate((at.theta, np.zeros(len(unit) - columns.base)))
     linear = segments.linear(model, whole, cut, segments.grid(record), at.path, moved, shown)
     grams = evidence.gram(evidence.weighed(linear, at.unrest.noise), at.unrest).scaled(unit)
-    chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known)
+    held = _anchor(start, at.theta, columns)
+    chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
     total = grams.each.sum(0)
     information = total[1:, 1:] / chosen + np.diag(columns.known)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information,
-        total[1:, 0] / chosen, chosen, linear,
+        total[1:, 0] / chosen + held, held, chosen, linear,
     )  # fmt: skip
 
 
@@ -229,10 +246,11 @@ def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
     return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
 
 
-def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray) -> float:
+def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
     """κ that predicts each voyage best from the others; never less than is usual.
 
-    each [S, 1 + C, 1 + C], voyage [S], `known` [C] before any data: all in units
+    each [S, 1 + C, 1 + C], voyage [S]; what is known before any data, information and pull, `known`
+    and `held` [C]: all in units
     """
     names = np.unique(voyage)
     if len(names) < 3:
@@ -245,7 +263,7 @@ def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray) -> float:
         for left in of.values():
             rest = total - left
             before = rest[1:, 1:] / kappa + np.diag(known)
-            score += marginal(left, before, rest[1:, 0] / kappa)
+            score += marginal(left, before, rest[1:, 0] / kappa + held)
         said.append(score)
     return max(USUAL_KAPPA, KAPPAS[int(np.argmax(said))])
 
@@ -341,4 +359,4 @@ def assume(
     causes = slice(base, len(unit))
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD
-    return replace(whole, information=information, pull=np.zeros(len(unit)), nominal=None)
+    return replace(whole, information=information, pull=whole.anchor, nominal=None)

@@ -205,7 +205,7 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
     """κ follows the scatter between voyages: twelve voyages, each with coefficients of its own."""
     rng = np.random.default_rng(2)
     count, sure = 24, 400.0  # each voyage knows its numbers to 1/20
-    known = np.ones(3)
+    known, held = np.ones(3), np.zeros(3)
 
     def grams(scatter):
         each = np.zeros((count, 4, 4))
@@ -217,6 +217,6 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
         return each
 
     voyage = np.arange(count)
-    assert inflation(grams(0.0), voyage, known) == 11.0  # what is usual, at least
-    assert inflation(grams(0.4), voyage, known) == 32.0
-    assert inflation(grams(0.4)[:2], voyage[:2], known) == 11.0
+    assert inflation(grams(0.0), voyage, known, held) == 11.0  # what is usual, at least
+    assert inflation(grams(0.4), voyage, known, held) == 32.0
+    assert inflation(grams(0.4)[:2], voyage[:2], known, held) == 11.0

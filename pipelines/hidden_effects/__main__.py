@@ -6,6 +6,8 @@ python -m pipelines.hidden_effects nightly --out DIR [--count 200] [--first-seed
     the same with other seeds; shift the block monthly, and never tune on it
 python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
+    each with --rivals: what simpler methods say of the same trials, too; of cases that were run
+    with --keep before, give the command again with it
 python -m pipelines.hidden_effects score DIR
     the tables again, of what is there by now
 
@@ -47,8 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(given: argparse.Namespace) -> None:
     command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
     settings = Settings(
-        jobs=given.jobs, keep=given.keep, share=given.share, limit=given.limit, shiplog=command
-    )
+        jobs=given.jobs, keep=given.keep, share=given.share, rivals=given.rivals,
+        limit=given.limit, shiplog=command,
+    )  # fmt: skip
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
 
@@ -68,6 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         suite.add_argument(
             "--share", action="store_true", help="train once a ship, not once a case"
         )
+        suite.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
         suite.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
         suite.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
         suite.set_defaults(first_seed=None, count=None)

@@ -3,7 +3,8 @@
 OUT/keys/plan.json    the cases; in `goals` it says what is hidden, so it lies with the keys
 OUT/keys/LABEL.json   a key, opened by `score` alone and only after the verdict is sealed
 OUT/cases/LABEL/      logs, store, base, d (until the case is done); verdict.json,
-                      verdict.sha256, steps.json (times, memory, last words; they stay)
+                      verdict.sha256, steps.json (times, memory, last words; they stay);
+                      with --rivals, rivals.json and rivals.sha256: what simpler methods say
 OUT/bases/SEED/       with --share, the model of a ship's nominal campaign
 """
 

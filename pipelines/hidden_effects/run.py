@@ -1,4 +1,5 @@
-"""A case the whole way: logs, store, base model, diagnosis, seal. Each step is a process.
+"""A case the whole way: logs, store, base model, diagnosis, seal; where asked for, what simpler
+methods say of it. Each step is a process.
 
 No step is told what is hidden but the one that writes the logs, and nothing here opens a key.
 """
@@ -48,16 +49,19 @@ class Settings:
     jobs: int = 1
     keep: bool = False  # logs, store, base and report of each case
     share: bool = False  # one base model for all cases of a ship: her nominal campaign is the same
+    rivals: bool = False  # simpler methods too, once the verdict is sealed
     limit: float = 3600.0  # s for one step
     case: tuple[str, ...] = (sys.executable, "-m", "pipelines.known_ship", "case")
     shiplog: tuple[str, ...] = (sys.executable, "-c", "from shiplog.cli import main; main()")
+    rival: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.rivals")
 
 
 def run(out: Path, plan: Plan, settings: Settings) -> None:
-    """Every case of the plan that has no sealed verdict yet; one that failed is tried again."""
+    """Every case of the plan that has no sealed verdict yet; one that failed is tried again. Where
+    rivals are wanted, they are also asked of finished cases whose store and base were kept."""
     ships: dict[int, list[Planned]] = {}
     for planned in plan.cases:
-        if not finished(plans.case_folder(out, planned)):
+        if not finished(plans.case_folder(out, planned)) or _to_compare(out, planned, settings):
             ships.setdefault(planned.seed, []).append(planned)
     todo = sum(map(len, ships.values()))
     log.info("%d of %d cases to run", todo, len(plan.cases))
@@ -67,7 +71,8 @@ def run(out: Path, plan: Plan, settings: Settings) -> None:
         for planned in cases:
             if stop.is_set():
                 return
-            said = run_case(out, planned, settings)
+            compare = finished(plans.case_folder(out, planned))
+            said = (compare_case if compare else run_case)(out, planned, settings)
             if said is None:
                 stop.set()
             else:
@@ -131,10 +136,48 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
         if name == "train" and settings.share:
             _mark(base, logs)
     said = _seal(folder, steps)
+    compared = None
+    if settings.rivals and steps[-1]["step"] == "diagnose":  # where it failed they may not
+        compared = compare_case(out, planned, settings)
+        if compared is None:
+            return None
     if not settings.keep:
         for name in LARGE:
             shutil.rmtree(folder / name, ignore_errors=True)
-    return f"{said} after {sum(done['wall_s'] for done in steps):.0f} s"
+    said = f"{said} after {sum(done['wall_s'] for done in steps):.0f} s"
+    return f"{said}; {compared}" if compared else said
+
+
+def compare_case(out: Path, planned: Planned, settings: Settings) -> str | None:
+    """What simpler methods say of a case whose verdict is sealed: `rivals.json`, sealed likewise.
+    Where they fail, the case stays what it is. None where somebody stopped it."""
+    folder = plans.case_folder(out, planned).resolve()
+    answers = folder / "rivals.json"
+    done = _step("rivals", [
+        *settings.rival, str(_base_of(out, planned)), "--voyages", "trial_*",
+        "--store", str(folder / "store"), "--json", str(answers),
+    ], folder, settings.limit)  # fmt: skip
+    if done["rc"] in STOPPED:
+        return None
+    steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
+    _write_steps(folder, [*(step for step in steps if step["step"] != "rivals"), done])
+    if done["rc"] != DONE or _object(answers, "methods") is None:
+        answers.unlink(missing_ok=True)
+        return f"not compared: rivals ended with {done['rc']}"
+    _seal_file(answers)
+    return f"compared after {done['wall_s']:.0f} s"
+
+
+def _base_of(out: Path, planned: Planned) -> Path:
+    """The case's own model, or the one that it shared."""
+    own = plans.case_folder(out, planned).resolve() / "base"
+    return own if own.exists() else out.resolve() / "bases" / str(planned.seed)
+
+
+def _to_compare(out: Path, planned: Planned, settings: Settings) -> bool:
+    folder = plans.case_folder(out, planned)
+    there = (folder / "store").exists() and _base_of(out, planned).exists()
+    return settings.rivals and there and not (folder / "rivals.sha256").exists()
 
 
 def _step(name: str, command: Sequence[str], folder: Path, limit: float) -> dict[str, Any]:
@@ -192,15 +235,26 @@ def _nominal(logs: Path) -> dict[str, str]:
 def _seal(folder: Path, steps: list[dict[str, Any]]) -> str:
     """Keep the steps, and the verdict's SHA-256 last: once that stands, all else does."""
     verdict, last = folder / "verdict.json", steps[-1]
-    (folder / "steps.json").write_text(json.dumps(steps, indent=1) + "\n", encoding="utf-8")
+    _write_steps(folder, steps)
     content = _object(verdict)
     if last["rc"] not in (DONE, LOST) or content is None:
         content = {"contract": 1, "verdict": FAILED, "step": last["step"], "rc": last["rc"]}
         verdict.write_text(json.dumps(content), encoding="utf-8")
-    partial = folder / "verdict.sha256.partial"
-    partial.write_text(f"{_sha256(verdict.read_bytes())}  verdict.json\n", encoding="utf-8")
-    partial.rename(folder / "verdict.sha256")
+    _seal_file(verdict)
     return str(content["verdict"])
+
+
+def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:
+    partial = folder / "steps.json.partial"
+    partial.write_text(json.dumps(steps, indent=1) + "\n", encoding="utf-8")
+    partial.replace(folder / "steps.json")
+
+
+def _seal_file(path: Path) -> None:
+    """NAME.sha256 beside NAME.json, whole or not at all."""
+    partial = path.with_suffix(".sha256.partial")
+    partial.write_text(f"{_sha256(path.read_bytes())}  {path.name}\n", encoding="utf-8")
+    partial.replace(path.with_suffix(".sha256"))
 
 
 def _sha256(content: bytes) -> str:

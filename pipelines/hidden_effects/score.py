@@ -6,8 +6,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -33,23 +33,44 @@ def open_key(folder: Path, key: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             f"{folder} has no verdict.sha256: the key {key} is not opened.",
             hint="run the case to its end first.",
         )
-    verdict = (folder / "verdict.json").read_bytes()
-    if hashlib.sha256(verdict).hexdigest() != (seal.read_text(encoding="utf-8").split() or [""])[0]:
-        raise Sealed(
-            f"{folder}/verdict.json is not what was sealed: the key {key} is not opened.",
-            hint="remove the case's folder and run the suite again.",
-        )
+    verdict = _as_sealed(
+        folder / "verdict.json", key, "remove the case's folder and run the suite again."
+    )
     return json.loads(verdict), json.loads(key.read_text(encoding="utf-8"))
+
+
+def open_rivals(folder: Path, key: Path) -> dict[str, Any]:
+    """Method → its answer; none of them where they were not asked, or nothing was sealed. Raises
+    Sealed, and is to be called before the key is opened."""
+    if not (folder / "rivals.sha256").exists():
+        return {}
+    hint = "remove rivals.json and rivals.sha256; a case that was kept can be asked again."
+    return json.loads(_as_sealed(folder / "rivals.json", key, hint))["methods"]
+
+
+def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
+    seal = path.with_suffix(".sha256").read_text(encoding="utf-8").split() or [""]
+    content = path.read_bytes() if path.exists() else b""
+    if hashlib.sha256(content).hexdigest() != seal[0]:
+        raise Sealed(f"{path} is not what was sealed: the key {key} is not opened.", hint=hint)
+    return content
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What was hidden in one case, and what was said of it."""
+    """What was hidden in one case, and what was said of it; by simpler methods, too, if asked."""
 
     planned: Planned
     verdict: dict[str, Any]
     key: dict[str, Any]
     steps: list[dict[str, Any]]
+    rivals: Mapping[str, Any] = field(default_factory=dict)
+
+    def by(self, method: str) -> Answer:
+        """The same case as that rival answers it."""
+        name = self.rivals[method]["answer"]
+        said = {"verdict": "named" if name else "none", "causes": [{"name": name}] if name else []}
+        return Answer(self.planned, said, self.key, [])
 
     @property
     def word(self) -> str:
@@ -168,7 +189,8 @@ def read(out: Path) -> Score:
         if steps[0]["rc"] != 0:
             unmade.append(one)
         else:
-            answers.append(Answer(one, *open_key(folder, key), steps))
+            rivals = open_rivals(folder, key)
+            answers.append(Answer(one, *open_key(folder, key), steps, rivals))
     return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
 
 

@@ -18,6 +18,11 @@ HEAD = ("", "measured", "of", "90 % interval", "goal", "met")
 NOT_MEASURED = "not measured"
 FULL, SMALL = 1.0, 0.3
 SURE = 0.9
+RIVALS = {  # as `rivals` calls them → as a table does
+    "regression": "regression of accelerations, BIC",
+    "glr": "likelihood ratio of rollouts, white noise",
+    "linear": "our evidence, linearised once",
+}
 
 
 def _full(answer: Answer) -> bool:
@@ -90,10 +95,10 @@ def text(score: Score) -> str:
     said += f"; {len(score.unmade)} whose logs could not be written" if score.unmade else ""
     if not score.answers:
         return f"{said}."
-    return "\n\n".join((
-        f"{said}.", report.table(HEAD, goals(score.answers)), per_cause(score.answers),
-        mistakes(score.answers),
-    ))  # fmt: skip
+    parts = [f"{said}.", report.table(HEAD, goals(score.answers)), per_cause(score.answers)]
+    if any(answer.rivals for answer in score.answers):
+        parts.append(methods(score.answers))
+    return "\n\n".join((*parts, mistakes(score.answers)))
 
 
 # --- the goals ------------------------------------------------------------------------------------
@@ -199,6 +204,37 @@ def _times(answers: Sequence[Answer]) -> list[Row]:
             f"{statistics.median(peak):.0f} MB ({max(peak):.0f} MB)", count, "", "", "",
         ),
     ]  # fmt: skip
+
+
+# --- simpler methods ------------------------------------------------------------------------------
+
+
+def methods(answers: Sequence[Answer]) -> str:
+    """Each on the cases that every one of them was asked: right of n for one cause hidden, and
+    false names of n for nothing hidden."""
+    asked = [answer for answer in answers if answer.rivals]
+    names = [n for n in dict.fromkeys((*RIVALS, *chain.from_iterable(a.rivals for a in asked)))
+             if all(n in a.rivals for a in asked)]  # fmt: skip
+    columns: dict[str, tuple[Test, Test]] = {
+        "size 1": (_among("one", _full), _right),
+        "0.3 to 1": (_among("one", _small), _right),
+        "500 s": (_among("one", _full, 500), _right),
+        "nothing hidden: a cause named": (
+            _among("none", seconds=None), lambda answer: bool(answer.named)
+        ),
+    }  # fmt: skip
+    rows = []
+    each = {RIVALS.get(name, name): [a.by(name) for a in asked] for name in names}
+    for title, given in (each | {"shiplog diagnose": asked}).items():
+        cells = []
+        for among, hit in columns.values():
+            hits = [hit(answer) for answer in given if among(answer)]
+            share = f" ({_percent(sum(hits) / len(hits))})" if hits else ""
+            cells.append(f"{sum(hits)}/{len(hits)}{share}" if hits else "")
+        rows.append((title, *cells))
+    table = report.table((f"method, {len(asked)} cases", *columns), rows)
+    failed = sum(step["step"] == "rivals" and step["rc"] != 0 for a in answers for step in a.steps)
+    return table + (f"\n{failed} more where the simpler methods failed" if failed else "")
 
 
 # --- by cause, and mistakes -----------------------------------------------------------------------
