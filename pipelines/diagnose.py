@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from shiplog import causes as catalogue
 from shiplog import coverage as covering
 from shiplog import (
     diagnose,
+    direct,
     external,
     record,
     reference,
@@ -34,7 +35,7 @@ from shiplog import (
 )  # fmt: skip
 from shiplog import verdict as verdicts
 from shiplog.causes import Cause, Setting
-from shiplog.diagnose import Decision, Named
+from shiplog.diagnose import Decision, Named, Structure
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.gain import Gain, gain, parts
@@ -59,6 +60,8 @@ REFUTED = 3  # times that the verdict is looked for again without what did not h
 WORTH = 0.02  # of the error, that each of several causes must take off held-out windows
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
 SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
+LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+VOYAGES = 3  # fewer cannot choose causes by voyages left out
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
 
 
@@ -137,10 +140,17 @@ def diagnose_run(
         dropped |= refuted
         if not refuted:
             break
+    if run.config.physical and not run.config.physics.fit and cut is not None:
+        chosen, refused = _chosen(trial, decision, cut, before)
+        dropped |= refused
+        if chosen is not None:
+            decision = chosen
+            after, found = _worth(trial, decision, cut, before)
     verdict = _verdict(
         run, decision, found, before_effect and nominal is not None, untested, dropped, notes,
         _uncovered(run, store, names, profile, cut), 0 if cut is None else len(cut), trial, pushed,
         _wrong(trial, before, cut, profile), _unseen(trial, decision, whole),
+        _lost(cut, before, found),
     )  # fmt: skip
     done = Diagnosis(verdict, decision, trial, whole, cut, before, after, out)
     _save(done, run, store, names, began)
@@ -171,7 +181,7 @@ def trial_of(
 ) -> tuple[Trial, dict[str, str]]:
     """Reference and trial; which causes cannot be tested, and why."""
     usual = nominal if nominal is not None else recorded
-    setting = _setting(run, usual, recorded)
+    setting = setting_of(run, usual, recorded)
     given = run.config.physical and not run.config.physics.fit
     extension = run.extension
     held = {} if extension is None else {c.label: c for c in extension.causes}
@@ -190,7 +200,7 @@ def trial_of(
         known = reference.assume(model, setting, start, recorded, given=given)
         return Trial(known, recorded, tuple(held)), untested
     # where the nominal voyages settle depends on them alone, so that it can be kept
-    before = _setting(run, nominal, nominal)
+    before = setting_of(run, nominal, nominal)
     testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
     at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
     known = reference.learn(model, setting, start, nominal, at)
@@ -216,7 +226,7 @@ def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extende
     return Extended(base, tuple(causes), stand_in, values, constants), start
 
 
-def _setting(run: Run, usual: Record, recorded: Record) -> Setting:
+def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     places, spacing = reference.places(recorded, PLACES)
@@ -272,14 +282,61 @@ def _gain(
         share = 1.0 - found.after / best.after
         dropped[one.cause.label] = f"no gain on held-out voyages ({share:+.1%})"
         decision, found = rest, best
-    named = decision.named
-    if not named:
+    if not decision.named:
         return None, None, decision, dropped
-    after = before.with_causes(
+    return _extended(trial, decision.named, before), found, decision, dropped
+
+
+def _extended(trial: Trial, named: Sequence[Named], before: ExtendedSimulator) -> ExtendedSimulator:
+    return before.with_causes(
         [n.cause for n in named], {n.cause.label: n.numbers for n in named},
         {n.cause.label: n.covariance for n in named}, _constants(trial, named),
     )  # fmt: skip
-    return after, found, decision, dropped
+
+
+def _worth(
+    trial: Trial, decision: Decision, cut: Windows, before: ExtendedSimulator
+) -> tuple[ExtendedSimulator, Gain]:
+    """The extended model, and its gain on windows that its numbers were fitted without."""
+    steps, measured = series(cut).steps, cut.state.double().numpy()
+    usual = parts(before.states(cut, before.theta) - measured, steps)
+    left = parts(held_out(trial, decision, cut, before) - measured, steps)
+    found = gain(usual, left, cut.plan["voyage"].to_list())
+    return _extended(trial, decision.named, before), found
+
+
+def _chosen(
+    trial: Trial, decision: Decision, cut: Windows, before: ExtendedSimulator
+) -> tuple[Decision | None, dict[str, str]]:
+    """Beside a model that nobody fitted: instruments by evidence, and of the causes of the error
+    those that take most off voyages left out. None where there are too few voyages, or no such."""
+    if cut.plan["voyage"].n_unique() < VOYAGES:
+        return None, {}
+    ref = trial.reference
+    read = tuple(n for n in decision.named if n.cause.only_read)
+    others = [c for c in ref.model.causes if not c.only_read and c.label not in trial.fixed]
+    constants: dict[str, np.ndarray] = {}
+    for cause in others:
+        constants |= cause.constants(ref.setting)
+    selected = direct.select(direct.search_of(before, others, ref.setting, cut, constants))
+    if not selected.numbers:
+        return None, dict(selected.refused)
+    by = {c.label: c for c in others}
+    named = tuple(
+        Named(
+            by[label], float("nan"), selected.probability[label], numbers,
+            selected.covariance[label],
+        )
+        for label, numbers in selected.numbers.items()
+    )  # fmt: skip
+    refused = dict(selected.refused)
+    for one in decision.named:
+        if not one.cause.only_read and one.cause.label not in by:
+            refused[one.cause.label] = f"{' and '.join(selected.numbers)} take more off"
+    chosen = replace(
+        decision, verdict="named", named=(*named, *read), structure=None, apart=selected.without
+    )
+    return chosen, refused
 
 
 def held_out(
@@ -331,10 +388,10 @@ def _without(trial: Trial, decision: Decision, left: tuple) -> dict[str, np.ndar
     if half is not None:
         middle, late = half
         out &= (trial.record.time[segment.rows] >= middle) == late
-    labels = tuple(n.cause.label for n in decision.named)
     included = tuple(decision.base.numbers)
-    numbers = trial.without(decision.point, included, decision.louder, out)
-    return {label: numbers[label] for label in labels}
+    numbers = trial.without(decision.point, included, decision.louder, out) if included else {}
+    numbers = {**numbers, **decision.apart.get(voyage, {})}
+    return {n.cause.label: numbers[n.cause.label] for n in decision.named}
 
 
 def _uncovered(run: Run, store: Store, names, profile, cut: Windows | None) -> list[Interval]:
@@ -367,8 +424,22 @@ def _uncovered(run: Run, store: Store, names, profile, cut: Windows | None) -> l
 
 def _verdict(
     run, decision, found, before_effect, untested, dropped, notes, uncovered, count, trial,
-    pushed, wrongs, depends,
+    pushed, wrongs, depends, lost,
 ) -> Verdict:  # fmt: skip
+    rejected = dict(decision.rejected) | dropped
+    if lost:
+        rejected |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
+        strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
+        family = strongest.name if strongest else "motion"
+        decision = replace(
+            decision, verdict="unknown", named=(), pulses=None, traces=(),
+            structure=Structure(family, strongest.evidence if strongest else 0.0, ()),
+        )  # fmt: skip
+        notes = [f"{lost}. It does not simulate this ship, or its profile reads her wrongly: "
+                 f"what is left depends most on {family}.", *notes]  # fmt: skip
+    rejected = {
+        k: why for k, why in rejected.items() if k not in {n.cause.label for n in decision.named}
+    }
     causes = [verdicts.cause_json(n) for n in decision.named]
     if decision.pulses is not None:
         share = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
@@ -383,7 +454,6 @@ def _verdict(
     if said == "none" and pushed:
         said = "external"
     limits = verdicts.limits_json(decision, trial.reference.model.causes, trial.reference.setting)
-    rejected = dict(decision.rejected) | dropped
     rejected |= {k: f"not testable: {why}" for k, why in untested.items()}
     traces = [
         {
@@ -395,7 +465,9 @@ def _verdict(
     ]
     return Verdict(
         verdict=said,
-        said=verdicts.sentence(said, causes, structure, found, decision.louder),
+        said=f"{lost}: no cause can be told from it."
+        if lost
+        else verdicts.sentence(said, causes, structure, found, decision.louder),
         run=run.name,
         before_effect=before_effect,
         made=_made(run, before_effect),
@@ -410,6 +482,22 @@ def _verdict(
         unseen=tuple(depends),
         limits=limits if said in ("none", "unknown") else (),
         notes=(*notes, *verdicts.remains(decision, said)),
+    )
+
+
+def _lost(cut: Windows | None, before: ExtendedSimulator, found: Gain | None) -> str:
+    """Why no name would be believed: rollouts worse than a ship that keeps her velocities, with
+    what was named in them too. Empty where they are better."""
+    if cut is None:
+        return ""
+    measured, steps = cut.state.double().numpy(), series(cut).steps
+    hold = float(parts(measured[:, :1] - measured, steps).sum(1).mean())
+    own = float(parts(before.states(cut, before.theta) - measured, steps).sum(1).mean())
+    after = own if found is None else found.after
+    if own <= LOST * hold or after <= hold:
+        return ""
+    return (
+        f"The model is worse than one that keeps its velocities (L {own:.0f}, that one {hold:.0f})"
     )
 
 

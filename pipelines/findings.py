@@ -20,19 +20,17 @@ import logging
 import time
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import tomli_w
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from pipelines import azimuths
 from pipelines.convert import convert
-from pipelines.diagnose import diagnose_run
+from pipelines.diagnose import diagnose_run, setting_of
 from pipelines.esso_osaka import TWIN, trials_store
 from pipelines.evaluate import evaluate_runs
 from pipelines.extrapolation import physics
@@ -41,16 +39,11 @@ from pipelines.prepare import expand, ingest_logs, seconds
 from pipelines.split import plan
 from shiplog import midship, parity, record, report, runs, table, windows
 from shiplog import profile as profiles
-from shiplog.causes import CATALOGUE, Setting
-from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.causes import CATALOGUE
 from shiplog.config import Config, Split
-from shiplog.extend import ExtendedSimulator, as_record
-from shiplog.models import mmg
+from shiplog.direct import MOST, Search, search_of
 from shiplog.parity import Estimate
-from shiplog.record import Record
-from shiplog.sensitivity import Series, rollout, series
 from shiplog.store import Store
-from shiplog.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -165,91 +158,7 @@ def variant(profile: str, path: Path, edit: Callable[[dict], None]) -> Path:
 
 # --- how far a few causes could get ---------------------------------------------------------------
 
-MOST = 6  # numbers of a cause, or of two, that are tried
-FOLDS = 8  # of whole voyages
 SHOWN = 4
-FAR = 1e3  # of a residual: a rollout beyond has left the pond
-
-
-@dataclass(frozen=True)
-class Search:
-    """Windows, and a model with room for every cause; numbers are in units of realistic sizes.
-
-    at      label → its places in the simulator's numbers
-    size    [P + Q]  realistic size of each; bounds [P + Q] in those units
-    """
-
-    cut: Windows
-    data: Series
-    recorded: Record
-    simulator: ExtendedSimulator
-    at: dict[str, np.ndarray]
-    size: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-    def residual(self, labels: Sequence[str], x: np.ndarray) -> np.ndarray:
-        """[N, I, 3] whose squares sum to L."""
-        theta = self.simulator.theta.copy()
-        where = self.where(labels)
-        theta[where] = x * self.size[where]
-        error = self.states(labels, theta) - self.cut.state.double().numpy()
-        steps = np.sqrt(self.data.steps)[..., None]
-        weighed = error[..., list(VELOCITY_IN_STATE)] * np.array(VELOCITY_WEIGHTS) * steps
-        return np.clip(np.nan_to_num(weighed, nan=FAR), -FAR, FAR)
-
-    def states(self, labels: Sequence[str], theta: np.ndarray) -> np.ndarray:
-        """`ExtendedSimulator.states`, without asking the causes that are not there."""
-        read = [c for c in self.simulator.model.causes if c.label in labels and c.reads]
-        was = self.recorded
-        for cause in read:
-            was = cause.read(was, theta[self.at[cause.label]])
-        shape = self.cut.state.shape
-        driven = np.concatenate((was.actuator, was.share[:, None]), 1)
-        data = self.data._replace(
-            measured=was.state.reshape(shape),
-            actuator=driven.reshape(*shape[:2], -1),
-            wind=was.true_wind.reshape(*shape[:2], 2),
-        )
-        with np.errstate(all="ignore"):
-            shown = replace(was, state=rollout(self.simulator.model, theta, data).reshape(-1, 6))
-            for cause in reversed(read):
-                shown = cause.read(shown, cause.inverse(theta[self.at[cause.label]]))
-        return shown.state.reshape(shape)
-
-    def where(self, labels: Sequence[str]) -> np.ndarray:
-        return np.concatenate([np.zeros(0, int), *(self.at[label] for label in labels)])
-
-    def fit(self, labels: Sequence[str], start: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Least squares of L over some windows [N] bool, barely held to zero."""
-        where = self.where(labels)
-        low, high = self.low[where], self.high[where]
-
-        def error(x: np.ndarray) -> np.ndarray:
-            return np.concatenate((self.residual(labels, x)[rows].ravel(), 0.3 * x))
-
-        begin = np.clip(start, low + 1e-6, high - 1e-6)
-        return least_squares(
-            error, begin, bounds=(low, high), diff_step=0.02, max_nfev=12, xtol=1e-3, ftol=1e-4
-        ).x
-
-    def loss(self, labels: Sequence[str], x: np.ndarray) -> np.ndarray:
-        """L of each window [N]."""
-        return (self.residual(labels, x) ** 2).sum((1, 2))
-
-    def held_out(self, labels: Sequence[str], x: np.ndarray) -> np.ndarray:
-        """L of each window [N], with numbers fitted without its voyage's fold."""
-        voyages = self.cut.plan["voyage"].to_list()
-        known = list(dict.fromkeys(voyages))
-        fold = np.array([known.index(v) % FOLDS for v in voyages])
-        loss = np.empty(len(fold))
-        for one in range(min(FOLDS, len(known))):
-            out = fold == one
-            loss[out] = self.loss(labels, self.fit(labels, x, ~out))[out]
-        return loss
-
-    def numbers(self, labels: Sequence[str], x: np.ndarray) -> str:
-        return ", ".join(f"{v:+.2f}" for v in x * self.size[self.where(labels)])
 
 
 def direct(folder: Path, out: Path) -> str:
@@ -285,47 +194,29 @@ def _direct(search: Search) -> str:
         for labels in best:
             held = search.held_out(labels, found[labels]).mean()
             rows.append(
-                (" + ".join(labels), search.numbers(labels, found[labels]), f"{loss[labels]:.0f}",
+                (" + ".join(labels), _numbers(search, labels, found[labels]), f"{loss[labels]:.0f}",
                  f"{held:.0f}", f"{held / start:.3f}")
             )  # fmt: skip
     head = ("causes", "numbers, SI", "L", "L held out", "of published")
     return f"Published: L {start:.0f}, {len(search.cut)} windows.\n\n{report.table(head, rows)}"
 
 
+def _numbers(search: Search, labels: Sequence[str], x: np.ndarray) -> str:
+    return ", ".join(f"{v:+.2f}" for v in x * search.size[search.where(labels)])
+
+
 def _search(run_path: Path, store: Store, names: Sequence[str]) -> Search:
     run = runs.load(run_path)
     profile = store.profile(names)
     recorded = record.read([t.collect() for t in store.tables(names)], names, profile)
-    _, ship, _ = mmg.geometry_of(profile)
-    speed = float(np.sqrt((recorded.state[:, [1, 3]] ** 2).sum(1).mean()))
-    scale = {
-        "speed": speed, "length": ship.length, "mass": ship.mass, "moment": ship.mass * ship.length,
-    }  # fmt: skip
-    setting = Setting(profile, scale, np.zeros((0, 2)), 1.0)
-    there = [c.on(setting) for c in CATALOGUE if c.missing(setting) is None]
-    causes = [c for c in there if c.count <= MOST]
-    simulator = run.extended(run.config.seeds[0], recorded)
-    count = len(simulator.theta)
-    simulator = simulator.with_causes(causes, {c.label: np.zeros(c.count) for c in causes}, None)
-    at, first = {}, count
-    for cause in causes:
-        at[cause.label] = np.arange(first, first + cause.count)
-        first += cause.count
-    sizes = np.concatenate([np.ones(count), *(c.sizes(setting) for c in causes)])
-    bounds = [c.bounds(setting) for c in causes]
-    free = np.full(count, np.inf)
-    low = np.concatenate((-free, *(b[0] for b in bounds))) / sizes
-    high = np.concatenate((free, *(b[1] for b in bounds))) / sizes
+    setting = setting_of(run, recorded, recorded)
+    causes = [c.on(setting) for c in CATALOGUE if c.missing(setting) is None]
     rows = table.with_elapsed(seconds(store, names, profile))
     cut = windows.cut(
         rows, plan(rows, "ref", run.config.window), run.config.window, profile.actuator_names,
         profile.wind_names,
     )  # fmt: skip
-    data = series(cut)
-    return Search(
-        cut, data, as_record(cut, profile, simulator.shares, simulator.lengths), simulator, at,
-        sizes, low, high,
-    )  # fmt: skip
+    return search_of(run.extended(run.config.seeds[0], recorded), causes, setting, cut)
 
 
 # --- milliAmpere ----------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ beats them all, is large enough to matter, and did not come out of a fit that fa
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -74,6 +74,7 @@ class Decision:
     first, nothing   the same with nothing named
     remains    families of structure, with what they would still explain
     told       label → what these data would tell of each cause, were it there
+    apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
     """
 
     verdict: str
@@ -90,6 +91,7 @@ class Decision:
     nothing: Found
     remains: tuple[Found, ...] = field(default=())
     told: Mapping[str, Told] = field(default_factory=dict)
+    apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
 
     @property
     def hidden(self) -> dict[str, float]:
@@ -140,9 +142,7 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
             if tried.gain > max(PULSED, *rivals):
                 pulses = tried
                 trial.unrest = replace(trial.unrest, pulse=tried.unit * tried.force)
-                base, found = trial.scan(
-                    point, [c for k, c in catalogue.items() if k not in included], included
-                )
+                base, found = trial.scan(point, _left(catalogue, included), included)
                 continue
         settled = _settle(trial, point, base, found, included)
         strongest = max(remains, key=lambda f: f.evidence, default=None)
@@ -177,9 +177,7 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
             less = best[1].evidence - one.evidence
             rejected.setdefault(other, f"{label} explains {less:.0f} nats more")
         included = tuple(base.numbers)
-        _, found = trial.scan(
-            point, [c for k, c in catalogue.items() if k not in included], included
-        )
+        _, found = trial.scan(point, _left(catalogue, included), included)
     included, point, base, dropped = _backwards(trial, included, fixed, point, base, steps)
     for label, loss in dropped.items():
         rejected[label] = f"without it the others explain all but {loss:.0f} nats"
@@ -227,6 +225,10 @@ def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     return replace(
         decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
     )
+
+
+def _left(catalogue: Mapping[str, Cause], included: Sequence[str]) -> list[Cause]:
+    return [c for c in catalogue.values() if all(c.beside(label) for label in included)]
 
 
 def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -102,8 +103,9 @@ def cause_json(named: Named) -> dict:
         "sentence": named.cause.sentence(shown),
         "equation": equation(named),
         "indistinguishable_from": list(dict.fromkeys(n.split(":")[0] for n in named.alike)),
-        "evidence_nats": named.evidence,
     }
+    if math.isfinite(named.evidence):  # chosen on whole windows, it has none
+        content["evidence_nats"] = named.evidence
     tests = [named.cause.separated_by[n] for n in named.alike if n in named.cause.separated_by]
     if named.alike:
         content["next_test"] = "; ".join(dict.fromkeys(tests)) or (

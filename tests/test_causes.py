@@ -605,3 +605,15 @@ def test_sizes_follow_the_ship():
     assert antenna.sizes(fast) == pytest.approx(100.0 * antenna.sizes(plain))
     low, high = Payload().bounds(plain)
     assert low[0] == pytest.approx(-0.5 * 244.6) and high[0] == math.inf
+
+
+def test_two_of_three_clocks_say_it_all():
+    """`gnss` is position and velocity together; no cause stands beside itself."""
+    by = {cause.label: cause for cause in CATALOGUE}
+    both = by["clock_offset:gnss"]
+    for channel in ("position", "velocity"):
+        assert not both.beside(f"clock_offset:{channel}")
+        assert not by[f"clock_offset:{channel}"].beside(both.label)
+    assert by["clock_offset:position"].beside("clock_offset:velocity")
+    assert by["clock_offset:wind"].beside(both.label)
+    assert both.beside("current") and not both.beside(both.label)

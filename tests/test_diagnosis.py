@@ -258,6 +258,17 @@ def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
     assert not any(one["name"] == "unknown:wind" for one in told["ranking"])
 
 
+def test_a_model_that_simulates_nothing_names_nothing(sea):
+    """Worse than keeping all velocities, with what was named in it too."""
+    before, cut = sea.done.before, sea.done.windows
+    assert pipeline._lost(cut, before, sea.done.verdict.gain) == ""
+    theta = before.theta.copy()
+    theta[list(before.model.names).index("hull.x_0f")] *= -200.0  # drives her instead of braking
+    wild = replace(before, theta=theta)
+    said = pipeline._lost(cut, wild, None)
+    assert "worse than one that keeps its velocities" in said
+
+
 # --- what is hidden, and what is not
 
 

@@ -22,7 +22,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"evaluate", "floors", "train", "crossvalidation", "identifiability", "residual", "forces"},
     {"segments", "evidence", "wrong", "extend", "ridge"},
     {"unexplained", "reference", "structure"},
-    {"unseen", "external", "hypotheses", "remembered"},
+    {"unseen", "external", "hypotheses", "remembered", "direct"},
     {"diagnose"},
     {"runs", "report", "viewer", "verdict"},
     {"cli"},

@@ -121,6 +121,10 @@ class Cause:
         """The cause as this ship has it: one rudder has one offset, two have two."""
         return self
 
+    def beside(self, label: str) -> bool:
+        """Whether it may stand beside a cause that is named already."""
+        return label != self.label
+
     def missing(self, setting: Setting) -> str | None:
         """Why it cannot be tested on this ship; None where it can."""
         return None

@@ -95,6 +95,13 @@ class ClockOffset(Cause):
     def usual(self) -> bool:
         return self.channel != "gnss"  # that is position and velocity together
 
+    def beside(self, label: str) -> bool:
+        """`gnss` is position and velocity together: two of the three say it all."""
+        both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
+        if self.channel == "gnss":
+            return label != self.label and label not in both
+        return label != self.label and not (self.label in both and label == f"{self.name}:gnss")
+
     def missing(self, setting: Setting) -> str | None:
         if self.channel == "wind" and not setting.profile.has_wind:
             return "no wind is recorded"
