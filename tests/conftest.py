@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+# Many small matrices: BLAS's threads would wait for each other. Set before numpy is loaded.
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
