@@ -61,6 +61,7 @@ WORTH = 0.02  # of the error, that each of several causes must take off held-out
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
 SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
 LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+HARM = 1.2  # times the error, from which on even an instrument's fault is refuted
 VOYAGES = 3  # fewer cannot choose causes by voyages left out
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
 
@@ -265,14 +266,16 @@ def _gain(
         return gain(usual, parts(error, steps), voyages)
 
     found = worth(decision)
-    # a cause of the error makes it less; an instrument's fault is a fault whatever it is worth
-    while any(not n.cause.only_read for n in decision.named):
-        if found.real and len(decision.named) == 1:
+    # a cause of the error makes it less; an instrument's fault is a fault though it is worth
+    # nothing, but not where it makes it more
+    while True:
+        harm = found.after > HARM * found.before
+        asked = [n for n in decision.named if harm or not n.cause.only_read]
+        if not asked or (found.real and len(decision.named) == 1):
             break
         tried = [
             (worth(rest), rest, one)
-            for one in decision.named
-            if not one.cause.only_read
+            for one in asked
             for rest in [diagnose.without(trial, decision, one)]
         ]
         best, rest, one = min(tried, key=lambda t: t[0].after)
@@ -449,7 +452,7 @@ def _verdict(
     if said == "named":
         structure = None
     family = structure["family"] if structure else ""
-    if said == "unknown" and family in SEEN and len(uncovered) > MOSTLY * count:
+    if said == "unknown" and not lost and family in SEEN and len(uncovered) > MOSTLY * count:
         said = "coverage"
     if said == "none" and pushed:
         said = "external"

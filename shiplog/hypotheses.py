@@ -323,9 +323,13 @@ class Trial:
         by = {cause.label: cause for cause in self.reference.model.causes}
         point, louder, near = None, 1.0, None
         for _ in range(ROUNDS):
-            point = self.at(numbers, path, louder)
-            path = point.path
-            base, _ = self.scan(point, (), included, near)
+            try:
+                point = self.at(numbers, path, louder)
+                path = point.path
+                base, _ = self.scan(point, (), included, near)
+            except np.linalg.LinAlgError:  # the fit ran away, and its path with it
+                assert self._first is not None
+                return point or self._first, Found("+".join(included), -np.inf, louder, numbers)
             louder = near = base.louder
             moved = {}
             for name in included:

@@ -518,6 +518,18 @@ def test_linearising_again_brings_no_evidence_of_its_own(sea, still):
         assert -15.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
 
 
+def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
+    """Where a matrix of it is none any more, it has no evidence, and there is no traceback."""
+    trial, decision = still
+
+    def broken(*_):
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(trial, "levels", broken)
+    _, found = trial.settle(("current",), {"current": np.zeros(2)}, decision.first.path)
+    assert found.evidence == -np.inf
+
+
 def test_recorded_actuators_are_no_delay(still):
     """No late rudder, no late clock on an ordinary day: evidence about zero or below."""
     trial, decision = still
