@@ -227,6 +227,16 @@ def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     )
 
 
+def untold(decision: Decision) -> Decision:
+    """Of a model that simulates nothing: what is left, without a name."""
+    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
+    found = ("motion", 0.0) if strongest is None else (strongest.name, strongest.evidence)
+    return replace(
+        decision, verdict="unknown", named=(), pulses=None, traces=(),
+        structure=Structure(*found, ()),
+    )  # fmt: skip
+
+
 def _left(catalogue: Mapping[str, Cause], included: Sequence[str]) -> list[Cause]:
     return [c for c in catalogue.values() if all(c.beside(label) for label in included)]
 

@@ -80,6 +80,16 @@ class Run:
         return f"{self.config.model} {self.config.data} ({self.config.recipe} recipe{wind})"
 
     @property
+    def given(self) -> bool:
+        """Whether its coefficients are as somebody gave them, fitted to no voyage."""
+        return self.config.physical and not self.config.physics.fit
+
+    @property
+    def made_on(self) -> tuple[str, ...]:
+        """The voyages it was fitted to, or stopped by."""
+        return (*self.config.split.training, *self.config.split.validation)
+
+    @property
     def shape(self) -> Shape:
         net = self.config.network
         return Shape(

@@ -156,6 +156,15 @@ def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -
     }
 
 
+def trace_json(named: Named) -> dict:
+    """There, but too small to matter."""
+    return {
+        "name": named.cause.name,
+        "parameters": {k: v.as_json() for k, v in named.shown.items()},
+        "sentence": f"Present, but below practical size: {named.cause.sentence(named.shown)}",
+    }
+
+
 def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
     found = decision.structure
     if found is None:

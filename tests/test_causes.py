@@ -10,7 +10,7 @@ import pytest
 
 from shiplog import profile as profiles
 from shiplog.causes import CATALOGUE, Setting
-from shiplog.causes.environment import Current
+from shiplog.causes.environment import Current, WindForce
 from shiplog.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
@@ -399,6 +399,43 @@ def test_wind_force_scales_each_force_of_the_wind():
     assert found / plain == pytest.approx(np.array([[1.3, 0.8, 1.5]]), rel=1e-9)
 
 
+@pytest.mark.parametrize("base", (None, network()), ids=("mmg", "network"))
+def test_a_model_without_wind_is_given_that_of_such_a_ship(base):
+    """Ones make of it the model with the estimated wind force; each number is an axis' own."""
+    ship, main, _ = mmg.geometry_of(TWIN)
+    usual = mmg.estimated(ship, main)
+    lacking = {n: float(v) for n, v in zip(usual.names, usual.values, strict=True) if "wind." in n}
+    assert len(lacking) == 10
+    cause = WindForce().on(replace(setting(), lacking=lacking))
+    calm, values = extended([], without=("wind",), base=base)
+    windless = replace(calm, causes=(cause,), constants=cause.constants(
+        replace(setting(), lacking=lacking)))  # fmt: skip
+    state, actuator, wind = under_way()
+    args = (state, actuator, wind)
+    plain = acceleration(calm, values, [], *args)
+    assert acceleration(windless, values, np.zeros(3), *args) == pytest.approx(plain, abs=1e-15)
+    whole, _ = extended([])
+    felt = acceleration(whole, usual.values, [], *args)
+    still, known = extended([], without=("wind",))
+    felt = felt - acceleration(still, known, [], *args)
+    found = acceleration(windless, values, np.ones(3), *args) - plain
+    assert found == pytest.approx(felt, rel=1e-9, abs=1e-14)
+    assert np.abs(found).max(0).min() > 1e-3
+    ahead = acceleration(windless, values, [0.5, 0.0, 0.0], *args) - plain
+    assert ahead[:, 0] == pytest.approx(0.5 * felt[:, 0], rel=1e-9)
+    assert np.abs(ahead[:, 1:]).max() < 1e-14
+
+
+def test_wind_in_a_model_without_it_is_no_coefficient_that_a_fit_takes_in():
+    lacking = replace(setting(), lacking={"wind.x1": -0.7})
+    assert WindForce().absorbed and not WindForce().on(lacking).absorbed
+    assert WindForce().on(setting()) == WindForce()
+    for label in ("wind_direction_offset", "wind_speed_scale", "clock_offset:wind"):
+        assert BY[label].missing(lacking) == "the model feels no wind"
+    shown = WindForce().on(lacking).shown(np.array([0.9, 1.1, -0.2]))
+    assert [v for v, _ in shown.values()] == pytest.approx([0.9, 1.1, -0.2])
+
+
 def test_thrust_loss_and_drift_at_the_bollard():
     """At rest the screw alone pushes: by the factor, and by the slope at 40 % of the campaign."""
     off = ("rudder", "wind")
@@ -564,19 +601,49 @@ def test_small_is_no_matter(label, number):
     assert not cause.practical(0.2 * np.array(number), setting())
 
 
+def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
+    """T y' = x - y: what it lacks is T times how fast it moves."""
+    rows, units = 300, len(FERRY.actuators)
+    rng = np.random.default_rng(0)
+    read = Record(
+        profile=FERRY, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
+        share=np.zeros(rows), starts=np.arange(rows) == 0, seen=np.ones(rows, bool),
+        state=np.zeros((rows, 6)), actuator=rng.standard_normal((rows, units)).cumsum(0),
+        wind=np.zeros((rows, 2)),
+    )  # fmt: skip
+    turned = [i for i, a in enumerate(FERRY.actuators) if a.kind == "azimuth"]
+    others = [i for i, a in enumerate(FERRY.actuators) if a.kind != "azimuth"]
+    late, lagged, aslant = (
+        BY[label].on(setting(FERRY)) for label in ("rudder_delay", "rudder_lag", "rudder_offset")
+    )
+    numbers = {late: [0.5], lagged: [0.5], aslant: [0.2, -0.1]}
+    acting = {cause: cause.read(read, np.array(p)).actuator for cause, p in numbers.items()}
+    for found in acting.values():
+        assert np.array_equal(found[:, others], read.actuator[:, others])
+    assert acting[late][5:, turned] == pytest.approx(read.actuator[:-5, turned])
+    rate = np.gradient(acting[lagged][:, turned], 0.1, axis=0)
+    lack = (read.actuator - acting[lagged])[:, turned]
+    assert np.corrcoef(rate[5:-5].ravel(), lack[5:-5].ravel())[0, 1] > 0.9
+    port = [FERRY.actuators[i].position_m[1] < 0.0 for i in turned]
+    assert (acting[aslant] - read.actuator)[0, turned] == pytest.approx(np.where(port, 0.2, -0.1))
+    for cause, p in numbers.items():
+        said = cause.sentence(cause.told(np.array(p), 1e-6 * np.eye(cause.count)))
+        assert said.startswith("The azimuths ")
+
+
 # --- which cannot be tested -----------------------------------------------------------------------
 
 MISSING = {
     "wind_force": "wind", "wind_direction_offset": "wind", "wind_speed_scale": "wind",
     "clock_offset:wind": "wind", "clock_offset:yaw_rate": "yaw rate", "bank": "bank",
-    "rudder_offset": "rudder", "rudder_lag": "rudder", "rudder_delay": "rudder",
     "rudder_force": "rudder",
 }  # fmt: skip
 
 
 @EVERY
 def test_what_a_ferry_cannot_be_asked(cause):
-    """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested."""
+    """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested.
+    What turns her thrusters may be late or aslant as a rudder may."""
     said = cause.missing(setting(FERRY))
     if cause.label not in MISSING:
         assert said is None

@@ -15,11 +15,13 @@ import pytest
 import sailing
 
 from pipelines import diagnose as pipeline
+from pipelines.diagnosis.held_out import HeldOut
+from pipelines.diagnosis.trial import record_of
 from pipelines.identify import identify_run
 from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
-from shiplog import diagnose, record, reference, runs, structure
+from shiplog import conventions, diagnose, record, reference, runs, structure
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
@@ -146,7 +148,7 @@ def test_a_current_is_named_and_sized(sea):
     assert apart(shown["direction"].value, true["direction"]) < 3.0
     gain = sea.done.verdict.gain
     assert gain.real and gain.reduction > 0.5
-    assert gain.windows == len(sea.done.windows)
+    assert gain.windows == len(sea.done.held.cut)
 
 
 def test_the_extended_model_has_nothing_more_wrong(sea):
@@ -157,10 +159,10 @@ def test_the_extended_model_has_nothing_more_wrong(sea):
     _, decision = judged(sea.usual, sea.done.trial.record, numbers, tuple(numbers))
     assert (decision.verdict, labels(decision)) == ("none", [])
     extended = again.models()[0]
-    after = extended.losses(sea.done.windows).mean()
-    before = sea.done.before.losses(sea.done.windows).mean()
+    after = extended.losses(sea.done.held.cut).mean()
+    before = sea.done.held.before.losses(sea.done.held.cut).mean()
     assert after < 0.5 * before
-    assert after == pytest.approx(sea.done.after.losses(sea.done.windows).mean(), rel=1e-9)
+    assert after == pytest.approx(sea.done.after.losses(sea.done.held.cut).mean(), rel=1e-9)
 
 
 CAUSES = (
@@ -260,13 +262,33 @@ def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
 
 def test_a_model_that_simulates_nothing_names_nothing(sea):
     """Worse than keeping all velocities, with what was named in it too."""
-    before, cut = sea.done.before, sea.done.windows
-    assert pipeline._lost(cut, before, sea.done.verdict.gain) == ""
-    theta = before.theta.copy()
-    theta[list(before.model.names).index("hull.x_0f")] *= -200.0  # drives her instead of braking
-    wild = replace(before, theta=theta)
-    said = pipeline._lost(cut, wild, None)
+    held = sea.done.held
+    assert held.lost(sea.done.verdict.gain) == ""
+    theta = held.before.theta.copy()
+    theta[
+        list(held.before.model.names).index("hull.x_0f")
+    ] *= -200.0  # drives her instead of braking
+    wild = HeldOut(held.trial, held.cut, replace(held.before, theta=theta))
+    said = wild.lost(None)
     assert "worse than one that keeps its velocities" in said
+
+
+@pytest.mark.parametrize(
+    "said", ("the rudder's sign turned round", "the two rudders exchanged",
+             "the propeller's sign turned round", "the wind blowing towards"),
+)  # fmt: skip
+def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
+    """Each is its own inverse: turned back, the model is as good as it was. Her current is in it:
+    what a wrong sign does must not drown in what else is wrong."""
+    cut, model = sea.done.held.cut, sea.done.after
+    (turned,) = [w for s, w in conventions.other(PROFILE, cut) if said in s]
+    found, loss = conventions.best(model, turned)
+    assert said in found
+    assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
+    told = HeldOut(sea.done.trial, turned, model).lost(None)
+    if "sign" in said:  # the others do not double the error of so short a trial
+        assert said in told and f"L is {loss:.0f}" in told
+    assert HeldOut(sea.done.trial, cut, model).lost(None) == ""
 
 
 # --- what is hidden, and what is not
@@ -368,7 +390,7 @@ def test_turning_the_pond_leaves_the_compass(sea, compass):
 def test_mirroring_all_flips_the_current_across(sea):
     """What was usual is learnt from the mirrored campaign too."""
     start = sea.run.base()[1]
-    nominal = pipeline._record(sea.store, list(NOMINAL), PROFILE)
+    nominal = record_of(sea.store, list(NOMINAL), PROFILE)
     usual = reference.learn(sea.usual.model, sea.usual.setting, start, mirrored(nominal))
     _, decision = judged(usual, mirrored(sea.done.trial.record))
     assert labels(decision) == ["current"]

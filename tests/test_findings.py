@@ -1,15 +1,13 @@
 """The figures of .docs/findings.md that take no minutes, against answers found by other means."""
 
-from pathlib import Path
-
 import numpy as np
 import polars as pl
 import pytest
 
-from pipelines import azimuths, findings
 from pipelines.convert import convert
+from pipelines.findings import kvlcc2, milliampere
 from pipelines.prepare import expand, ingest_logs
-from shiplog import parity, record, user_causes
+from shiplog import parity
 from shiplog import profile as profiles
 from shiplog.store import Store
 
@@ -38,7 +36,7 @@ def test_azimuths_follow_their_orders_late(shared_data):
     """0.6 to 0.7 s is where ordered and measured angles correlate best, unit by unit."""
     folder = shared_data / "milliampere1_physical" / "nlp1"
     _, raw, delay, left, dead, lag, both = map(
-        lambda text: float(text.strip("%")), findings._follows(folder, 3)
+        lambda text: float(text.strip("%")), milliampere._follows(folder, 3)
     )
     order = pl.read_parquet(folder / "actuator_ref_3.parquet")
     stood = pl.read_parquet(folder / "actuators__actuator_3__azimuth_angle.parquet")
@@ -56,35 +54,10 @@ def test_azimuths_follow_their_orders_late(shared_data):
     assert dead + lag == pytest.approx(delay, abs=0.3)
 
 
-def test_the_azimuths_causes_move_azimuths_alone():
-    profile = profiles.load("milliampere")
-    rows, units = 300, len(profile.actuators)
-    rng = np.random.default_rng(0)
-    read = record.Record(
-        profile=profile, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
-        share=np.zeros(rows), starts=np.arange(rows) == 0, seen=np.ones(rows, bool),
-        state=np.zeros((rows, 6)), actuator=rng.standard_normal((rows, units)).cumsum(0),
-        wind=np.zeros((rows, 2)),
-    )  # fmt: skip
-    known = {c.label: c for c in user_causes.load([Path(azimuths.__file__)])}
-    assert set(known) == {"azimuth_lag", "azimuth_delay"}
-    turned = [i for i, a in enumerate(profile.actuators) if a.kind == "azimuth"]
-    others = [i for i, a in enumerate(profile.actuators) if a.kind != "azimuth"]
-    late = known["azimuth_delay"].read(read, np.array([0.5]))
-    lagged = known["azimuth_lag"].read(read, np.array([0.5]))
-    for acting in (late.actuator, lagged.actuator):
-        assert np.array_equal(acting[:, others], read.actuator[:, others])
-    assert late.actuator[5:, turned] == pytest.approx(read.actuator[:-5, turned])
-    # T y' = x - y: what it lacks is T times how fast it moves
-    rate = np.gradient(lagged.actuator[:, turned], 0.1, axis=0)
-    lack = (read.actuator - lagged.actuator)[:, turned]
-    assert np.corrcoef(rate[5:-5].ravel(), lack[5:-5].ravel())[0, 1] > 0.9
-
-
 @pytest.mark.shared
 def test_marin_at_hsvas_scale_keeps_what_froude_keeps(shared_data):
-    full = pl.read_parquet(shared_data / "kvlcc2_simman" / findings.MARIN)
-    model = findings.at_model_scale(full)
+    full = pl.read_parquet(shared_data / "kvlcc2_simman" / kvlcc2.MARIN)
+    model = kvlcc2.at_model_scale(full)
     along = np.hypot(full["u_body_mps"].to_numpy(), full["v_body_mps"].to_numpy())
     small = np.hypot(model["u_body_mps"].to_numpy(), model["v_body_mps"].to_numpy())
     assert small / np.sqrt(7.0) == pytest.approx(along / np.sqrt(7.0 * 45.7), rel=1e-6)

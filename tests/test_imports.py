@@ -21,7 +21,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"identify", "band", "gain"},
     {"evaluate", "floors", "train", "crossvalidation", "identifiability", "residual", "forces"},
     {"segments", "evidence", "wrong", "extend", "ridge"},
-    {"unexplained", "reference", "structure"},
+    {"unexplained", "reference", "structure", "conventions"},
     {"unseen", "external", "hypotheses", "remembered", "direct"},
     {"diagnose"},
     {"runs", "report", "viewer", "verdict"},

@@ -26,7 +26,7 @@ import jax
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
-from pipelines.diagnose import trial_of
+from pipelines.diagnosis.trial import trial_of
 from shiplog import diagnose, evidence, record, reference, runs, segments
 from shiplog.evidence import Unrest
 from shiplog.exceptions import RunError, ShiplogError

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -47,12 +47,14 @@ class Setting:
     scale   "speed" (root mean square of the campaigns, m/s), "length" (m), "mass" (kg) and
             "moment", their product
     places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
+    lacking coefficients of the forces that the model has not, as they are of such a ship
     """
 
     profile: Profile
     scale: Mapping[str, float]
     places: np.ndarray
     spacing: float
+    lacking: Mapping[str, float] = field(default_factory=dict)
 
     def prior(self, parameter: Parameter) -> float:
         return parameter.prior * self.scale.get(parameter.of, 1.0)
@@ -88,7 +90,6 @@ class Cause:
     equation: ClassVar[str]  # what it adds to the equations of motion or of the instruments
     parameters: ClassVar[tuple[Parameter, ...]]
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
-    absorbed: ClassVar[bool] = False  # by any model that is fitted to the affected data
     user: ClassVar[bool] = False
 
     @property
@@ -99,6 +100,11 @@ class Cause:
     @property
     def count(self) -> int:
         return len(self.parameters)
+
+    @property
+    def absorbed(self) -> bool:
+        """Whether any model that is fitted to the affected data takes it in."""
+        return False
 
     @property
     def usual(self) -> bool:

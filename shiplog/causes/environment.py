@@ -45,6 +45,13 @@ class Current(Cause):
 
 @dataclass(frozen=True)
 class WindForce(Cause):
+    """Of a model that has no wind force, that of such a ship times its numbers.
+
+    lacking   the coefficients that the model has not
+    """
+
+    lacking: tuple[str, ...] = ()
+
     name = "wind_force"
     kind = "environment"
     story = "The wind pushes otherwise than the model has it."
@@ -58,26 +65,47 @@ class WindForce(Cause):
         "wind_speed_scale": "a second anemometer, or fast straight runs in calm",
         "current": "repeat in calm, or turn: wind force follows the wind, a current does not",
     }
-    absorbed = True
+
+    @property
+    def absorbed(self) -> bool:
+        return not self.lacking
+
+    def on(self, setting: Setting) -> WindForce:
+        return WindForce(tuple(n for n in setting.lacking if n.startswith("wind.")))
 
     def missing(self, setting: Setting) -> str | None:
         return None if setting.profile.has_wind else "no wind is recorded"
 
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        values = [setting.lacking[name] for name in self.lacking]
+        return {"wind.of_such_a_ship": np.array(values)} if values else {}
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.ones(3) if self.lacking else super().sizes(setting)
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        if self.lacking:  # which way it turns her depends on what stands on deck
+            return np.array([0.0, 0.0, -3.0]), np.full(3, np.inf)
+        return super().bounds(setting)
+
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
-        factor = {"x": 1.0 + p[0], "y": 1.0 + p[1], "n": 1.0 + p[2]}
-        scaled = {
-            k: v * factor[k.removeprefix("wind.")[0]] for k, v in c.items() if k.startswith("wind.")
-        }
-        return c | scaled
+        if self.lacking:
+            had, already = dict(zip(self.lacking, at["wind.of_such_a_ship"], strict=True)), 0.0
+        else:
+            had, already = {k: v for k, v in c.items() if k.startswith("wind.")}, 1.0
+        factor = {axis: already + p[i] for i, axis in enumerate("xyn")}
+        return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
 
     def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
-        return {q.name: (1.0 + p[..., i], "1") for i, q in enumerate(self.parameters)}
+        already = 0.0 if self.lacking else 1.0
+        return {q.name: (already + p[..., i], "1") for i, q in enumerate(self.parameters)}
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         x, y, n = (shown[q.name].value for q in self.parameters)
+        whose = "it does such a ship; the model has no wind" if self.lacking else "the model has it"
         return (
             f"The wind pushes {x:.2f} times as hard ahead, {y:.2f} athwart, and turns {n:.2f} "
-            "times as hard as the model has it."
+            f"times as hard as {whose}."
         )
 
 

@@ -103,8 +103,8 @@ class ClockOffset(Cause):
         return label != self.label and not (self.label in both and label == f"{self.name}:gnss")
 
     def missing(self, setting: Setting) -> str | None:
-        if self.channel == "wind" and not setting.profile.has_wind:
-            return "no wind is recorded"
+        if self.channel == "wind":
+            return unfelt_wind(setting)
         if self.channel == "yaw_rate" and setting.profile.sensors.yaw_rate is None:
             return "no yaw rate is recorded"
         return None
@@ -158,6 +158,13 @@ class AntennaOffset(Cause):
         )
 
 
+def unfelt_wind(setting: Setting) -> str | None:
+    """Why nothing can be said of the wind's instrument."""
+    if not setting.profile.has_wind:
+        return "no wind is recorded"
+    return "the model feels no wind" if setting.lacking else None
+
+
 @dataclass(frozen=True)
 class WindDirectionOffset(Cause):
     name = "wind_direction_offset"
@@ -168,7 +175,7 @@ class WindDirectionOffset(Cause):
     separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
 
     def missing(self, setting: Setting) -> str | None:
-        return None if setting.profile.has_wind else "no wind is recorded"
+        return unfelt_wind(setting)
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         c, s = np.cos(p[0]), np.sin(p[0])
@@ -188,10 +195,13 @@ class WindSpeedScale(Cause):
     equation = "U_measured = {value:.2f} U_A"
     parameters = (Parameter("value", "1", 0.22, 0.02, low=-0.9),)
     separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
-    absorbed = True
+
+    @property
+    def absorbed(self) -> bool:
+        return True
 
     def missing(self, setting: Setting) -> str | None:
-        return None if setting.profile.has_wind else "no wind is recorded"
+        return unfelt_wind(setting)
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         return replace(record, wind=record.wind / (1.0 + p[0]))

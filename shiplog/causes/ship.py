@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -33,7 +33,10 @@ class _Factor(Cause):
     scaled: ClassVar[tuple[str, ...]]
     kind = "ship"
     parameters = (Parameter("factor", "1", 0.4, 0.04, low=-1.0),)
-    absorbed = True
+
+    @property
+    def absorbed(self) -> bool:
+        return True
 
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return _times(c, self.scaled, 1.0 + p[0])
@@ -151,7 +154,10 @@ class Payload(Cause):
         "thrust_loss": "step of the screw from rest (inertia) against steady speed",
         "cross_flow_drag": "step of the screw from rest (inertia) against a pure decay of sway",
     }
-    absorbed = True
+
+    @property
+    def absorbed(self) -> bool:
+        return True
 
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return c | {"load.mass": p[0], "load.moment": p[1]}
@@ -171,20 +177,33 @@ class Payload(Cause):
         )
 
 
+def _steering(profile: Profile) -> list[int]:
+    """Columns of the rudders; of a ship without, of what turns her thrusters."""
+    return _columns(profile, "rudder") or _columns(profile, "azimuth")
+
+
 @dataclass(frozen=True)
 class _OnRudders(Cause):
+    """Of rudders, or of azimuths where the ship has no rudder."""
+
+    what: str = field(default="rudders", kw_only=True)
+
     kind = "ship"
 
+    def on(self, setting: Setting) -> Cause:
+        rudders = _columns(setting.profile, "rudder")
+        return replace(self, what="rudders" if rudders else "azimuths")
+
     def missing(self, setting: Setting) -> str | None:
-        return None if _columns(setting.profile, "rudder") else "the ship has no rudder"
+        return None if _steering(setting.profile) else "the ship has no rudder"
 
     def _with(self, record: Record, acting: np.ndarray) -> Record:
         actuator = record.actuator.copy()
-        actuator[:, _columns(record.profile, "rudder")] = acting
+        actuator[:, _steering(record.profile)] = acting
         return replace(record, actuator=actuator)
 
     def _recorded(self, record: Record) -> np.ndarray:
-        return record.actuator[:, _columns(record.profile, "rudder")]
+        return record.actuator[:, _steering(record.profile)]
 
 
 @dataclass(frozen=True)
@@ -206,10 +225,11 @@ class RudderOffset(_OnRudders):
         return len(self.groups)
 
     def on(self, setting: Setting) -> Cause:
-        columns = _columns(setting.profile, "rudder")
+        columns = _steering(setting.profile)
         aside = [setting.profile.actuators[i].position_m[1] for i in columns]
         paired = min(aside, default=0.0) < 0.0 < max(aside, default=0.0)
-        return RudderOffset(("port", "starboard") if paired else ("angle",))
+        groups = ("port", "starboard") if paired else ("angle",)
+        return replace(super().on(setting), groups=groups)
 
     def sizes(self, setting: Setting) -> np.ndarray:
         return np.full(self.count, np.radians(5.0))
@@ -218,7 +238,7 @@ class RudderOffset(_OnRudders):
         return np.full(self.count, -np.radians(40.0)), np.full(self.count, np.radians(40.0))
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        columns = _columns(record.profile, "rudder")
+        columns = _steering(record.profile)
         if self.count == 1:
             each = np.full(len(columns), p[0])
         else:
@@ -231,10 +251,10 @@ class RudderOffset(_OnRudders):
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         said = " and ".join(
-            (f"{name} rudder " if self.count > 1 else "") + f"{v.value:+.1f} deg"
+            f"{v.value:+.1f} deg" + (f" ({name})" if self.count > 1 else "")
             for name, v in shown.items()
         )
-        return f"The rudders stand {said} off what is recorded."
+        return f"The {self.what} stand {said} off what is recorded."
 
     def practical(self, p: np.ndarray, setting: Setting) -> bool:
         return bool(np.abs(p).max() > np.radians(0.3))
@@ -252,7 +272,7 @@ class RudderLag(_OnRudders):
         return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The rudders follow their record with a lag of {shown['time'].value:.2f} s."
+        return f"The {self.what} follow their record with a lag of {shown['time'].value:.2f} s."
 
 
 def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
@@ -299,4 +319,4 @@ class RudderDelay(_OnRudders):
         return self._with(record, record.later(self._recorded(record), -float(p[0])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The rudders act {shown['time'].value:.2f} s later than they are recorded."
+        return f"The {self.what} act {shown['time'].value:.2f} s later than they are recorded."

@@ -44,7 +44,7 @@ class MMG:
     def forces_of(
         self, p: Mapping[str, Array], state: Array, actuator: Array, true_wind: Array
     ) -> dict[str, Array]:
-        """The same of coefficients by name."""
+        """The same of coefficients by name; the wind's may join where the ship has none."""
         g = self.geometry
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
         found = {"hull": hull.hull(p, g, u, v, r)}
@@ -57,7 +57,7 @@ class MMG:
             found["thruster"] = total(
                 thruster.thruster(p, g, t, u, v, r, actuator) for t in g.thrusters
             )
-        if g.wind:
+        if g.wind or "wind.x1" in p:
             found["wind"] = wind.wind(p, g, *wind.apparent(true_wind, heading, u, v))
         return found
 

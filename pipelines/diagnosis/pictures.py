@@ -9,20 +9,18 @@ import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
-from pipelines.diagnose import Diagnosis, held_out
+from pipelines.diagnosis.answer import Diagnosis
 from shiplog import unexplained, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
 from shiplog.diagnose import PULSES, Decision
 from shiplog.exceptions import listed
 from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
-from shiplog.gain import parts
 from shiplog.hypotheses import Trial
 from shiplog.models.mmg import body
 from shiplog.record import Record
 from shiplog.reference import corrected
 from shiplog.segments import KNOT, Linear
-from shiplog.sensitivity import series
 from shiplog.unexplained import around
 from shiplog.windows import Windows
 
@@ -139,20 +137,20 @@ def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
 
 def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
     """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
-    cut, before, trial, decision = done.windows, done.before, done.trial, done.decision
-    if cut is None or before is None or trial is None or decision is None:
+    held, decision = done.held, done.decision
+    if held is None or decision is None:
         return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERRORS)
-    states = {BEFORE: before.states(cut, before.theta)}
+    cut = held.cut
+    states = {BEFORE: held.states_before}
     if done.after is not None:
-        states[AFTER] = held_out(trial, decision, cut, before)
-    measured, steps = cut.state.double().numpy(), series(cut).steps
+        states[AFTER] = held.states_after(decision)
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"),
         pl.col("elapsed").alias("time"),
     )  # fmt: skip
     errors = numbered.with_columns(
         pl.Series("seconds", cut.dt.double().numpy().sum(1)),
-        *(pl.Series(k, parts(v - measured, steps).sum(1)) for k, v in states.items()),
+        *(pl.Series(k, held.parts(v).sum(1)) for k, v in states.items()),
     )
     if AFTER not in states:
         errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))

@@ -1,0 +1,149 @@
+"""What was decided and what it rests on, as the verdict that is written down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.diagnosis import where
+from pipelines.diagnosis.held_out import HeldOut
+from shiplog import diagnose, segments
+from shiplog import verdict as verdicts
+from shiplog.diagnose import Decision
+from shiplog.extend import ExtendedSimulator
+from shiplog.gain import Gain
+from shiplog.hypotheses import Trial
+from shiplog.record import Record
+from shiplog.runs import Run
+from shiplog.segments import Linear
+from shiplog.verdict import Interval, Verdict
+
+MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
+SEEN = ("wind", "motion", "controls")  # families that a model is wrong in where it never was
+LEAST_S = 240.0  # of unbroken record, below which nothing can be said
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict and what it rests on.
+
+    whole   as the model stood, on overlapping segments
+    held    the windows; None where no stretch was long enough for one
+    after   the extended model; None where nothing was named
+    """
+
+    verdict: Verdict
+    folder: Path
+    decision: Decision | None = None
+    trial: Trial | None = None
+    whole: Linear | None = None
+    held: HeldOut | None = None
+    after: ExtendedSimulator | None = None
+
+    @property
+    def recording(self) -> Path | None:
+        """Its pictures, where there is something to show."""
+        return None if self.decision is None else self.folder / "diagnosis.rrd"
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a verdict says besides what was decided.
+
+    before_effect   whether the model was made on voyages before these, and they are known
+    untested        label → why it could not be tested
+    dropped         label → why held-out voyages refute it
+    lost            why no name would be believed; empty where one would
+    """
+
+    run: Run
+    before_effect: bool
+    untested: Mapping[str, str] = field(default_factory=dict)
+    dropped: Mapping[str, str] = field(default_factory=dict)
+    lost: str = ""
+    notes: Sequence[str] = ()
+    pushed: Sequence[Interval] = ()
+    uncovered: Sequence[Interval] = ()
+    wrong: Sequence[dict] = ()
+    unseen: Sequence[dict] = ()
+
+
+def verdict(
+    trial: Trial, decision: Decision, found: Gain | None, held: HeldOut | None, context: Context
+) -> Verdict:
+    rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
+    if context.lost and decision.structure is not None:
+        notes.insert(
+            0,
+            f"{context.lost}. It does not simulate this ship, or her profile reads her wrongly: "
+            f"what is left depends most on {decision.structure.family}.",
+        )
+    named = {n.cause.label for n in decision.named}
+    rejected = {k: why for k, why in rejected.items() if k not in named}
+    rejected |= {k: f"not testable: {why}" for k, why in context.untested.items()}
+    causes = [verdicts.cause_json(n) for n in decision.named]
+    if decision.pulses is not None:
+        times = where.pulses(trial, decision, decision.pulses)
+        sure = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
+        causes.append(verdicts.pulses_json(decision, times, sure))
+    said = _word(decision, bool(causes), held, context)
+    structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
+    sentence = f"{context.lost}: no cause can be told."
+    if not context.lost:
+        sentence = verdicts.sentence(said, causes, structure, found, decision.louder)
+    setting, catalogue = trial.reference.setting, trial.reference.model.causes
+    return Verdict(
+        verdict=said,
+        said=sentence,
+        run=context.run.name,
+        before_effect=context.before_effect,
+        made=_made(context.run, context.before_effect),
+        causes=tuple(causes),
+        ranking=verdicts.ranking_json(decision, said, context.dropped),
+        rejected=verdicts.rejected_json(rejected),
+        traces=tuple(verdicts.trace_json(n) for n in decision.traces),
+        structure=structure if said == "unknown" else None,
+        intervals=(*context.pushed, *context.uncovered),
+        gain=found if causes else None,
+        wrong=tuple(context.wrong),
+        unseen=tuple(context.unseen),
+        limits=verdicts.limits_json(decision, catalogue, setting)
+        if said in ("none", "unknown")
+        else (),
+        notes=(*notes, *verdicts.remains(decision, said)),
+    )
+
+
+def _word(decision: Decision, named: bool, held: HeldOut | None, context: Context) -> str:
+    """named, none, unknown, coverage or external."""
+    if named:
+        return "named"
+    family = decision.structure.family if decision.structure else ""
+    unseen = held is not None and len(context.uncovered) > MOSTLY * len(held.cut)
+    if decision.verdict == "unknown" and not context.lost and family in SEEN and unseen:
+        return "coverage"
+    if decision.verdict == "none" and context.pushed:
+        return "external"
+    return decision.verdict
+
+
+def _made(run: Run, before_effect: bool) -> str:
+    if run.given:
+        return "of coefficients that were not fitted to these voyages"
+    return "on voyages before these" if before_effect else "on these very voyages"
+
+
+def enough(recorded: Record) -> bool:
+    """Whether anything can be said of it."""
+    return recorded.seconds >= LEAST_S and len(segments.begins(recorded)) >= 4
+
+
+def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
+    short = max(LEAST_S - recorded.seconds, segments.SECONDS * 4 - recorded.seconds, 0.0)
+    said = (
+        f"Too little for a verdict: {recorded.seconds:.0f} s can be used and {LEAST_S:.0f} s in "
+        f"unbroken stretches of {segments.SECONDS:.0f} s are needed. Log at least {short:.0f} s "
+        "more, with turns both ways, a stop, and runs on several headings."
+    )
+    return Verdict("coverage", said, run.name, before_effect)

@@ -1,0 +1,203 @@
+"""What causes are worth on windows whose voyage had no part in their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+
+from shiplog import conventions, diagnose, direct
+from shiplog.diagnose import Decision, Named
+from shiplog.extend import ExtendedSimulator
+from shiplog.gain import Gain, gain, parts
+from shiplog.hypotheses import Trial
+from shiplog.sensitivity import series
+from shiplog.windows import Windows
+
+WORTH = 0.02  # of the error, that each of several causes must take off held-out windows
+LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
+HARM = 1.2  # times the error, from which on even an instrument's fault is refuted
+VOYAGES = 3  # fewer cannot choose causes by voyages left out
+
+Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """The trial's windows, and the model as it stands."""
+
+    trial: Trial
+    cut: Windows
+    before: ExtendedSimulator
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        return self.cut.state.double().numpy()
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        return series(self.cut).steps
+
+    @cached_property
+    def voyages(self) -> list[str]:
+        """Of each window."""
+        return self.cut.plan["voyage"].to_list()
+
+    @cached_property
+    def states_before(self) -> np.ndarray:
+        return self.before.states(self.cut, self.before.theta)
+
+    def parts(self, states: np.ndarray) -> np.ndarray:
+        """L of each window by channel [N, 3]."""
+        return parts(states - self.measured, self.steps)
+
+    @cached_property
+    def losses_before(self) -> np.ndarray:
+        """[N, 3] by channel."""
+        return self.parts(self.states_before)
+
+    def states_after(self, decision: Decision) -> np.ndarray:
+        """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
+        states = np.empty(tuple(self.cut.state.shape))
+        constants = _constants(self.trial, decision.named)
+        for voyage, half, rows in self._folds():
+            numbers = self._without(decision, voyage, half)
+            simulator = self.before.with_causes(
+                [n.cause for n in decision.named], numbers, None, constants
+            )
+            states[rows.numpy()] = simulator.states(self.cut.pick(rows), simulator.theta)
+        return states
+
+    def gain(self, decision: Decision) -> Gain:
+        after = self.parts(self.states_after(decision))
+        return gain(self.losses_before, after, self.voyages)
+
+    def extended(self, decision: Decision) -> ExtendedSimulator:
+        """The model with what is named in it, with numbers from all voyages."""
+        named = decision.named
+        return self.before.with_causes(
+            [n.cause for n in named], {n.cause.label: n.numbers for n in named},
+            {n.cause.label: n.covariance for n in named}, _constants(self.trial, named),
+        )  # fmt: skip
+
+    def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
+        """What is left of a decision, its gain, and label → why not of what is not.
+
+        A cause of the error makes it less. An instrument's fault is a fault though it is worth
+        nothing, but not where it makes the error more.
+        """
+        dropped: dict[str, str] = {}
+        if not decision.named:
+            return decision, None, dropped
+        found = self.gain(decision)
+        while decision.named:
+            harm = found.after > HARM * found.before
+            asked = [n for n in decision.named if harm or not n.cause.only_read]
+            if not asked or (found.real and len(decision.named) == 1):
+                break
+            tried = []
+            for one in asked:
+                rest = diagnose.without(self.trial, decision, one)
+                tried.append((self.gain(rest), rest, one))
+            best, rest, one = min(tried, key=lambda t: t[0].after)
+            least = WORTH if len(decision.named) > 1 else 0.0
+            if best.after * (1.0 - least) >= found.after:
+                break
+            share = 1.0 - found.after / best.after
+            dropped[one.cause.label] = f"no gain on held-out voyages ({share:+.1%})"
+            decision, found = rest, best
+        return decision, found if decision.named else None, dropped
+
+    def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
+        """Beside a model that nobody fitted: instruments by evidence, and of the causes of the
+        error those that take most off voyages left out. None where there are too few voyages, or
+        no such cause."""
+        if len(set(self.voyages)) < VOYAGES:
+            return None, {}
+        ref = self.trial.reference
+        read = tuple(n for n in decision.named if n.cause.only_read)
+        others = [
+            c for c in ref.model.causes if not c.only_read and c.label not in self.trial.fixed
+        ]
+        constants: dict[str, np.ndarray] = {}
+        for cause in others:
+            constants |= cause.constants(ref.setting)
+        search = direct.search_of(self.before, others, ref.setting, self.cut, constants)
+        selected = direct.select(search)
+        refused = dict(selected.refused)
+        if not selected.numbers:
+            return None, refused
+        by = {c.label: c for c in others}
+        named = tuple(
+            Named(
+                by[label], float("nan"), selected.probability[label], numbers,
+                selected.covariance[label],
+            )
+            for label, numbers in selected.numbers.items()
+        )  # fmt: skip
+        for one in decision.named:
+            if not one.cause.only_read and one.cause.label not in by:
+                refused[one.cause.label] = f"{' and '.join(selected.numbers)} take more off"
+        chosen = replace(
+            decision, verdict="named", named=(*named, *read), structure=None, apart=selected.without
+        )
+        return chosen, refused
+
+    def lost(self, found: Gain | None) -> str:
+        """Why no name would be believed: a sign turned round does far more for the rollouts than
+        all that was named, or they are worse than a ship that keeps her velocities, with what was
+        named in them too. Empty where neither holds."""
+        own = float(self.losses_before.sum(1).mean())
+        after = own if found is None else found.after
+        hold = float(self.parts(self.measured[:, :1]).sum(1).mean())
+        other, turned = conventions.best(self.before, self.cut)
+        if turned < min(TURNED * after, hold):
+            return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
+        if own <= LOST * hold or after <= hold:
+            return ""
+        return (
+            f"The model is worse than one that keeps its velocities (L {own:.0f}, that one "
+            f"{hold:.0f})"
+        )
+
+    def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
+        """(voyage, half of it, window rows) that are left out: whole voyages, or the halves of one
+        alone."""
+        known = list(dict.fromkeys(self.voyages))
+        if len(known) > 1:
+            for name in known:
+                yield name, None, torch.tensor([i for i, n in enumerate(self.voyages) if n == name])
+            return
+        elapsed = self.cut.plan["elapsed"].to_numpy()
+        middle = 0.5 * (elapsed.min() + elapsed.max() + float(self.cut.dt[0].sum()))
+        for late in (False, True):
+            rows = torch.tensor(np.flatnonzero((elapsed >= middle) == late))
+            if len(rows):
+                yield known[0], (middle, late), rows
+
+    def _without(self, decision: Decision, voyage: str, half: Half) -> dict[str, np.ndarray]:
+        """Numbers of the named causes from all else alone."""
+        recorded, segment = self.trial.record, decision.point.linear.cut
+        index = recorded.names.index(voyage) if voyage in recorded.names else -1
+        out = segment.voyage == index
+        if half is not None:
+            middle, late = half
+            out &= (recorded.time[segment.rows] >= middle) == late
+        included = tuple(decision.base.numbers)
+        numbers = dict(decision.apart.get(voyage, {}))
+        if included:
+            fitted = self.trial.without(decision.point, included, decision.louder, out)
+            numbers = {**fitted, **numbers}
+        return {n.cause.label: numbers[n.cause.label] for n in decision.named}
+
+
+def _constants(trial: Trial, named: Sequence[Named]) -> dict[str, np.ndarray]:
+    """What the named causes' forces need, and no more: it is kept with an extended run."""
+    needed: dict[str, np.ndarray] = {}
+    for one in named:
+        needed |= one.cause.constants(trial.reference.setting)
+    return needed

@@ -1,0 +1,110 @@
+"""Store and run to a trial: what is usual for the ship, the voyages in question, the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.prepare import seconds
+from pipelines.split import plan
+from shiplog import causes as catalogue
+from shiplog import record, reference, remembered, table, user_causes, windows
+from shiplog.causes import Cause, Setting
+from shiplog.exceptions import StoreError
+from shiplog.hypotheses import Trial
+from shiplog.models import mmg
+from shiplog.models.extended import Extended
+from shiplog.models.mmg import estimate
+from shiplog.profile import Profile
+from shiplog.record import Record
+from shiplog.reference import Start
+from shiplog.runs import Run
+from shiplog.store import Store
+from shiplog.windows import Windows
+
+PLACES = 12  # of a map of the bottom
+
+
+def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
+    """Those that are asked for, or all that the run has not seen. Raises StoreError for none."""
+    if wanted:
+        return store.select(list(wanted))
+    names = [n for n in store.select() if n not in run.made_on]
+    if not names:
+        raise StoreError(
+            f"Every voyage in {store.path} was used to make {run.name}.",
+            hint="name some with --voyages, or ingest voyages it has not seen.",
+        )
+    return names
+
+
+def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
+    return record.read([frame.collect() for frame in store.tables(names)], names, profile)
+
+
+def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
+    """As `evaluate` cuts them; None where no stretch is long enough for one."""
+    rows = table.with_elapsed(seconds(store, names, profile))
+    planned = plan(rows, "ref", run.config.window)
+    if planned.height == 0:
+        return None
+    return windows.cut(rows, planned, run.config.window, profile.actuator_names, profile.wind_names)
+
+
+def trial_of(
+    run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path]
+) -> tuple[Trial, dict[str, str]]:
+    """Reference and trial; which causes cannot be tested, and why."""
+    setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
+    extension = run.extension
+    held = {} if extension is None else {c.label: c for c in extension.causes}
+    untested: dict[str, str] = {}
+    chosen = list(held.values())  # they are in the model, testable here or not
+    for one in (*catalogue.CATALOGUE, *user_causes.load(cause_files)):
+        if one.label in held:
+            continue
+        missing = one.missing(setting)
+        cause = one if missing else one.on(setting)
+        if missing is None and nominal is None and not run.given and cause.absorbed:
+            missing = "a model fitted to these voyages absorbs it"
+        if missing is None:
+            chosen.append(cause)
+        else:
+            untested[cause.label] = missing
+    model, start = _model(run, chosen, setting)
+    if nominal is None:
+        known = reference.assume(model, setting, start, recorded, given=run.given)
+        return Trial(known, recorded, tuple(held)), untested
+    # where the nominal voyages settle depends on them alone, so that it can be kept
+    before = setting_of(run, nominal, nominal)
+    testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
+    at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
+    known = reference.learn(model, setting, start, nominal, at)
+    return Trial(known, recorded, tuple(held)), untested
+
+
+def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
+    """The run's model with room for these causes, and where its coefficients stand."""
+    base, start, stand_in, values = run.base()
+    constants: dict[str, np.ndarray] = {}
+    for cause in causes:
+        constants |= cause.constants(setting)
+    if run.extension is not None:
+        constants |= run.extension.constants
+    return Extended(base, tuple(causes), stand_in, values, constants), start
+
+
+def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
+    """Ship and place of a diagnosis; her speed is that of the `usual` voyages."""
+    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
+    ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
+    places, spacing = reference.places(recorded, PLACES)
+    scale = {
+        "speed": max(speed, 1e-3), "length": main.length, "mass": main.mass,
+        "moment": main.mass * main.length,
+    }  # fmt: skip
+    windless = run.profile.has_wind and not ship.wind
+    lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
+    return Setting(run.profile, scale, places, spacing, lacking)
