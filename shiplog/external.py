@@ -12,7 +12,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -24,6 +23,7 @@ from shiplog.models.mmg.model import named
 from shiplog.quality import jumps, stretches
 from shiplog.record import Record
 from shiplog.segments import KNOT, Linear
+from shiplog.traced import traced
 from shiplog.unexplained import Unexplained
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
@@ -181,7 +181,7 @@ def _forces(
     return {name: np.asarray(force)[: len(state)] for name, force in found.items()}
 
 
-@jax.jit
+@traced
 def _compiled(physics, values, state, actuator, wind):
     return physics.forces(values, state, actuator, wind)
 

@@ -11,7 +11,6 @@ import os
 import zipfile
 from collections.abc import Iterable
 from dataclasses import astuple
-from functools import lru_cache
 from pathlib import Path as File
 
 import jax
@@ -65,7 +64,7 @@ def _keep(kept: File, found: Settled) -> None:
 
 def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:
     leaves, shape = jax.tree.flatten(model)
-    digest = hashlib.sha256(_source())
+    digest = hashlib.sha256(cache.source())
     for word in (shape, setting.scale, setting.profile, record.names, record.step):
         digest.update(repr(word).encode())
     arrays: Iterable = (
@@ -75,13 +74,3 @@ def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str
     for array in arrays:
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
-
-
-@lru_cache
-def _source() -> bytes:
-    """Digest of this package's modules."""
-    digest = hashlib.sha256()
-    root = File(__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
-    return digest.digest()

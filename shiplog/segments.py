@@ -8,8 +8,8 @@ that follows: y ≈ y* + Z (z - z*) + J d.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import jax
@@ -20,6 +20,7 @@ from jax import Array
 from shiplog import variational
 from shiplog.record import Record
 from shiplog.sensitivity import Physical, rate
+from shiplog.traced import traced
 
 jax.config.update("jax_enable_x64", True)
 
@@ -121,7 +122,7 @@ def _ab2(values: Array, before: Array, first) -> Array:
     return jnp.where(first, values, 1.5 * values - 0.5 * before)
 
 
-@jax.jit
+@traced
 def _path(model, theta, start, push, driven, step):
     """States [S, K, 6] at the nodes, accelerations `push` [S, K, 3] added."""
 
@@ -138,8 +139,8 @@ def _path(model, theta, start, push, driven, step):
     return jnp.moveaxis(states, 0, 1)
 
 
-@partial(jax.jit, static_argnames=("coefficients",))
-def _slopes(model, theta, states, driven, coefficients):
+@traced
+def _slopes(model, theta, states, driven, *, coefficients):
     """∂ν̇ by state [S, K, 3, 6], by what drives [S, K, 3, D] and by θ [S, K, 3, P or 0]."""
     by = (0, 1, 2) if coefficients else (0, 1)
     none = jnp.zeros((*states.shape[:2], 3, 0))
@@ -225,12 +226,15 @@ def first_path(model: Physical, theta: np.ndarray, segments: Cut, g: Grid) -> Pa
     states = resampled(centre, y, knots)
     per = round(KNOT / (g.step * NODE_ROWS))
     driven = segments.driven[:, ::per]
-    said = np.asarray(_accelerations(model, theta, states, driven))
+    said = np.empty_like(accelerated)
+    for part, filled in _chunks(len(segments)):
+        found = _accelerations(model, theta, filled(states), filled(driven))
+        said[part] = np.asarray(found)[: len(said[part])]
     start = y[:, 0] - 0.5 * BIN * (y[:, 1] - y[:, 0]) / BIN
     return Path(start, np.moveaxis(accelerated - said, -1, 1))
 
 
-@jax.jit
+@traced
 def _accelerations(model, theta, states, driven):
     return model.acceleration(theta, states, driven[..., :-2], driven[..., -2:])
 
@@ -296,32 +300,31 @@ def linear(
     return Linear(segments, path, e, z, j)
 
 
-def _run(model, theta, segments, path, g, moved=None):
-    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ.
+def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
+    """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
+    up: one compilation serves all."""
+    for at in range(0, count, CHUNK):
+        part = slice(at, min(at + CHUNK, count))
 
-    Chunk by chunk, padded: one compilation serves all.
-    """
+        def filled(values: np.ndarray, part: slice = part) -> np.ndarray:
+            own = values[part]
+            lack = CHUNK - len(own)
+            return np.concatenate((own, np.repeat(own[-1:], lack, axis=0))) if lack else own
+
+        yield part, filled
+
+
+def _run(model, theta, segments, path, g, moved=None):
+    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ."""
     push = path.at_nodes(g)
     per = (g.nodes - 1) // g.bins
     ys, columns = [], []
-    for at in range(0, len(segments), CHUNK):
-        part = slice(at, at + CHUNK)
-        lack = CHUNK - len(segments.rows[part])
-
-        def filled(values, lack=lack):
-            if not lack:
-                return values
-            return np.concatenate((values, np.repeat(values[-1:], lack, axis=0)))
-
-        driven = filled(segments.driven[part])
-        states = _path(
-            model, theta, filled(path.start[part]), filled(push[part]), driven, segments.step
-        )
-        keep = slice(CHUNK - lack)
-        by_state, by_driven, by_theta = (
-            np.asarray(found)[keep]
-            for found in _slopes(model, theta, states, driven, moved is not None)
-        )
+    for part, filled in _chunks(len(segments)):
+        driven = filled(segments.driven)
+        states = _path(model, theta, filled(path.start), filled(push), driven, segments.step)
+        keep = slice(part.stop - part.start)
+        slopes = _slopes(model, theta, states, driven, coefficients=moved is not None)
+        by_state, by_driven, by_theta = (np.asarray(found)[keep] for found in slopes)
         states = np.asarray(states)[keep]
         how = moved[part] if moved is not None else np.zeros((*driven[keep].shape, 0))
         pairs = 0.5 * (states[:, 1:] + states[:, :-1])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple, Protocol
 
 import jax
@@ -19,6 +18,7 @@ import torch
 from jax import Array
 
 from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.traced import traced
 from shiplog.windows import Windows
 
 jax.config.update("jax_enable_x64", True)
@@ -123,7 +123,7 @@ def rate(model: Physical, theta: Array, state: Array, actuator: Array, wind: Arr
     )
 
 
-@jax.jit
+@traced
 def _rollout(model, theta, start, actuator, wind, dt):
     """[N, I, 6] of inputs [N, I - 1, ...], a step each."""
 
@@ -172,8 +172,8 @@ def padded(data: Series) -> Series:
     )
 
 
-@partial(jax.jit, static_argnames=("free",))
-def _linearised(model, theta, start, actuator, wind, dt, free=None):
+@traced
+def _linearised(model, theta, start, actuator, wind, dt, *, free=None):
     """`free`: indices of the parameters to differentiate by; all of them if None."""
     actuator, wind, dt = _fine(actuator, wind, dt, model.substeps)
     states = _rollout(model, theta, start, actuator, wind, dt)
@@ -234,9 +234,9 @@ def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.nda
     return np.asarray(states)[:count], np.asarray(slopes)[:count]
 
 
-@partial(jax.jit, static_argnames=("free",))
-def _normal(model, theta, measured, actuator, wind, dt, steps, weight, free=None):
-    states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free)
+@traced
+def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=None):
+    states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free=free)
     scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
     error = (states[..., VELOCITY] - measured[..., VELOCITY]) * scale
     slope = slopes[:, :, VELOCITY] * scale[..., None]
@@ -276,7 +276,7 @@ def normal(
             model,
             theta,
             *(values[at : at + CHUNK] for values in (*whole[:4], whole.steps, whole.weight)),
-            free,
+            free=free,
         )
         for at in range(0, len(whole.measured), CHUNK)
     ]

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROWS = (  # each may import its own row (a package its own modules) and the rows above
     {"exceptions", "channels", "seeds", "cache"},
-    {"units", "findings"},
+    {"units", "findings", "traced"},
     {"profile", "config", "logs", "comparison", "exhibit"},
     {"align", "midship", "quality", "draft"},
     {"grid", "table", "parity", "parity_fit", "record", "variational"},
