@@ -231,6 +231,7 @@ def identify_command(
     parameters: Path | None,
     without: Sequence[str],
     free: Sequence[str],
+    folds: int | None = None,
 ) -> Answer:
     """`shiplog train --model mmg|hybrid`."""
     if model == "hybrid" and not fit:
@@ -255,7 +256,8 @@ def identify_command(
             "window": window,
             "split": split,
             "seeds": tuple(range(seeds)),
-            "physics": {"fit": fit, "without": tuple(without), "free": tuple(free)},
+            "physics": {"fit": fit, "without": tuple(without), "free": tuple(free)}
+            | ({} if folds is None else {"folds": folds}),
         }
     )
     run, said = identify_run(config, store, out, parameters)

@@ -257,6 +257,10 @@ def train(
     free: Annotated[
         list[str] | None, typer.Option(help="Physical models: parameters that may move: 'wind.*'.")
     ] = None,
+    folds: Annotated[
+        int | None,
+        typer.Option(min=2, help="Physical models: parts that voyages are held out in, 5 unless."),
+    ] = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
@@ -284,6 +288,7 @@ def train(
             parameters=parameters,
             without=without or [],
             free=free or [],
+            folds=folds,
         )
         _answer(found.text, found.content, json_to)
         return
@@ -292,6 +297,7 @@ def train(
         ("--parameters", parameters),
         ("--without", without),
         ("--free", free),
+        ("--folds", folds),
     ):
         if given:
             raise ShiplogError(

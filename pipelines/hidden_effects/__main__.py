@@ -12,7 +12,7 @@ python -m pipelines.hidden_effects score DIR
     the tables again, of what is there by now
 
 Interrupted, give the same command again and it goes on; with a larger --count it grows. Exit
-code 3: a case has no verdict.
+code 3: a case has no verdict; 4: less than --least asks for.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from pathlib import Path
 
 from pipelines.hidden_effects import plan, run, score, suites, tables
 from pipelines.hidden_effects.run import Settings
+from pipelines.hidden_effects.score import Score
 from shiplog.exceptions import ShiplogError
 
 
@@ -43,7 +44,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("stopped; what was finished is kept", file=sys.stderr)
         return 130
     print(tables.text(found))
-    return 3 if found.unmade or any(a.word == run.FAILED for a in found.answers) else 0
+    if found.unmade or any(a.word == run.FAILED for a in found.answers):
+        return 3
+    return _short_of(found, given.least)
+
+
+def _short_of(found: Score, least: int) -> int:
+    """4 where fewer are right than are asked for, or one is misnamed."""
+    right, wrong = (sum(getattr(a, how) for a in found.answers) for how in ("right", "misnamed"))
+    if not least or (right >= least and not wrong):
+        return 0
+    print(f"{right} right and {wrong} misnamed; at least {least} and none were asked for")
+    return 4
 
 
 def _run(given: argparse.Namespace) -> None:
@@ -80,6 +92,9 @@ def _parser() -> argparse.ArgumentParser:
             suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
     scored = commands.add_parser("score", help="the tables of what is there by now")
     scored.add_argument("out", type=Path)
+    for one in commands.choices.values():
+        one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "
+                         "are right and none is misnamed")  # fmt: skip
     return parser
 
 

@@ -116,7 +116,7 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
         ],
         "train": [
             *settings.shiplog, "train", "--model", "mmg", "--voyages", "nominal_*",
-            "--store", str(store), "--out", str(base),
+            "--folds", "2", "--store", str(store), "--out", str(base),
         ],
         "diagnose": [
             *settings.shiplog, "diagnose", str(base), "--voyages", "trial_*",
