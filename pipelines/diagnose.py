@@ -72,7 +72,7 @@ def diagnose_run(
     pushed = where.pushed(tried, point, whole)
     cut = trial.windows_of(run, store, names, profile)
     before = run.extended(run.config.seeds[0], recorded)
-    held = None if cut is None else HeldOut(tried, cut, before)
+    held = None if cut is None else HeldOut(cut, before, tried)
     decision, found, dropped, lost = _decided(run, tried, point, held)
     context = Context(
         run,

@@ -22,6 +22,7 @@ from shiplog.exceptions import RunError, listed
 from shiplog.findings import CONTRACT
 from shiplog.identify import Identified
 from shiplog.models import mmg
+from shiplog.models.hybrid import Hybrid
 from shiplog.runs import Run
 from shiplog.sensitivity import Series, Simulator, losses, rollout
 from shiplog.store import Store
@@ -109,7 +110,7 @@ def identify_run(
             network, simulator, done, sentence, validated = choose_network(
                 ready, config.physics, refit, by_voyage, seed
             )
-            save(run, seed, ready, simulator, done, simulator.model.residual.fixed)  # type: ignore[attr-defined]  # of a Hybrid, as `choose_network` made it
+            save(run, seed, ready, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
             said.append(sentence)
         else:
@@ -126,7 +127,6 @@ def save(
     ready: Prepared,
     simulator: Simulator,
     found: Identified | None,
-    fixed: dict[str, np.ndarray] | None = None,
 ) -> None:
     """One seed's numbers, for machines and as a TOML that --parameters takes."""
     start, count = ready.start, len(ready.start.names)
@@ -149,7 +149,8 @@ def save(
         }
     )
     toml = start.with_values(values, source).to_toml()
-    run.save_simulator(seed, simulator, fixed or {}, toml, identified)
+    fixed = simulator.model.residual.fixed if isinstance(simulator.model, Hybrid) else {}
+    run.save_simulator(seed, simulator, fixed, toml, identified)
 
 
 def _apart(days: list[str], voyages: list[str]) -> bool:

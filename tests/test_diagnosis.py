@@ -268,7 +268,7 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
     theta[
         list(held.before.model.names).index("hull.x_0f")
     ] *= -200.0  # drives her instead of braking
-    wild = HeldOut(held.trial, held.cut, replace(held.before, theta=theta))
+    wild = HeldOut(held.cut, replace(held.before, theta=theta), held.trial)
     said = wild.lost(None)
     assert "worse than one that keeps its velocities" in said
 
@@ -285,10 +285,10 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
     found, loss = conventions.best(model, turned)
     assert said in found
     assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
-    told = HeldOut(sea.done.trial, turned, model).lost(None)
+    told = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in said:  # the others do not double the error of so short a trial
         assert said in told and f"L is {loss:.0f}" in told
-    assert HeldOut(sea.done.trial, cut, model).lost(None) == ""
+    assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 
 # --- what is hidden, and what is not

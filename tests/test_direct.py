@@ -54,7 +54,7 @@ def search(labels=tuple(BEND)):
         first += BEND[label].shape[-1]
     size = np.full(first, 2.0)
     far = np.full(first, 10.0)
-    return Linear(Cut(), None, None, None, at, size, -far, far)  # type: ignore[arg-type]
+    return Linear(Cut(), None, None, None, at, size, -far, far)
 
 
 @pytest.fixture(scope="module")

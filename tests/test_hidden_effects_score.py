@@ -5,16 +5,20 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pipelines.hidden_effects import plan, run, score, suites, tables
+from pipelines.hidden_effects import oracle, plan, run, score, suites, tables
 from pipelines.hidden_effects.__main__ import main
 from pipelines.hidden_effects.parameters import compare
 from pipelines.hidden_effects.plan import Plan, Planned
 from pipelines.hidden_effects.score import Answer, Sealed, calibration, open_key, wilson
 from pipelines.known_ship.cases import CATALOGUE, OUTSIDE, draw
+from shiplog import profile as profiles
+from shiplog.causes import Setting
 
 ROOT = Path(__file__).parent.parent
 
@@ -116,7 +120,7 @@ def test_the_goals_table_counts_by_hand():
         "two at once, size 1: both, no third": ("1/2", "no"),
     }
     assert {what: (rows[what][1], rows[what][-1]) for what in counts} == counts
-    assert rows["held-out gain over the ORACLE's, median"][0] == "not measured"
+    assert rows["held-out gain over the oracle's: median"][0] == "not measured"
     assert rows["diagnose 7000 s: CPU time, median (worst)"][0] == "7.5 s (7.5 s)"
     assert rows["diagnose 7000 s: peak memory, median (worst)"][0] == "800 MB (800 MB)"
     assert "outside, size below 1" not in rows
@@ -130,9 +134,38 @@ def test_wilsons_interval_of_19_in_20():
 
 
 def test_the_gain_is_set_against_the_oracles_where_there_is_one():
-    better = [named("current", gain={"reduction": r, "oracle": 0.8}) for r in (0.6, 0.8, 0.76)]
-    rows = measured([answer(CURRENT, verdict) for verdict in [*better, named("current", gain={})]])
-    assert rows["held-out gain over the ORACLE's, median"][:2] == ("95 %", "3")
+    """None where nothing is named, the truth itself gains nothing, or nobody asked."""
+    better = [named("current", gain={"reduction": r}) for r in (0.6, 0.8, 0.76)]
+    told = [replace(answer(CURRENT, verdict), oracle=0.8) for verdict in (*better, NONE)]
+    gyro = replace(answer(CURRENT, better[0]), oracle=0.01)
+    rows = measured([*told, gyro, answer(CURRENT, better[0])])
+    assert rows["held-out gain over the oracle's: median"][:2] == ("95 %", "3")
+    assert rows["held-out gain over the oracle's: worst tenth"][:2] == ("75 %", "3")
+
+
+def test_the_truth_in_the_catalogues_own_numbers():
+    """Told as the contract has it, the numbers show just that again."""
+    profile = profiles.load("esso-vectwin")
+    scale = {"speed": 0.6, "length": 3.0, "mass": 244.6, "moment": 733.8}
+    setting = Setting(profile, scale, np.zeros((12, 2)), 1.0)
+
+    def numbers_of(name, **told):
+        parameters = {k: {"value": v} for k, v in told.items()}
+        return oracle.true_cause({"name": name, "parameters": parameters}, setting)
+
+    for towards, want in (
+        (190.0, [-0.0985, -0.0174]), (10.0, [0.0985, 0.0174]), (280.0, [0.0174, -0.0985]),
+    ):  # fmt: skip
+        cause, numbers = numbers_of("current", speed=0.1, direction=towards)
+        assert cause.label == "current" and numbers == pytest.approx(want, abs=1e-4)
+    _, numbers = numbers_of("payload", mass=30.0, position=-0.5)
+    assert numbers == pytest.approx([30.0, -15.0], rel=1e-6)
+    cause, numbers = numbers_of("clock_offset", time=0.4, channel="velocity")
+    assert cause.label == "clock_offset:velocity" and numbers == pytest.approx([0.4])
+    _, numbers = numbers_of("rudder_offset", port=-2.0, starboard=0.0)
+    assert numbers == pytest.approx([-math.radians(2.0), 0.0], abs=1e-9)
+    for name in ("bank", "side_thrust", "propeller_walk"):
+        assert numbers_of(name) is None
 
 
 # --- parameters -----------------------------------------------------------------------------------
@@ -339,6 +372,8 @@ def test_the_fixed_suite_hides_something_of_every_kind():
     assert len(drawn) == 12
     assert {case.verdict for case in drawn} == {"none", "named", "unknown"}
     assert {len(case.causes) for case in drawn} == {0, 1, 2}
+    assert [p.seed for p in suites.plan("brief").cases] == [p.seed for p in fixed.cases]
+    assert {p.seconds for p in suites.plan("brief").cases} == {3000}
     assert len(suites.plan("nightly", 7).cases) == 200
 
 
@@ -448,6 +483,19 @@ def test_a_diagnosis_that_breaks_is_a_wrong_answer_and_is_tried_again(
     run.run(out, planned, stubs())
     assert commands_said(tmp_path).count("diagnose") == 3
     assert main(["score", str(out)]) == 0
+    assert main(["score", str(out), "--least", "2"]) == 0
+    assert main(["score", str(out), "--least", "3"]) == 4
+    assert "2 right and 0 misnamed" in capsys.readouterr().out
+
+
+def test_one_wrong_name_is_too_many(tmp_path, stubs, capsys):
+    """However many are right beside it."""
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
+    key = out / "keys" / "6.json"
+    key.write_text(key.read_text().replace("current", "bank"))
+    assert main(["score", str(out), "--least", "1"]) == 4
+    assert "1 right and 1 misnamed" in capsys.readouterr().out
 
 
 def test_a_ship_is_trained_once_where_that_is_asked_for(tmp_path, stubs):

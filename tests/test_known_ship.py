@@ -803,7 +803,12 @@ def test_campaigns_are_as_long_as_asked_and_the_trial_comes_later():
     long, brief = cases.draw(6), cases.draw(6, seconds=500)
     assert [leg.seconds for leg in long.trial] == [plan.seconds for plan in PLANS]
     assert brief.nominal == long.nominal and sum(leg.seconds for leg in brief.trial) == 500.0
-    for legs in (long.nominal, long.trial, brief.trial):
+    short = cases.draw(6, seconds=3000)
+    assert [sum(leg.seconds for leg in legs) for legs in (short.nominal, short.trial)] == (
+        pytest.approx([3003.0, 3003.0])
+    )
+    assert (short.effects, short.ship) == (long.effects, long.ship)
+    for legs in (long.nominal, long.trial, brief.trial, short.nominal):
         assert legs[0].campaign[0] == 0.0 and legs[-1].campaign[1] == 1.0
         assert all(a.campaign[1] == b.campaign[0] for a, b in pairwise(legs))
     assert max(leg.start for leg in long.nominal) < min(leg.start for leg in long.trial)

@@ -151,6 +151,15 @@ def test_the_training_windows_fit_better_than_at_the_start(fitted):
     assert float(sentence.split("(")[1].split(")")[0]) < 0.9
 
 
+def test_voyages_are_held_out_in_as_many_parts_as_are_asked_for(fitted, store, tmp_path):
+    assert runs.load(fitted[0]).config.physics.folds == 5
+    code, _, _ = train(
+        store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, "--folds", 2, "--free", "hull.x_0f"
+    )
+    assert code == 0 and runs.load(tmp_path / "r").config.physics.folds == 2
+    assert call("train", "--store", store, "--out", tmp_path / "n", "--folds", 2)[0] == 1
+
+
 def test_one_identification_stands_for_all_seeds(fitted):
     run = runs.load(fitted[0])
     assert run.config.seeds == (0,)

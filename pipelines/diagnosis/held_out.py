@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from shiplog import conventions, diagnose, direct
+from shiplog.causes import constants_of
 from shiplog.diagnose import Decision, Named
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain, gain, parts
@@ -27,10 +28,9 @@ Half = tuple[float, bool] | None  # s into the voyage, and whether it is the lat
 
 
 @dataclass(frozen=True)
-class HeldOut:
-    """The trial's windows, and the model as it stands."""
+class Rollouts:
+    """A trial's windows, and the model as it stands."""
 
-    trial: Trial
     cut: Windows
     before: ExtendedSimulator
 
@@ -60,14 +60,21 @@ class HeldOut:
         """[N, 3] by channel."""
         return self.parts(self.states_before)
 
+
+@dataclass(frozen=True)
+class HeldOut(Rollouts):
+    """The same with the trial whose causes are judged on them."""
+
+    trial: Trial
+
     def states_after(self, decision: Decision) -> np.ndarray:
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
         states = np.empty(tuple(self.cut.state.shape))
-        constants = _constants(self.trial, decision.named)
+        needed = self._constants(decision)
         for voyage, half, rows in self._folds():
             numbers = self._without(decision, voyage, half)
             simulator = self.before.with_causes(
-                [n.cause for n in decision.named], numbers, None, constants
+                [n.cause for n in decision.named], numbers, None, needed
             )
             states[rows.numpy()] = simulator.states(self.cut.pick(rows), simulator.theta)
         return states
@@ -81,7 +88,7 @@ class HeldOut:
         named = decision.named
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
-            {n.cause.label: n.covariance for n in named}, _constants(self.trial, named),
+            {n.cause.label: n.covariance for n in named}, self._constants(decision),
         )  # fmt: skip
 
     def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
@@ -123,10 +130,8 @@ class HeldOut:
         others = [
             c for c in ref.model.causes if not c.only_read and c.label not in self.trial.fixed
         ]
-        constants: dict[str, np.ndarray] = {}
-        for cause in others:
-            constants |= cause.constants(ref.setting)
-        search = direct.search_of(self.before, others, ref.setting, self.cut, constants)
+        needed = constants_of(others, ref.setting)
+        search = direct.search_of(self.before, others, ref.setting, self.cut, needed)
         selected = direct.select(search)
         refused = dict(selected.refused)
         if not selected.numbers:
@@ -164,6 +169,9 @@ class HeldOut:
             f"{hold:.0f})"
         )
 
+    def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
+        return constants_of((n.cause for n in decision.named), self.trial.reference.setting)
+
     def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
         """(voyage, half of it, window rows) that are left out: whole voyages, or the halves of one
         alone."""
@@ -193,11 +201,3 @@ class HeldOut:
             fitted = self.trial.without(decision.point, included, decision.louder, out)
             numbers = {**fitted, **numbers}
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}
-
-
-def _constants(trial: Trial, named: Sequence[Named]) -> dict[str, np.ndarray]:
-    """What the named causes' forces need, and no more: it is kept with an extended run."""
-    needed: dict[str, np.ndarray] = {}
-    for one in named:
-        needed |= one.cause.constants(trial.reference.setting)
-    return needed

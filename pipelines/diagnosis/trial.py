@@ -11,7 +11,7 @@ from pipelines.prepare import seconds
 from pipelines.split import plan
 from shiplog import causes as catalogue
 from shiplog import record, reference, remembered, table, user_causes, windows
-from shiplog.causes import Cause, Setting
+from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
 from shiplog.hypotheses import Trial
 from shiplog.models import mmg
@@ -88,12 +88,10 @@ def trial_of(
 def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
     """The run's model with room for these causes, and where its coefficients stand."""
     base, start, stand_in, values = run.base()
-    constants: dict[str, np.ndarray] = {}
-    for cause in causes:
-        constants |= cause.constants(setting)
+    needed = constants_of(causes, setting)
     if run.extension is not None:
-        constants |= run.extension.constants
-    return Extended(base, tuple(causes), stand_in, values, constants), start
+        needed |= run.extension.constants
+    return Extended(base, tuple(causes), stand_in, values, needed), start
 
 
 def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:

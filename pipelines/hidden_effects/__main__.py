@@ -2,6 +2,8 @@
 
 python -m pipelines.hidden_effects fixed --out DIR
     twelve seeds; what is hidden is drawn by the seed
+python -m pipelines.hidden_effects brief --out DIR
+    the same in campaigns of 3000 s
 python -m pipelines.hidden_effects nightly --out DIR [--count 200] [--first-seed 30000]
     the same with other seeds; shift the block monthly, and never tune on it
 python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
@@ -62,7 +64,7 @@ def _run(given: argparse.Namespace) -> None:
     command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
     settings = Settings(
         jobs=given.jobs, keep=given.keep, share=given.share, rivals=given.rivals,
-        limit=given.limit, shiplog=command,
+        oracle=given.oracle, limit=given.limit, shiplog=command,
     )  # fmt: skip
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
@@ -84,10 +86,11 @@ def _parser() -> argparse.ArgumentParser:
             "--share", action="store_true", help="train once a ship, not once a case"
         )
         suite.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
+        suite.add_argument("--oracle", action="store_true", help="what the truth would gain, too")
         suite.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
         suite.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
         suite.set_defaults(first_seed=None, count=None)
-        if name != "fixed":
+        if name not in ("fixed", "brief"):
             suite.add_argument("--first-seed", type=int, default=first, help="of the block")
             suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
     scored = commands.add_parser("score", help="the tables of what is there by now")

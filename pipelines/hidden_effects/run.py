@@ -50,10 +50,12 @@ class Settings:
     keep: bool = False  # logs, store, base and report of each case
     share: bool = False  # one base model for all cases of a ship: her nominal campaign is the same
     rivals: bool = False  # simpler methods too, once the verdict is sealed
+    oracle: bool = False  # and what the truth would gain, once the verdict is sealed
     limit: float = 3600.0  # s for one step
     case: tuple[str, ...] = (sys.executable, "-m", "pipelines.known_ship", "case")
     shiplog: tuple[str, ...] = (sys.executable, "-c", "from shiplog.cli import main; main()")
     rival: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.rivals")
+    truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.oracle")
 
 
 def run(out: Path, plan: Plan, settings: Settings) -> None:
@@ -141,6 +143,8 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
         compared = compare_case(out, planned, settings)
         if compared is None:
             return None
+    if settings.oracle and steps[-1]["step"] == "diagnose":
+        _ask_oracle(folder, base, key, settings)
     if not settings.keep:
         for name in LARGE:
             shutil.rmtree(folder / name, ignore_errors=True)
@@ -166,6 +170,18 @@ def compare_case(out: Path, planned: Planned, settings: Settings) -> str | None:
         return f"not compared: rivals ended with {done['rc']}"
     _seal_file(answers)
     return f"compared after {done['wall_s']:.0f} s"
+
+
+def _ask_oracle(folder: Path, base: Path, key: Path, settings: Settings) -> None:
+    """`oracle.json`, where there is one; where it fails, the case stays what it is."""
+    answer = folder / "oracle.json"
+    done = _step("oracle", [
+        *settings.truth, str(base), "--case", str(folder), "--key", str(key),
+        "--store", str(folder / "store"), "--json", str(answer),
+    ], folder, settings.limit)  # fmt: skip
+    if done["rc"] != DONE:
+        log.info("no oracle: %s", done["stderr"])
+        answer.unlink(missing_ok=True)
 
 
 def _base_of(out: Path, planned: Planned) -> Path:

@@ -19,6 +19,7 @@ from shiplog.exceptions import ShiplogError
 
 Z_90 = 1.6449  # both sides of the normal distribution
 BINS = 10
+LEAST_GAIN = 0.05  # of the oracle's, for a share of it to mean anything
 
 
 class Sealed(ShiplogError):
@@ -58,13 +59,18 @@ def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was hidden in one case, and what was said of it; by simpler methods, too, if asked."""
+    """What was hidden in one case, and what was said of it; by simpler methods, too, if asked.
+
+    oracle   share of the held-out error that exactly what was hidden would take off; None where
+             it was not asked, or has no term here
+    """
 
     planned: Planned
     verdict: dict[str, Any]
     key: dict[str, Any]
     steps: list[dict[str, Any]]
     rivals: Mapping[str, Any] = field(default_factory=dict)
+    oracle: float | None = None
 
     def by(self, method: str) -> Answer:
         """The same case as that rival answers it."""
@@ -149,14 +155,12 @@ class Answer:
 
     @property
     def recovered(self) -> float | None:
-        """Of the error cut that the true term reaches, the share that the named one does.
-
-        `gain.oracle` is that reduction. A diagnosis cannot know it and need not give it; only a
-        scorer that fits the hidden term could, and this one does not.
-        """
-        gain = self.verdict.get("gain") or {}
-        oracle, reduction = gain.get("oracle"), gain.get("reduction")
-        return reduction / oracle if oracle and reduction is not None else None
+        """Of the error cut that the truth reaches, the share that what was named does. None where
+        nothing was named, or the truth itself gains next to nothing (a gyro's faults)."""
+        reduction = (self.verdict.get("gain") or {}).get("reduction")
+        if reduction is None or self.oracle is None or self.oracle < LEAST_GAIN:
+            return None
+        return reduction / self.oracle
 
     def step(self, name: str) -> dict[str, Any] | None:
         """One that went to its end."""
@@ -190,8 +194,15 @@ def read(out: Path) -> Score:
             unmade.append(one)
         else:
             rivals = open_rivals(folder, key)
-            answers.append(Answer(one, *open_key(folder, key), steps, rivals))
+            answers.append(
+                Answer(one, *open_key(folder, key), steps, rivals, _oracle(folder / "oracle.json"))
+            )
     return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
+
+
+def _oracle(path: Path) -> float | None:
+    found = json.loads(path.read_text(encoding="utf-8"))["oracle"] if path.exists() else None
+    return None if found is None else float(found["reduction"])
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:

@@ -37,6 +37,7 @@ GOALS: tuple[tuple[str, float | None, int], ...] = (  # rule, size, seconds of t
 )
 SUITES = {  # name → (first seed, cases; of `goals`: of each row)
     "fixed": (1001, 12),  # the first twelve after 1000, and none, one, two, outside all occur
+    "brief": (1001, 12),  # the same ships and effects in campaigns of 3000 s: minutes
     "nightly": (30000, 200),  # never tuned on: shift the block monthly
     "goals": (20000, 20),
 }
@@ -49,7 +50,8 @@ def plan(suite: str, first_seed: int | None = None, count: int | None = None) ->
     number = number if count is None else count
     seeds = range(first, first + number)
     if suite != "goals":
-        return Plan(suite, first, tuple(Planned(str(s), s, None, None, 7000) for s in seeds))
+        seconds = 3000 if suite == "brief" else 7000
+        return Plan(suite, first, tuple(Planned(str(s), s, None, None, seconds) for s in seeds))
     return Plan(suite, first, tuple(
         Planned(f"{seed}-{row}", seed, RULES[rule](seed, seed - first), size, seconds)
         for seed in seeds

@@ -23,10 +23,12 @@ from pipelines.known_ship.ship import Effects, Ship, varied
 from pipelines.known_ship.voyage import Voyage, sail
 from pipelines.known_ship.weather import Wind
 
-DURATIONS = {  # s, of the trial; the nominal campaign is always the first
+DURATIONS = {  # s, of the trial
     7000: (500.5, 1801.8, 500.5, 1801.8, 1201.2, 1201.2),  # the paper's
+    3000: (500.5, 900.9, 700.7, 900.9),
     500: (250.0, 250.0),  # one to fit and one to hold out
 }
+NOMINAL = {7000: 7000, 3000: 3000, 500: 7000}  # s of a trial → of the nominal campaign
 SHARES = {"none": 0.2, "one": 0.6, "two": 0.1, "outside": 0.1}
 SMALLEST = 0.1  # of the realistic size
 NOMINAL_DAY = datetime(2025, 6, 3, 1, 0, tzinfo=UTC)
@@ -269,7 +271,8 @@ def draw(
     cause    hide this instead: a name of `CATALOGUE` or `OUTSIDE`, two as "current+fouling",
              or "none"; ship, weather and noise stay those of the seed
     size     of all that is hidden; drawn log-uniformly from 0.1 to 1 unless given
-    seconds  length of the trial, 7000 or 500; the nominal campaign is whole in either
+    seconds  length of the trial, 7000, 3000 or 500; the nominal campaign is whole, but of as many
+             seconds where it is 3000
     """
     if seconds not in DURATIONS:
         raise ValueError(f"seconds is {seconds}; a trial takes {' or '.join(map(str, DURATIONS))}.")
@@ -296,7 +299,7 @@ def draw(
     return Case(
         seed=seed, ship=replace(varied(seed), name=Ship().name),  # her name would tell the seed
         causes=tuple(causes), ordinary=ordinary, effects=effects,
-        nominal=_legs(seed, "nominal", NOMINAL_DAY, DURATIONS[7000]),
+        nominal=_legs(seed, "nominal", NOMINAL_DAY, DURATIONS[NOMINAL[seconds]]),
         trial=_legs(seed, "trial", TRIAL_DAY, DURATIONS[seconds]),
     )  # fmt: skip
 

@@ -3,7 +3,7 @@ file of your own, given with --cause), and a line in CATALOGUE."""
 
 from __future__ import annotations
 
-from shiplog.causes.base import Cause, Parameter, Setting, Shown, si
+from shiplog.causes.base import Cause, Parameter, Setting, Shown, constants_of, si
 from shiplog.causes.environment import Bank, Current, ShallowWater, WindForce
 from shiplog.causes.sensors import (
     AntennaOffset,
@@ -36,4 +36,4 @@ CATALOGUE: tuple[Cause, ...] = (
     AntennaOffset(), WindDirectionOffset(), WindSpeedScale(),
 )  # fmt: skip
 
-__all__ = ["CATALOGUE", "Cause", "Parameter", "Setting", "Shown", "si"]
+__all__ = ["CATALOGUE", "Cause", "Parameter", "Setting", "Shown", "constants_of", "si"]

@@ -9,7 +9,7 @@ the model as it was, exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -200,6 +200,14 @@ class Cause:
         """Whether any of its numbers is large enough to matter."""
         least = np.array([setting.least(q) for q in self.parameters])
         return bool((np.abs(p) >= least).any())
+
+
+def constants_of(causes: Iterable[Cause], setting: Setting) -> dict[str, np.ndarray]:
+    """What all their forces need and nobody fits."""
+    needed: dict[str, np.ndarray] = {}
+    for cause in causes:
+        needed |= cause.constants(setting)
+    return needed
 
 
 def si(unit: str) -> float:
