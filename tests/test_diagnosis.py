@@ -25,6 +25,7 @@ from shiplog import conventions, diagnose, record, reference, runs, structure
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
+from shiplog.gain import Gain
 from shiplog.hypotheses import Told, Trial
 from shiplog.ingest import ingest
 from shiplog.store import Store
@@ -289,6 +290,33 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
     if "sign" in said:  # the others do not double the error of so short a trial
         assert said in told and f"L is {loss:.0f}" in told
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
+
+
+@pytest.mark.parametrize(
+    ("label", "evidence", "after", "low", "left"),
+    [
+        ("current", 60.0, 480.0, -0.01, 1),  # strong evidence, a gain that is not sure
+        ("current", 12.0, 480.0, 0.01, 1),  # weak evidence, a sure gain
+        ("current", 12.0, 480.0, -0.01, 0),  # neither: it may be something like it
+        ("current", 60.0, 505.0, -0.01, 0),  # no gain at all
+        ("yaw_rate_bias", 12.0, 505.0, -0.01, 1),  # an instrument's fault, worth nothing
+        ("yaw_rate_bias", 60.0, 700.0, -0.6, 0),  # which does harm
+    ],
+)
+def test_what_does_not_gain_is_no_cause_of_the_error(sea, label, evidence, after, low, left):
+    cause = next(c for c in sea.usual.model.causes if c.label == label)
+    one = replace(sea.done.decision.named[0], cause=cause, evidence=evidence)
+    point = replace(sea.done.decision.base, numbers={label: np.zeros(cause.count)})
+    decision = replace(sea.done.decision, named=(one,), base=point)
+
+    class Said(HeldOut):
+        def gain(self, decided):
+            return Gain(500.0, after if decided.named else 500.0, low, 0.1, 18, {})
+
+    held = sea.done.held
+    rest, found, dropped = Said(held.cut, held.before, held.trial).refuted(decision)
+    assert len(rest.named) == left and (found is None) == (not left)
+    assert ("no gain on held-out voyages" in dropped.get(label, "")) == (not left)
 
 
 # --- what is hidden, and what is not

@@ -94,8 +94,9 @@ class HeldOut(Rollouts):
     def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
         """What is left of a decision, its gain, and label → why not of what is not.
 
-        A cause of the error makes it less. An instrument's fault is a fault though it is worth
-        nothing, but not where it makes the error more.
+        A cause of the error makes it less, and surely so where little evidence speaks for it: what
+        is outside the catalogue looks a little like something in it. An instrument's fault is a
+        fault though it is worth nothing, but not where it makes the error more.
         """
         dropped: dict[str, str] = {}
         if not decision.named:
@@ -111,11 +112,15 @@ class HeldOut(Rollouts):
                 rest = diagnose.without(self.trial, decision, one)
                 tried.append((self.gain(rest), rest, one))
             best, rest, one = min(tried, key=lambda t: t[0].after)
-            least = WORTH if len(decision.named) > 1 else 0.0
-            if best.after * (1.0 - least) >= found.after:
+            alone = len(decision.named) == 1
+            gains = best.after * (1.0 if alone else 1.0 - WORTH) >= found.after
+            if gains and not (alone and one.evidence < diagnose.MORE):
                 break
             share = 1.0 - found.after / best.after
-            dropped[one.cause.label] = f"no gain on held-out voyages ({share:+.1%})"
+            why = f"{share:+.1%}"
+            if gains:
+                why = f"{why}, {found.low:+.1%} to {found.high:+.1%}: none that is sure"
+            dropped[one.cause.label] = f"no gain on held-out voyages ({why})"
             decision, found = rest, best
         return decision, found if decision.named else None, dropped
 
