@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.hidden_effects import oracle, plan, run, score, suites, tables
+from pipelines.hidden_effects import oracle, parameters, plan, run, score, suites, tables
 from pipelines.hidden_effects.__main__ import main
 from pipelines.hidden_effects.parameters import compare
 from pipelines.hidden_effects.plan import Plan, Planned
@@ -121,9 +121,30 @@ def test_the_goals_table_counts_by_hand():
     }
     assert {what: (rows[what][1], rows[what][-1]) for what in counts} == counts
     assert rows["held-out gain over the oracle's: median"][0] == "not measured"
-    assert rows["diagnose 7000 s: CPU time, median (worst)"][0] == "7.5 s (7.5 s)"
-    assert rows["diagnose 7000 s: peak memory, median (worst)"][0] == "800 MB (800 MB)"
+    assert rows["diagnose 7000 s, mmg: CPU time, median (worst)"][0] == "7.5 s (7.5 s)"
+    assert rows["diagnose 7000 s, mmg: peak memory, median (worst)"][0] == "800 MB (800 MB)"
     assert "outside, size below 1" not in rows
+
+
+def test_a_network_that_learned_the_trial_has_goals_of_its_own():
+    """A current it cannot take in, thrust it can: naming that is wrong, silence is right."""
+
+    def learned(key, verdict):
+        planned = Planned("1", 1, None, 1.0, 7000, "feedforward")
+        return replace(answer(key, verdict), planned=planned)
+
+    lost = hidden(thrust_loss=(1.0, {}))
+    rows = measured([
+        learned(CURRENT, named("current")), learned(CURRENT, NONE), learned(lost, NONE),
+        learned(lost, named("thrust_loss")), learned(lost, named("current")),
+    ])  # fmt: skip
+    of = "network on affected data: "
+    assert rows[f"{of}what it cannot take in"][1] == "1/2"
+    assert rows[f"{of}what it has taken in, named"][1] == "1/3"
+    assert rows[f"{of}named but wrong"][1] == "1/5"
+    assert "one cause, size 1, 7000 s: named right" not in rows
+    assert "named but wrong, any size" not in rows
+    assert rows["diagnose 7000 s, feedforward: CPU time, median (worst)"][3] == "<= 60 s"
 
 
 def test_wilsons_interval_of_19_in_20():
@@ -375,6 +396,9 @@ def test_the_fixed_suite_hides_something_of_every_kind():
     assert [p.seed for p in suites.plan("brief").cases] == [p.seed for p in fixed.cases]
     assert {p.seconds for p in suites.plan("brief").cases} == {3000}
     assert len(suites.plan("nightly", 7).cases) == 200
+    network = suites.plan("network")
+    assert {p.cause for p in network.cases} == {*parameters.SURVIVE, *parameters.ABSORBED}
+    assert {p.model for p in network.cases} == {"feedforward"}
 
 
 def test_a_plan_may_grow_but_not_change(tmp_path):

@@ -6,6 +6,9 @@ python -m pipelines.hidden_effects brief --out DIR
     the same in campaigns of 3000 s
 python -m pipelines.hidden_effects nightly --out DIR [--count 200] [--first-seed 30000]
     the same with other seeds; shift the block monthly, and never tune on it
+python -m pipelines.hidden_effects network --out DIR [--count 15] [--first-seed 25000]
+    the paper's network, trained on the very voyages in question: what it cannot take in is to be
+    named, and what it has taken in never
 python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
     each with --rivals: what simpler methods say of the same trials, too; of cases that were run

@@ -23,6 +23,13 @@ FACTORS = (  # new over old: 1 is none, and the error is a share of what was add
     "wind_speed_scale",
 )  # fmt: skip
 BEARINGS = ("heading_offset", "wind_direction_offset")
+SURVIVE = (  # what a network that was trained on the affected voyages cannot take in
+    "current", "rudder_delay", "clock_offset", "yaw_rate_bias", "thrust_drift", "shallow_water",
+    "rudder_lag", "yaw_rate_scale", "bank",
+)  # fmt: skip
+ABSORBED = (
+    "thrust_loss", "wind_force", "payload", "fouling", "wind_speed_scale", "cross_flow_drag",
+)  # fmt: skip
 CLOCKS = {"gnss": ("position", "velocity")}  # one clock for both; any other channel has its own
 
 

@@ -26,6 +26,7 @@ class Planned:
     cause: str | None  # as the simulator's command takes it; None: drawn by the seed
     size: float | None  # None: drawn by the seed
     seconds: int
+    model: str = "mmg"  # of the nominal campaign; a network is trained on the trial itself
 
     @property
     def options(self) -> list[str]:

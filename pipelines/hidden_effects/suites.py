@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipelines.hidden_effects.parameters import ABSORBED, SURVIVE
 from pipelines.hidden_effects.plan import Plan, Planned
 from pipelines.known_ship.cases import CATALOGUE, OUTSIDE
 
@@ -40,6 +41,7 @@ SUITES = {  # name → (first seed, cases; of `goals`: of each row)
     "brief": (1001, 12),  # the same ships and effects in campaigns of 3000 s: minutes
     "nightly": (30000, 200),  # never tuned on: shift the block monthly
     "goals": (20000, 20),
+    "network": (25000, len(SURVIVE) + len(ABSORBED)),
 }
 
 
@@ -49,6 +51,12 @@ def plan(suite: str, first_seed: int | None = None, count: int | None = None) ->
     first = first if first_seed is None else first_seed
     number = number if count is None else count
     seeds = range(first, first + number)
+    if suite == "network":
+        causes = (*SURVIVE, *ABSORBED)
+        return Plan(suite, first, tuple(
+            Planned(str(s), s, causes[(s - first) % len(causes)], 1.0, 7000, "feedforward")
+            for s in seeds
+        ))  # fmt: skip
     if suite != "goals":
         seconds = 3000 if suite == "brief" else 7000
         return Plan(suite, first, tuple(Planned(str(s), s, None, None, seconds) for s in seeds))

@@ -8,7 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
-from pipelines.hidden_effects.parameters import OTHER_FORM, PRECISE, Comparison
+from pipelines.hidden_effects.parameters import (
+    ABSORBED,
+    OTHER_FORM,
+    PRECISE,
+    SURVIVE,
+    Comparison,
+)
 from pipelines.hidden_effects.score import Answer, Score, calibration, wilson
 from shiplog import report
 
@@ -36,9 +42,17 @@ def _small(answer: Answer) -> bool:
 def _among(kind: str, sized: Test = lambda answer: True, seconds: int | None = 7000) -> Test:
     def test(answer: Answer) -> bool:
         there = seconds is None or answer.planned.seconds == seconds
-        return there and answer.kind == kind and sized(answer)
+        return there and _physics(answer) and answer.kind == kind and sized(answer)
 
     return test
+
+
+def _physics(answer: Answer) -> bool:
+    return answer.planned.model == "mmg"
+
+
+def _network(causes: Sequence[str]) -> Test:
+    return lambda answer: not _physics(answer) and set(answer.hidden) <= set(causes)
 
 
 def _tiny(answer: Answer) -> bool:
@@ -74,13 +88,22 @@ RATES = (
         lambda answer: answer.word != "none", most=0.05,
     ),
     Rate(
-        "named but wrong, any size", lambda answer: True, lambda answer: answer.misnamed, most=0.02
+        "named but wrong, any size", _physics, lambda answer: answer.misnamed, most=0.02
     ),
     Rate("outside, size 1: unknown, right family", _among("outside", _full), _right, least=0.95),
     Rate(
         "outside, size below 1", _among("outside", lambda answer: not _full(answer)), _right
     ),
     Rate("two at once, size 1: both, no third", _among("two", _full), _right, least=0.90),
+    Rate("network on affected data: what it cannot take in", _network(SURVIVE), _right, least=0.90),
+    Rate(
+        "network on affected data: what it has taken in, named", _network(ABSORBED),
+        lambda answer: not answer.misnamed and bool(answer.named), most=0.0,
+    ),
+    Rate(
+        "network on affected data: named but wrong", lambda answer: not _physics(answer),
+        lambda answer: answer.misnamed, most=0.02,
+    ),
     Rate("two at once, size below 1", _among("two", lambda answer: not _full(answer)), _right),
 )  # fmt: skip
 
@@ -195,26 +218,32 @@ def _calibration(answers: Sequence[Answer]) -> list[Row]:
 
 def _times(answers: Sequence[Answer]) -> list[Row]:
     """Of diagnoses of whole trials that came to an end. CPU time is what one core would take."""
-    steps = [a.step("diagnose") for a in answers if a.planned.seconds == 7000]
-    done = [step for step in steps if step]
-    if not done:
-        return []
-    cpu, wall, peak = ([step[k] for step in done] for k in ("cpu_s", "wall_s", "peak_mb"))
-    middle, count = statistics.median(cpu), str(len(done))
-    return [
-        (
-            "diagnose 7000 s: CPU time, median (worst)", f"{middle:.1f} s ({max(cpu):.1f} s)",
-            count, "", "<= 10 s", _met(middle <= 10.0),
-        ),
-        (
-            "diagnose 7000 s: wall time, median (worst)",
-            f"{statistics.median(wall):.1f} s ({max(wall):.1f} s)", count, "", "", "",
-        ),
-        (
-            "diagnose 7000 s: peak memory, median (worst)",
-            f"{statistics.median(peak):.0f} MB ({max(peak):.0f} MB)", count, "", "", "",
-        ),
-    ]  # fmt: skip
+    rows: list[Row] = []
+    for model, limit in (("mmg", 10.0), ("feedforward", 60.0)):
+        steps = [
+            a.step("diagnose") for a in answers
+            if a.planned.seconds == 7000 and a.planned.model == model
+        ]  # fmt: skip
+        done = [step for step in steps if step]
+        if not done:
+            continue
+        cpu, wall, peak = ([step[k] for step in done] for k in ("cpu_s", "wall_s", "peak_mb"))
+        middle, count, of = statistics.median(cpu), str(len(done)), f"diagnose 7000 s, {model}: "
+        rows += [
+            (
+                f"{of}CPU time, median (worst)", f"{middle:.1f} s ({max(cpu):.1f} s)", count, "",
+                f"<= {limit:.0f} s", _met(middle <= limit),
+            ),
+            (
+                f"{of}wall time, median (worst)",
+                f"{statistics.median(wall):.1f} s ({max(wall):.1f} s)", count, "", "", "",
+            ),
+            (
+                f"{of}peak memory, median (worst)",
+                f"{statistics.median(peak):.0f} MB ({max(peak):.0f} MB)", count, "", "", "",
+            ),
+        ]  # fmt: skip
+    return rows
 
 
 # --- simpler methods ------------------------------------------------------------------------------
