@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from shiplog.advise import Advice
 from shiplog.causes import Cause, Setting, si
 from shiplog.channels import VELOCITY
 from shiplog.diagnose import LEAST, PULSES, UNKNOWN, Decision, Named
@@ -94,7 +95,7 @@ DEPENDS = {
 }
 
 
-def cause_json(named: Named) -> dict:
+def cause_json(named: Named, advice: Advice | None = None) -> dict:
     shown = named.shown
     content = {
         "name": named.cause.name,
@@ -109,8 +110,12 @@ def cause_json(named: Named) -> dict:
     tests = [named.cause.separated_by[n] for n in named.alike if n in named.cause.separated_by]
     if named.alike:
         content["next_test"] = "; ".join(dict.fromkeys(tests)) or (
-            "log the same manoeuvres again, with turns both ways and stops"
+            advice.words if advice else "the same manoeuvres again, with turns both ways and stops"
         )
+    if advice is not None:
+        content["next_test_expected"] = {
+            "manoeuvre": advice.words, "seconds": advice.seconds, "nats": advice.nats,
+        }  # fmt: skip
     if named.cause.user:
         content["user"] = True
     return content
@@ -307,6 +312,11 @@ def markdown(verdict: Verdict) -> str:
             lines += [
                 "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}; "
                 f"this would: {cause['next_test']}.",
+            ]  # fmt: skip
+        if (expected := cause.get("next_test_expected")) is not None:
+            lines += [
+                f"Simulated, {expected['manoeuvre']} would tell most: {expected['nats']:.3g} nats "
+                f"in {expected['seconds']:.0f} s.",
             ]  # fmt: skip
         lines.append("")
     if verdict.gain is not None:

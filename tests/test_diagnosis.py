@@ -21,7 +21,7 @@ from pipelines.identify import identify_run
 from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
-from shiplog import conventions, diagnose, record, reference, runs, structure
+from shiplog import advise, conventions, diagnose, record, reference, runs, structure
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
@@ -317,6 +317,27 @@ def test_what_does_not_gain_is_no_cause_of_the_error(sea, label, evidence, after
     rest, found, dropped = Said(held.cut, held.before, held.trial).refuted(decision)
     assert len(rest.named) == left and (found is None) == (not left)
     assert ("no gain on held-out voyages" in dropped.get(label, "")) == (not left)
+
+
+def test_the_manoeuvre_that_separates_is_the_seamans(sea):
+    """Rudders must move to tell a lag from a delay, screws turn to tell lost thrust from a rough
+    hull, and the ship swing both ways to tell a gyro's scale from its bias."""
+    trial = sea.done.trial
+    grams = dict(zip((m.words for m in advise.MANOEUVRES), advise.sailed(trial, {}), strict=True))
+    by = {c.label: c for c in sea.usual.model.causes}
+
+    def worth(label, numbers, other):
+        one = replace(sea.done.decision.named[0], cause=by[label], numbers=np.array(numbers))
+        return {w.split(",")[0]: advise.apart(trial, g, one, other) for w, g in grams.items()}
+
+    lag = worth("rudder_lag", [2.0], "rudder_delay")
+    assert lag["a drifting stop"] == pytest.approx(0.0, abs=1e-3)
+    assert lag["doublets of 3 s at constant revolutions"] > 5.0
+    power = worth("thrust_loss", [-0.2], "fouling")
+    assert power["full power and no power in turn"] > 2.0 * power["a drifting stop"]
+    gyro = worth("yaw_rate_scale", [0.03], "yaw_rate_bias")
+    assert gyro["a zigzag"] > 10.0 * gyro["a drifting stop"]
+    assert all(v >= -1e-6 for found in (lag, power, gyro) for v in found.values())
 
 
 # --- what is hidden, and what is not

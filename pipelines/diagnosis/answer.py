@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipelines.diagnosis import where
 from pipelines.diagnosis.held_out import HeldOut
-from shiplog import diagnose, segments
+from shiplog import advise, diagnose, segments
 from shiplog import verdict as verdicts
 from shiplog.diagnose import Decision
 from shiplog.extend import ExtendedSimulator
@@ -82,7 +82,8 @@ def verdict(
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
     rejected |= {k: f"not testable: {why}" for k, why in context.untested.items()}
-    causes = [verdicts.cause_json(n) for n in decision.named]
+    advised = advise.advice(trial, decision.named, decision.first.numbers)
+    causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.pulses is not None:
         times = where.pulses(trial, decision, decision.pulses)
         sure = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
