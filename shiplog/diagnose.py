@@ -13,8 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from shiplog import unnamed
 from shiplog.causes import Cause, Shown
-from shiplog.hypotheses import Found, Point, Pulses, Told, Trial
+from shiplog.hypotheses import Found, Point, Told, Trial
+from shiplog.unnamed import Pulses
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 LEAST = 8.0  # nats that the first cause must bring
@@ -135,9 +137,9 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
     while True:
         first = len(included) == len(fixed)
         wanted = LEAST if first and pulses is None else MORE
-        remains = trial.structures(point, base, included)
+        remains = unnamed.structures(trial, point, base, included)
         if pulses is None and base.louder >= LOUD:
-            tried = trial.pulses(point, base)
+            tried = unnamed.pulses(trial, point, base)
             rivals = [f.evidence for f in (*found[:1], *remains[:1])]
             if tried.gain > max(PULSED, *rivals):
                 pulses = tried
@@ -287,7 +289,7 @@ def odds(gain: float, wanted: float) -> float:
 
 
 def _structure(trial: Trial, point: Point, found: Found) -> Structure:
-    acts = trial.acts_on(point, found)
+    acts = unnamed.acts_on(trial, point, found)
     return Structure(found.name, found.evidence, acts)
 
 

@@ -16,6 +16,7 @@ from shiplog.gain import Gain
 from shiplog.unseen import Dependence
 
 SHARE_SAID = 0.01  # of a ranking
+HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
 NINETY = 1.645  # standard deviations to either end of a 90 % interval
 
 
@@ -204,15 +205,15 @@ def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> 
 
 def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
     """The smallest size of each cause that these data would show, best known first: of each number
-    alone, and as a share of the realistic size."""
+    alone, and as a share of the realistic size. Numbers that no size would show are left out."""
     by = {c.label: c for c in causes}
     found = []
     for label, told in decision.told.items():
         cause, least = by[label], told.least(LEAST)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
-            parts = zip(cause.parameters, sizes, strict=True)
-            shown = {p.name: (size / si(p.unit), p.unit) for p, size in parts}
+            parts = zip(cause.parameters, sizes, least, strict=True)
+            shown = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
         else:  # as many as the ship has rudders, or the map places
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
@@ -351,7 +352,8 @@ def markdown(verdict: Verdict) -> str:
                 for k, v in one["parameters"].items()
             )
             label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
-            lines.append(f"| {label} | {numbers} | {one['share']:.0%} |")
+            share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "never shows"
+            lines.append(f"| {label} | {numbers} | {share} |")
         lines.append("")
     if verdict.wrong:
         lines += ["## Where it is wrong", ""]

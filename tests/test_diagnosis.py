@@ -21,7 +21,7 @@ from pipelines.identify import identify_run
 from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
-from shiplog import advise, conventions, diagnose, record, reference, runs, structure
+from shiplog import advise, conventions, diagnose, record, reference, runs, structure, unnamed
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
@@ -520,7 +520,7 @@ def test_in_each_others_places_nothing_depends_on_position(sea, trials, monkeypa
     base, _ = trial.scan(point, ())
 
     def explained() -> float:
-        found = trial.structures(point, base, ())
+        found = unnamed.structures(trial, point, base, ())
         return next(f.evidence for f in found if f.name == "position")
 
     before = explained()

@@ -23,6 +23,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"segments", "evidence", "wrong", "extend", "ridge"},
     {"unexplained", "reference", "structure", "conventions"},
     {"unseen", "external", "hypotheses", "remembered", "direct"},
+    {"unnamed"},
     {"diagnose"},
     {"advise"},
     {"runs", "report", "viewer", "verdict"},

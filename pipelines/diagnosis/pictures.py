@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from pipelines.diagnosis.answer import Diagnosis
-from shiplog import unexplained, viewer
+from shiplog import unexplained, unnamed, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
 from shiplog.diagnose import PULSES, Decision
@@ -125,7 +125,7 @@ def _acceleration(model, theta, state, driven, wind):
 def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
-    force, _ = trial.pulse_force(decision.point, decision.base, decision.pulses)
+    force, _ = unnamed.pulse_force(trial, decision.point, decision.base, decision.pulses)
     apart = round(KNOT / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
     whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force

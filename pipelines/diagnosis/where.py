@@ -10,16 +10,17 @@ import polars as pl
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.prepare import seconds
 from shiplog import coverage as covering
-from shiplog import external, segments, table, unexplained, unseen, wrong
+from shiplog import external, segments, table, unexplained, unnamed, unseen, wrong
 from shiplog import verdict as verdicts
 from shiplog.diagnose import Decision
 from shiplog.extend import campaign
-from shiplog.hypotheses import Point, Pulses, Trial
+from shiplog.hypotheses import Point, Trial
 from shiplog.profile import Profile
 from shiplog.runs import Run
 from shiplog.segments import Linear
 from shiplog.sensitivity import series
 from shiplog.store import Store
+from shiplog.unnamed import Pulses
 from shiplog.verdict import Interval
 from shiplog.windows import Windows
 
@@ -97,7 +98,7 @@ def uncovered(
 
 def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
-    force, sd = trial.pulse_force(decision.point, decision.base, found)
+    force, sd = unnamed.pulse_force(trial, decision.point, decision.base, found)
     strongest = float(np.quantile(np.abs(force), 0.98))
     times: list[dict] = []
     for i, row in enumerate(trial.rows):

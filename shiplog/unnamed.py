@@ -1,0 +1,193 @@
+"""What has no name of its own, on the same scale of evidence: structures that anything may have,
+and a force that nobody records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from shiplog import evidence, structure
+from shiplog.hypotheses import LOUDER, Found, Point, Trial
+from shiplog.models.mmg import body
+from shiplog.reference import HELD
+
+LOUD = 1.2  # from which on a structure may also bring the usual unrest back
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """The unrecorded thruster: log likelihood, its gain over louder unrest, place [m ahead of
+    midship], root mean square force [N], and acceleration of 1 N [3]."""
+
+    value: float
+    gain: float
+    lever: float
+    force: float
+    unit: np.ndarray
+
+
+def acts_on(trial: Trial, point: Point, found: Found) -> tuple[str, ...]:
+    """Channels in which a structure pushes by more than a third of where it pushes most."""
+    ref = trial.reference
+    here = structure.at_knots(point.linear.cut, trial.grid)
+    basis = structure.basis(found.name, trial.record, here)
+    if basis is None:
+        return ()
+    features = basis.features(here)
+    columns = structure.columns(point.linear, features, ref.unrest.push)
+    weighed = evidence.weighed(point.linear, trial.unrest.noise, columns)
+    total = trial.total(weighed, 1.0)
+    weights = np.linalg.solve(
+        total[1:, 1:] + np.eye(len(total) - 1) / structure.SIZES[1] ** 2, total[1:, 0]
+    )
+    pushed = (features @ weights).std((0, 1))
+    names = np.array(["surge", "sway", "yaw_rate"])
+    return tuple(str(n) for n in names[pushed > pushed.max() / 3.0])
+
+
+def structures(trial: Trial, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
+    """Each family's evidence above the base hypothesis, less what is usual of it."""
+    ref = trial.reference
+    here = structure.at_knots(point.linear.cut, trial.grid)
+    usual = None
+    if ref.nominal is not None:
+        usual = structure.at_knots(ref.nominal.cut, trial.grid)
+    found = []
+    for family in structure.FAMILIES:
+        basis = structure.basis(family, trial.record, *(k for k in (usual, here) if k))
+        if basis is None:
+            continue
+        columns = structure.columns(point.linear, basis.features(here), ref.unrest.push)
+        weighed = evidence.weighed(
+            point.linear, ref.unrest.noise, np.concatenate((point.linear.j, columns), -1)
+        )
+        before = None
+        if usual is not None and ref.nominal is not None and family != "time":
+            added = structure.columns(ref.nominal, basis.features(usual), ref.unrest.push)
+            joined = np.concatenate((ref.nominal.j, added), -1)
+            weighed_then = evidence.weighed(ref.nominal, ref.unrest.noise, joined)
+            before = evidence.total(weighed_then, ref.unrest, np.ones(len(joined)))
+        best = max(
+            (
+                one
+                for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
+                for one in _structure(trial, family, weighed, before, point, included, louder)
+            ),
+            key=lambda f: f.evidence,
+        )
+        found.append(replace(best, evidence=best.evidence - base.evidence))
+    return sorted(found, key=lambda f: -f.evidence)
+
+
+def _structure(trial: Trial, family, weighed, before, point, included, louder) -> Iterator[Found]:
+    """At one λ, in each size."""
+    ref = trial.reference
+    unit = ref.columns.unit
+    count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
+    volume = trial.volume(louder)
+    whole = trial.total(weighed, louder)
+    for size in structure.SIZES:
+        by = np.concatenate(([1.0], unit, np.full(more, size)))
+        total = whole * np.outer(by, by)
+        known, pull = _usual(trial, before, by, more)
+        value = trial.solve(
+            _twice(total, more), volume, louder, point, included,
+            _beside(known, more), np.concatenate((pull, np.zeros(more))),
+        ).value  # fmt: skip
+        if before is not None:
+            # what the nominal campaign has of it already is no news
+            usual = trial.solve(total, volume, louder, point, included, known, pull)
+            kept = total[: count + 1, : count + 1]
+            without = trial.solve(kept, volume, louder, point, included, ref.information, ref.pull)
+            value -= max(usual.value - without.value, 0.0)
+        yield Found(family, value, louder)
+
+
+def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients and a structure's weights after the nominal campaign; where that says
+    nothing of the structure, it is usually not there."""
+    ref = trial.reference
+    if before is None:
+        held = _beside(ref.information, more)
+        held[len(ref.pull) :, len(ref.pull) :] *= HELD
+        return held, np.concatenate((ref.pull, np.zeros(more)))
+    seen = before * np.outer(by, by) / ref.kappa
+    sure = np.diag(np.concatenate((ref.columns.known, np.ones(more))))
+    return seen[1:, 1:] + sure, seen[1:, 0] + np.concatenate((ref.anchor, np.zeros(more)))
+
+
+def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
+    """A force to the side that comes and goes at one place along the ship, unrecorded: its
+    accelerations go together as those of no other unrest do. Judged on what is left."""
+    ref = trial.reference
+    d = trial.solved(point, base)
+    left = point.weighed
+    r = np.concatenate(([1.0], -d))
+    alone = replace(
+        left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
+    )
+
+    def value(unrest: evidence.Unrest) -> float:
+        found = evidence.gram(alone, unrest)
+        return -0.5 * (float(trial.weight @ found.each[:, 0, 0]) + found.logdet)
+
+    isotropic = max(value(trial.unrest.louder(v)) for v in LOUDER)
+    best: Pulses | None = None
+    ship = ref.model.stand_in
+    coefficients = ref.coefficients
+    length = ref.setting.scale["length"]
+    for lever in np.linspace(-0.45, 0.45, 7) * length:
+        unit = accelerations(coefficients, ship.geometry, np.array([0.0, 1.0, lever]))
+        # in newtons that matter: from the usual unrest upwards
+        ordinary = trial.unrest.push[1] / abs(unit[1])
+        for size in ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0]):
+            tried = replace(trial.unrest, pulse=unit * size)
+            one = value(tried)
+            if best is None or one > best.value:
+                best = Pulses(one, one - isotropic, float(lever), float(size), unit)
+    assert best is not None
+    return best
+
+
+def pulse_force(
+    trial: Trial, point: Point, base: Found, pulses: Pulses
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
+    d = trial.solved(point, base)
+    unrest = trial.unrest.louder(base.louder)
+    z, covariance = evidence.starts_and_knots(point.linear, d, unrest)
+    knots = trial.grid.knots
+    kernel = unrest.kernel(knots)
+    pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
+    share = pulse @ np.linalg.inv(kernel)
+    pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+    sway = slice(knots, 2 * knots)
+    left = (pulse - share @ pulse)[sway, sway]
+    known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
+    variance = np.diagonal(known + left, axis1=1, axis2=2)
+    return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
+
+
+def accelerations(coefficients: Mapping, geometry, force: np.ndarray) -> np.ndarray:
+    """ν̇ [3] that a force X, Y, N makes of a ship at rest."""
+    zero = jnp.zeros(())
+    found = body.accelerations(coefficients, geometry, zero, zero, zero, jnp.asarray(force))
+    return np.asarray(found)
+
+
+def _twice(total: np.ndarray, more: int) -> np.ndarray:
+    """The last columns once more: what is usual of them, and what changed."""
+    at = np.arange(len(total))
+    both = np.concatenate((at, at[len(at) - more :]))
+    return total[np.ix_(both, both)]
+
+
+def _beside(information: np.ndarray, more: int) -> np.ndarray:
+    """With as many numbers more, of unit size each."""
+    whole = np.eye(len(information) + more)
+    whole[: len(information), : len(information)] = information
+    return whole
