@@ -118,85 +118,181 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
 
     banned   labels that held-out voyages have refuted already
     """
-    ref = trial.reference
-    fixed = trial.fixed
-    known = {c.label: c for c in ref.model.causes if c.label not in fixed}
-    catalogue = {label: cause for label, cause in known.items() if label not in banned}
-    first_point = point
-    trial.unrest = ref.unrest
-    included: tuple[str, ...] = fixed
-    base, found = trial.scan(point, tuple(catalogue.values()), included)
-    nothing = base
-    told = {f.name: f.told for f in found if f.told is not None}
-    rejected: dict[str, str] = {}
-    ranking: dict[str, float] = {}
-    steps: dict[str, tuple[float, tuple[str, ...]]] = {}
-    pulses: Pulses | None = None
-    structure: Structure | None = None
-    remains: list[Found] = []
-    while True:
-        first = len(included) == len(fixed)
-        wanted = LEAST if first and pulses is None else MORE
-        remains = unnamed.structures(trial, point, base, included)
-        if pulses is None and base.louder >= LOUD:
-            tried = unnamed.pulses(trial, point, base)
-            rivals = [f.evidence for f in (*found[:1], *remains[:1])]
-            if tried.gain > max(PULSED, *rivals):
-                pulses = tried
-                trial.unrest = replace(trial.unrest, pulse=tried.unit * tried.force)
-                base, found = trial.scan(point, _left(catalogue, included), included)
-                continue
-        settled = _settle(trial, point, base, found, included)
-        strongest = max(remains, key=lambda f: f.evidence, default=None)
-        stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
-        if not ranking:
-            ranking = _ranked(settled, found, remains, base, wanted, stochastic)
-            if pulses is not None:
-                sure = odds(pulses.gain, PULSED)
-                ranking = {PULSES: sure} | {k: (1.0 - sure) * v for k, v in ranking.items()}
-        best = settled[0] if settled else None
-        gain = best[1].evidence - base.evidence if best else -math.inf
-        if strongest and strongest.evidence > max(UNKNOWN, gain + FLEXIBLE):
-            structure = _structure(trial, point, strongest)
-            if best:
-                rejected[best[1].name.split("+")[-1]] = (
-                    f"a dependence on {strongest.name} that it does not have explains "
-                    f"{strongest.evidence - max(gain, 0.0):.0f} nats more"
-                )
-            break
-        if best is None or gain < wanted or len(included) - len(fixed) >= MOST:
-            break
-        point, base = best
-        label = next(n for n in base.numbers if n not in included)
-        rivals = tuple(
-            one.name.split("+")[-1]
-            for _, one in settled[1:]
-            if best[1].evidence - one.evidence < ALIKE
-        )
-        steps[label] = (gain, rivals)
-        for _, one in settled[1:]:
-            other = one.name.split("+")[-1]
-            less = best[1].evidence - one.evidence
-            rejected.setdefault(other, f"{label} explains {less:.0f} nats more")
-        included = tuple(base.numbers)
-        _, found = trial.scan(point, _left(catalogue, included), included)
-    included, point, base, dropped = _backwards(trial, included, fixed, point, base, steps)
-    for label, loss in dropped.items():
-        rejected[label] = f"without it the others explain all but {loss:.0f} nats"
-    named = _named(trial, included, fixed, base, steps, ranking)
-    traces = tuple(n for n in named if not n.cause.practical(n.numbers, ref.setting))
-    real = tuple(n for n in named if n.cause.practical(n.numbers, ref.setting))
-    stochastic = _louder(trial, point, base, included) if base.louder > 1.0 else 0.0
-    verdict = "named" if real or pulses else "none"
-    if structure is not None and not real and pulses is None:
+    trial.unrest = trial.reference.unrest
+    search = _Search(trial, point, banned)
+    nothing = search.base
+    while search.one_more():
+        pass
+    search.backwards()
+    named = search.named()
+    setting = trial.reference.setting
+    traces = tuple(n for n in named if not n.cause.practical(n.numbers, setting))
+    real = tuple(n for n in named if n.cause.practical(n.numbers, setting))
+    structure, base = search.structure, search.base
+    verdict = "named" if real or search.pulses else "none"
+    if structure is not None and verdict == "none":
         verdict = "unknown"
-    elif verdict == "none" and stochastic > STOCHASTIC and base.louder >= LOUD:
+    elif verdict == "none" and base.louder >= LOUD and search.stochastic > STOCHASTIC:
         verdict = "unknown"
-        structure = Structure("stochastic", stochastic, ("surge", "sway", "yaw_rate"))
+        structure = Structure("stochastic", search.stochastic, ("surge", "sway", "yaw_rate"))
     return Decision(
-        verdict, real, structure, pulses, traces, rejected, ranking, base.louder, point, base,
-        first_point, nothing, tuple(remains), told,
+        verdict, real, structure, search.pulses, traces, search.rejected, search.ranking,
+        base.louder, search.point, base, point, nothing, tuple(search.remains), search.told,
     )  # fmt: skip
+
+
+class _Search:
+    """Forward selection as it stands: what is named so far, beside the causes that may join."""
+
+    def __init__(self, trial: Trial, point: Point, banned: Collection[str]) -> None:
+        self.trial, self.point = trial, point
+        self.included: tuple[str, ...] = trial.fixed
+        self.catalogue = [
+            c for c in trial.reference.model.causes
+            if c.label not in trial.fixed and c.label not in banned
+        ]  # fmt: skip
+        self.base, self.found = trial.scan(point, self.catalogue, self.included)
+        self.told = {f.name: f.told for f in self.found if f.told is not None}
+        self.rejected: dict[str, str] = {}
+        self.ranking: dict[str, float] = {}
+        self.steps: dict[str, tuple[float, tuple[str, ...]]] = {}  # evidence, and what is alike
+        self.pulses: Pulses | None = None
+        self.structure: Structure | None = None
+        self.remains: list[Found] = []
+
+    @property
+    def stochastic(self) -> float:
+        """Nats that louder unrest brings over the usual one."""
+        if self.base.louder <= 1.0:
+            return 0.0
+        usual = self.trial.level(self.point, 1.0, self.included).value
+        return self.base.evidence - usual
+
+    def one_more(self) -> bool:
+        """Whether something more was found: a cause, or a thruster that nobody records."""
+        self.remains = unnamed.structures(self.trial, self.point, self.base, self.included)
+        if self._pulses():
+            return True
+        settled = _settle(self.trial, self.point, self.base, self.found, self.included)
+        first = self.included == self.trial.fixed
+        wanted = LEAST if first and self.pulses is None else MORE
+        if not self.ranking:
+            self.ranking = self._ranked(settled, wanted)
+        best = settled[0][1] if settled else None
+        gain = best.evidence - self.base.evidence if best else -math.inf
+        if self._structure(best, gain):
+            return False
+        full = len(self.included) - len(self.trial.fixed) >= MOST
+        if best is None or gain < wanted or full:
+            return False
+        self._take(settled, gain)
+        return True
+
+    def _pulses(self) -> bool:
+        """Whether a force that comes and goes explains the unrest better than all else."""
+        if self.pulses is not None or self.base.louder < LOUD:
+            return False
+        tried = unnamed.pulses(self.trial, self.point, self.base)
+        rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]
+        if tried.gain <= max(PULSED, *rivals):
+            return False
+        self.pulses = tried
+        self.trial.unrest = replace(self.trial.unrest, pulse=tried.unit * tried.force)
+        self.base, self.found = self.trial.scan(self.point, self._left(), self.included)
+        return True
+
+    def _structure(self, best: Found | None, gain: float) -> bool:
+        """Whether an unknown structure explains far more than the best cause."""
+        strongest = max(self.remains, key=lambda f: f.evidence, default=None)
+        if strongest is None or strongest.evidence <= max(UNKNOWN, gain + FLEXIBLE):
+            return False
+        acts_on = unnamed.acts_on(self.trial, self.point, strongest)
+        self.structure = Structure(strongest.name, strongest.evidence, acts_on)
+        if best is not None:
+            self.rejected[_last(best)] = (
+                f"a dependence on {strongest.name} that it does not have explains "
+                f"{strongest.evidence - max(gain, 0.0):.0f} nats more"
+            )
+        return True
+
+    def _take(self, settled: Sequence[tuple[Point, Found]], gain: float) -> None:
+        """The best contender joins; the others are set against it."""
+        self.point, self.base = settled[0]
+        label = _last(self.base)
+        less = {_last(one): self.base.evidence - one.evidence for _, one in settled[1:]}
+        self.steps[label] = (gain, tuple(other for other, nats in less.items() if nats < ALIKE))
+        for other, nats in less.items():
+            self.rejected.setdefault(other, f"{label} explains {nats:.0f} nats more")
+        self.included = tuple(self.base.numbers)
+        _, self.found = self.trial.scan(self.point, self._left(), self.included)
+
+    def _left(self) -> list[Cause]:
+        return [c for c in self.catalogue if all(c.beside(label) for label in self.included)]
+
+    def _ranked(self, settled: Sequence[tuple[Point, Found]], wanted: float) -> dict[str, float]:
+        """Probabilities of the first step, tempered; `none` holds the threshold."""
+        base = self.base
+        value = {"none": wanted}
+        value |= {f.name: f.evidence for f in self.found}
+        value |= {_last(one): one.evidence - base.evidence for _, one in settled}
+        value |= {f"unknown:{f.name}": f.evidence - FLEXIBLE for f in self.remains}
+        if base.louder >= LOUD:  # said where nothing is named
+            value["unknown:stochastic"] = wanted + self.stochastic - STOCHASTIC
+            if settled and settled[0][1].evidence - base.evidence > wanted:
+                value["unknown:stochastic"] = min(value["unknown:stochastic"], wanted)
+        share = np.array(list(value.values())) / TEMPERATURE
+        share = np.exp(share - share.max())
+        share /= share.sum()
+        order = np.argsort(-share)
+        ranking = {list(value)[i]: float(share[i]) for i in order}
+        if self.pulses is None:
+            return ranking
+        sure = odds(self.pulses.gain, PULSED)
+        return {PULSES: sure} | {k: (1.0 - sure) * v for k, v in ranking.items()}
+
+    def backwards(self) -> None:
+        """Each named cause must still be missed when the others are refitted without it."""
+        fixed = len(self.trial.fixed)
+        while len(self.included) - fixed > 1:
+            losses = {}
+            for label in self.included[fixed:]:
+                rest = tuple(n for n in self.included if n != label)
+                numbers = {n: self.base.numbers[n] for n in rest}
+                point, base = self.trial.settle(rest, numbers, self.point.path)
+                losses[label] = (self.base.evidence - base.evidence, point, base, rest)
+            label = min(losses, key=lambda n: losses[n][0])
+            loss, point, base, rest = losses[label]
+            if loss >= LEAST:
+                break
+            less = max(loss, 0.0)
+            self.rejected[label] = f"without it the others explain all but {less:.0f} nats"
+            self.steps.pop(label, None)
+            self.included, self.point, self.base = rest, point, base
+
+    def named(self) -> tuple[Named, ...]:
+        by = {c.label: c for c in self.trial.reference.model.causes}
+        found, at = [], 0
+        for label in self.included:
+            cause = by[label]
+            part = slice(at, at + cause.count)
+            at += cause.count
+            if label in self.trial.fixed:
+                continue
+            assert self.base.covariance is not None
+            gain, alike = self.steps[label]
+            sure = odds(gain, MORE)
+            found.append(
+                Named(
+                    cause, gain, sure if found else self.ranking.get(label, sure),
+                    np.asarray(self.base.numbers[label]), self.base.covariance[part, part], alike,
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+
+def _last(found: Found) -> str:
+    """The label that joined last."""
+    return found.name.split("+")[-1]
 
 
 def without(trial: Trial, decision: Decision, one: Named) -> Decision:
@@ -239,10 +335,6 @@ def untold(decision: Decision) -> Decision:
     )  # fmt: skip
 
 
-def _left(catalogue: Mapping[str, Cause], included: Sequence[str]) -> list[Cause]:
-    return [c for c in catalogue.values() if all(c.beside(label) for label in included)]
-
-
 def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     """Contenders linearised where they are found, best first; those whose fit ran away left out."""
     contenders = [
@@ -259,77 +351,6 @@ def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     return sorted(settled, key=lambda pair: -pair[1].evidence)
 
 
-def _louder(trial: Trial, point: Point, base: Found, included: tuple[str, ...]) -> float:
-    """Nats that louder unrest brings over the usual one."""
-    return base.evidence - trial.level(point, 1.0, included).value
-
-
-def _ranked(settled, found, remains, base, wanted, stochastic) -> dict[str, float]:
-    """Probabilities of the first step, tempered; `none` holds the threshold."""
-    value = {"none": wanted}
-    value |= {f.name: f.evidence for f in found}
-    for _, one in settled:
-        value[one.name.split("+")[-1]] = one.evidence - base.evidence
-    value |= {f"unknown:{f.name}": f.evidence - FLEXIBLE for f in remains}
-    if base.louder >= LOUD:  # said where nothing is named
-        value["unknown:stochastic"] = wanted + stochastic - STOCHASTIC
-        if settled and settled[0][1].evidence - base.evidence > wanted:
-            value["unknown:stochastic"] = min(value["unknown:stochastic"], wanted)
-    names = list(value)
-    of = np.array([value[n] for n in names]) / TEMPERATURE
-    share = np.exp(of - of.max())
-    share /= share.sum()
-    order = np.argsort(-share)
-    return {names[i]: float(share[i]) for i in order}
-
-
 def odds(gain: float, wanted: float) -> float:
     """Probability of what brings so many nats where so many are wanted."""
     return 1.0 / (1.0 + math.exp(min((wanted - gain) / TEMPERATURE, 50.0)))
-
-
-def _structure(trial: Trial, point: Point, found: Found) -> Structure:
-    acts = unnamed.acts_on(trial, point, found)
-    return Structure(found.name, found.evidence, acts)
-
-
-def _backwards(trial, included, fixed, point, base, steps):
-    """Each named cause must still be missed when the others are refitted without it."""
-    dropped: dict[str, float] = {}
-    while len(included) - len(fixed) > 1:
-        losses = {}
-        for label in included[len(fixed) :]:
-            rest = tuple(n for n in included if n != label)
-            numbers = {n: base.numbers[n] for n in rest}
-            losses[label] = (base.evidence, *trial.settle(rest, numbers, point.path))
-        label = min(losses, key=lambda n: losses[n][0] - losses[n][2].evidence)
-        loss = losses[label][0] - losses[label][2].evidence
-        if loss >= LEAST:
-            break
-        dropped[label] = loss
-        steps.pop(label, None)
-        included = tuple(n for n in included if n != label)
-        point, base = losses[label][1], losses[label][2]
-    return included, point, base, dropped
-
-
-def _named(trial, included, fixed, base, steps, ranking) -> tuple[Named, ...]:
-    by = {c.label: c for c in trial.reference.model.causes}
-    found, at = [], 0
-    for label in included:
-        cause = by[label]
-        part = slice(at, at + cause.count)
-        at += cause.count
-        if label in fixed:
-            continue
-        gain, alike = steps[label]
-        first = len(found) == 0
-        sure = odds(gain, MORE)
-        probability = ranking.get(label, sure) if first else sure
-        found.append(
-            Named(
-                cause, gain, probability, np.asarray(base.numbers[label]),
-                base.covariance[part, part], alike,
-            )
-        )  # fmt: skip
-    return tuple(found)
