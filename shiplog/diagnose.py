@@ -23,6 +23,7 @@ LEAST = 8.0  # nats that the first cause must bring
 MORE = 25.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
+POSES = 10.0  # nats that a structure as good as the first cause may still bring beside it
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
 LOUD = 1.4  # times the usual unrest, from which on it is asked where it comes from
 PULSED = 40.0  # nats that pulses must bring beyond louder unrest
@@ -159,6 +160,8 @@ class _Search:
         self.pulses: Pulses | None = None
         self.structure: Structure | None = None
         self.remains: list[Found] = []
+        self.start = (point, self.base)
+        self.rival: Found | None = None  # the best structure before the first cause was named
 
     @property
     def stochastic(self) -> float:
@@ -171,6 +174,8 @@ class _Search:
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
         self.remains = unnamed.structures(self.trial, self.point, self.base, self.included)
+        if self._poses():
+            return False
         if self._pulses():
             return True
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
@@ -215,8 +220,31 @@ class _Search:
             )
         return True
 
+    def _poses(self) -> bool:
+        """Whether what was named first only looks like what is there: a structure that anything may
+        have explained as much, for all its freedom, and explains more beside it."""
+        rival, self.rival = self.rival, None
+        strongest = max(self.remains, key=lambda f: f.evidence, default=None)
+        if rival is None or strongest is None or strongest.evidence < POSES:
+            return False
+        ((label, (gain, _)),) = self.steps.items()
+        if rival.evidence < gain:
+            return False
+        self.steps.clear()
+        self.rejected[label] = (
+            f"a dependence on {rival.name} explains as much, and beside it "
+            f"{strongest.evidence:.0f} nats more"
+        )
+        self.included, self.point, self.base = self.trial.fixed, *self.start
+        self.structure = Structure(
+            rival.name, rival.evidence, unnamed.acts_on(self.trial, self.point, rival)
+        )
+        return True
+
     def _take(self, settled: Sequence[tuple[Point, Found]], gain: float) -> None:
         """The best contender joins; the others are set against it."""
+        if not self.steps and self.pulses is None:
+            self.rival = max(self.remains, key=lambda f: f.evidence, default=None)
         self.point, self.base = settled[0]
         label = _last(self.base)
         less = {_last(one): self.base.evidence - one.evidence for _, one in settled[1:]}

@@ -26,7 +26,7 @@ from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
 from shiplog.gain import Gain
-from shiplog.hypotheses import Told, Trial
+from shiplog.hypotheses import Found, Told, Trial
 from shiplog.ingest import ingest
 from shiplog.store import Store
 from shiplog.verdict import limits_json, ranking_json
@@ -338,6 +338,28 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     gyro = worth("yaw_rate_scale", [0.03], "yaw_rate_bias")
     assert gyro["a zigzag"] > 10.0 * gyro["a drifting stop"]
     assert all(v >= -1e-6 for found in (lag, power, gyro) for v in found.values())
+
+
+@pytest.mark.parametrize(
+    ("as_good", "beside", "said"),
+    [(True, 12.0, "unknown"), (True, 5.0, "named"), (False, 12.0, "named")],
+)
+def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good, beside, said):
+    """A free structure pays for its freedom: one as good as the cause, that explains still more
+    beside it, is what is there."""
+    trial, decision = compass
+    found = decision.named[0].evidence
+    told = iter([found + (1.0 if as_good else -1.0), beside, beside])
+    monkeypatch.setattr(
+        unnamed, "structures", lambda *_: [Found("controls", next(told), 1.0)]
+    )  # fmt: skip
+    monkeypatch.setattr(unnamed, "acts_on", lambda *_: ("yaw_rate",))
+    again = diagnose.decide(trial, decision.first)
+    assert again.verdict == said
+    if said == "unknown":
+        assert again.structure == diagnose.Structure("controls", found + 1.0, ("yaw_rate",))
+        assert "explains as much" in again.rejected["heading_offset"] and not again.named
+        assert again.base is again.nothing or again.base.evidence == again.nothing.evidence
 
 
 # --- what is hidden, and what is not
