@@ -207,12 +207,19 @@ class _Search:
         return True
 
     def _structure(self, best: Found | None, gain: float) -> bool:
-        """Whether an unknown structure explains far more than the best cause."""
+        """Whether an unknown structure explains far more than the best cause; or, where little
+        speaks for that, as much: a structure pays for its freedom, and beside a true cause it
+        explains less."""
         strongest = max(self.remains, key=lambda f: f.evidence, default=None)
-        if strongest is None or strongest.evidence <= max(UNKNOWN, gain + FLEXIBLE):
+        if strongest is None:
             return False
-        acts_on = unnamed.acts_on(self.trial, self.point, strongest)
-        self.structure = Structure(strongest.name, strongest.evidence, acts_on)
+        far = strongest.evidence > max(UNKNOWN, gain + FLEXIBLE)
+        faint = best is not None and LEAST <= gain < MORE and strongest.evidence >= gain
+        if not (far or faint):
+            return False
+        if far:
+            acts_on = unnamed.acts_on(self.trial, self.point, strongest)
+            self.structure = Structure(strongest.name, strongest.evidence, acts_on)
         if best is not None:
             self.rejected[_last(best)] = (
                 f"a dependence on {strongest.name} that it does not have explains "

@@ -362,6 +362,21 @@ def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good,
         assert again.base is again.nothing or again.base.evidence == again.nothing.evidence
 
 
+@pytest.mark.parametrize(("as_good", "said"), [(1.0, "none"), (-1.0, "named")])
+def test_little_evidence_that_a_structure_has_too_is_none(compass, monkeypatch, as_good, said):
+    """Too little for the structure to be said, and no more for the cause than for that."""
+    trial, decision = compass
+    found = decision.named[0].evidence
+    monkeypatch.setattr(diagnose, "MORE", found + 1.0)
+    monkeypatch.setattr(diagnose, "UNKNOWN", found + 10.0)
+    monkeypatch.setattr(diagnose, "STOCHASTIC", np.inf)
+    told = iter([found + as_good, -20.0])
+    monkeypatch.setattr(unnamed, "structures", lambda *_: [Found("controls", next(told), 1.0)])
+    again = diagnose.decide(trial, decision.first)
+    assert (again.verdict, again.structure) == (said, None)
+    assert ("explains" in again.rejected.get("heading_offset", "")) == (said == "none")
+
+
 # --- what is hidden, and what is not
 
 
