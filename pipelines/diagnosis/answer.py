@@ -72,6 +72,11 @@ class Context:
 def verdict(
     trial: Trial, decision: Decision, found: Gain | None, held: HeldOut | None, context: Context
 ) -> Verdict:
+    """What was decided, in the contract's words.
+
+    found   the gain of what is named; None where nothing is, or there are no windows
+    held    the windows it was measured on
+    """
     rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
     if context.lost and decision.structure is not None:
         notes.insert(
