@@ -4,7 +4,8 @@ OUT/keys/plan.json    the cases; in `goals` it says what is hidden, so it lies w
 OUT/keys/LABEL.json   a key, opened by `score` alone and only after the verdict is sealed
 OUT/cases/LABEL/      logs, store, base, d (until the case is done); verdict.json,
                       verdict.sha256, steps.json (times, memory, last words; they stay);
-                      with --rivals, rivals.json and rivals.sha256: what simpler methods say
+                      with --rivals, rivals.json and rivals.sha256: what simpler methods say;
+                      with --oracle, oracle.json: what the truth would gain
 OUT/bases/SEED/       with --share, the model of a ship's nominal campaign
 """
 

@@ -95,6 +95,7 @@ RATES = (
         "outside, size below 1", _among("outside", lambda answer: not _full(answer)), _right
     ),
     Rate("two at once, size 1: both, no third", _among("two", _full), _right, least=0.90),
+    Rate("two at once, size below 1", _among("two", lambda answer: not _full(answer)), _right),
     Rate("network on affected data: what it cannot take in", _network(SURVIVE), _right, least=0.90),
     Rate(
         "network on affected data: what it has taken in, named", _network(ABSORBED),
@@ -104,7 +105,6 @@ RATES = (
         "network on affected data: named but wrong", lambda answer: not _physics(answer),
         lambda answer: answer.misnamed, most=0.02,
     ),
-    Rate("two at once, size below 1", _among("two", lambda answer: not _full(answer)), _right),
 )  # fmt: skip
 
 
