@@ -158,6 +158,7 @@ class _Search:
         self.ranking: dict[str, float] = {}
         self.steps: dict[str, tuple[float, tuple[str, ...]]] = {}  # evidence, and what is alike
         self.pulses: Pulses | None = None
+        self.structures = unnamed.Structures(trial, point)
         self.structure: Structure | None = None
         self.remains: list[Found] = []
         self.start = (point, self.base)
@@ -173,7 +174,7 @@ class _Search:
 
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
-        self.remains = unnamed.structures(self.trial, self.point, self.base, self.included)
+        self.remains = self.structures.found(self.point, self.base, self.included)
         if self._poses():
             return False
         if self._pulses():
@@ -218,7 +219,7 @@ class _Search:
         if not (far or faint):
             return False
         if far:
-            acts_on = unnamed.acts_on(self.trial, self.point, strongest)
+            acts_on = self.structures.acts_on(self.point, strongest)
             self.structure = Structure(strongest.name, strongest.evidence, acts_on)
         if best is not None:
             self.rejected[_last(best)] = (
@@ -244,7 +245,7 @@ class _Search:
         )
         self.included, self.point, self.base = self.trial.fixed, *self.start
         self.structure = Structure(
-            rival.name, rival.evidence, unnamed.acts_on(self.trial, self.point, rival)
+            rival.name, rival.evidence, self.structures.acts_on(self.point, rival)
         )
         return True
 

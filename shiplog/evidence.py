@@ -79,11 +79,23 @@ class Weighed:
     logdet: float
     knots: int
 
+    def beside(self, pushed: np.ndarray) -> Weighed:
+        """With W columns more, of which each bends the observations as the acceleration `pushed`
+        [S, 3J, W] at the knots does."""
+        by_knots = self.zz[:, :, 6:] @ pushed
+        across = np.swapaxes(self.zd[:, 6:], 1, 2) @ pushed
+        own = np.swapaxes(pushed, 1, 2) @ by_knots[:, 6:]
+        count = self.dd.shape[-1]
+        dd = np.empty((len(own), count + own.shape[-1], count + own.shape[-1]))
+        dd[:, :count, :count] = self.dd
+        dd[:, :count, count:] = across
+        dd[:, count:, :count] = np.swapaxes(across, 1, 2)
+        dd[:, count:, count:] = own
+        return replace(self, dd=dd, zd=np.concatenate((self.zd, by_knots), -1))
 
-def weighed(linear: Linear, noise: np.ndarray, columns: np.ndarray | None = None) -> Weighed:
-    """`columns`: [S, B, 6, C], where not the linearisation's own."""
-    count = len(linear.e)
-    j = linear.j if columns is None else columns
+
+def weighed(linear: Linear, noise: np.ndarray) -> Weighed:
+    count, j = len(linear.e), linear.j
     weight = np.where(linear.cut.used, 1.0 / noise, 0.0)[..., None]
     d = (np.concatenate((linear.e[..., None], j), -1) * weight).reshape(count, -1, 1 + j.shape[-1])
     z = (linear.z * weight).reshape(count, -1, linear.z.shape[-1])

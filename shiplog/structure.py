@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.record import Record
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, Linear, resampled
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, resampled
 
 FAMILIES = ("position", "heading", "time", "motion", "controls", "wind")
 FEATURES = 20
@@ -123,13 +123,8 @@ def _count(family: str, knots: Knots) -> int:
     return int(_variables(family, knots).shape[-1])
 
 
-def columns(linear: Linear, features: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """[S, B, 6, W]: how each weight bends the observations; `push` [3] is the unit of size."""
-    knots = features.shape[1]
-    z = linear.z[..., 6:].reshape(*linear.e.shape, 3, knots)
-    scaled = features * push[:, None]
-    count, bins, six = linear.e.shape
-    flat = z.reshape(count, bins * six, 3 * knots)
-    return (flat @ np.moveaxis(scaled, 2, 1).reshape(count, 3 * knots, -1)).reshape(
-        count, bins, six, -1
-    )
+def pushed(features: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `push` [3] is the
+    unit of size."""
+    scaled = np.moveaxis(features * push[:, None], 2, 1)
+    return scaled.reshape(len(scaled), -1, scaled.shape[-1])

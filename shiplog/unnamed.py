@@ -14,6 +14,7 @@ from shiplog import evidence, structure
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
 from shiplog.reference import HELD
+from shiplog.structure import Basis
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 
@@ -30,57 +31,73 @@ class Pulses:
     unit: np.ndarray
 
 
-def acts_on(trial: Trial, point: Point, found: Found) -> tuple[str, ...]:
-    """Channels in which a structure pushes by more than a third of where it pushes most."""
-    ref = trial.reference
-    here = structure.at_knots(point.linear.cut, trial.grid)
-    basis = structure.basis(found.name, trial.record, here)
-    if basis is None:
-        return ()
-    features = basis.features(here)
-    columns = structure.columns(point.linear, features, ref.unrest.push)
-    weighed = evidence.weighed(point.linear, trial.unrest.noise, columns)
-    total = trial.total(weighed, 1.0)
-    weights = np.linalg.solve(
-        total[1:, 1:] + np.eye(len(total) - 1) / structure.SIZES[1] ** 2, total[1:, 0]
-    )
-    pushed = (features @ weights).std((0, 1))
-    names = np.array(["surge", "sway", "yaw_rate"])
-    return tuple(str(n) for n in names[pushed > pushed.max() / 3.0])
+@dataclass(frozen=True)
+class Family:
+    """One kind of structure, and what the nominal campaign has of it.
+
+    before  [1 + C + W, 1 + C + W]  products of that campaign's [e | J | W]; None where it says
+            nothing of the structure
+    """
+
+    basis: Basis
+    before: np.ndarray | None
 
 
-def structures(trial: Trial, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
-    """Each family's evidence above the base hypothesis, less what is usual of it."""
-    ref = trial.reference
-    here = structure.at_knots(point.linear.cut, trial.grid)
-    usual = None
-    if ref.nominal is not None:
-        usual = structure.at_knots(ref.nominal.cut, trial.grid)
-    found = []
-    for family in structure.FAMILIES:
-        basis = structure.basis(family, trial.record, *(k for k in (usual, here) if k))
-        if basis is None:
-            continue
-        columns = structure.columns(point.linear, basis.features(here), ref.unrest.push)
-        weighed = evidence.weighed(
-            point.linear, ref.unrest.noise, np.concatenate((point.linear.j, columns), -1)
-        )
-        before = None
-        if usual is not None and ref.nominal is not None and family != "time":
-            added = structure.columns(ref.nominal, basis.features(usual), ref.unrest.push)
-            joined = np.concatenate((ref.nominal.j, added), -1)
-            weighed_then = evidence.weighed(ref.nominal, ref.unrest.noise, joined)
-            before = evidence.total(weighed_then, ref.unrest, np.ones(len(joined)))
-        best = max(
-            (
-                one
-                for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
-                for one in _structure(trial, family, weighed, before, point, included, louder)
-            ),
-            key=lambda f: f.evidence,
-        )
-        found.append(replace(best, evidence=best.evidence - base.evidence))
-    return sorted(found, key=lambda f: -f.evidence)
+class Structures:
+    """All families, about a trial's first point: what they depend on was measured."""
+
+    def __init__(self, trial: Trial, point: Point) -> None:
+        self.trial = trial
+        ref = trial.reference
+        here, usual, weighed = structure.at_knots(point.linear.cut, trial.grid), None, None
+        if ref.nominal is not None:
+            usual = structure.at_knots(ref.nominal.cut, trial.grid)
+            weighed = evidence.weighed(ref.nominal, ref.unrest.noise)
+        self.families: dict[str, Family] = {}
+        for name in structure.FAMILIES:
+            basis = structure.basis(name, trial.record, *(k for k in (usual, here) if k))
+            if basis is None:
+                continue
+            before = None
+            if usual is not None and weighed is not None and name != "time":
+                pushed = structure.pushed(basis.features(usual), ref.unrest.push)
+                every = np.ones(len(pushed))
+                before = evidence.total(weighed.beside(pushed), ref.unrest, every)
+            self.families[name] = Family(basis, before)
+
+    def found(self, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
+        """Each family's evidence above the base hypothesis, less what is usual of it."""
+        found = []
+        for name, family in self.families.items():
+            _, weighed = self._beside(family, point)
+            best = max(
+                (
+                    one
+                    for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
+                    for one in _structure(
+                        self.trial, name, weighed, family.before, point, included, louder
+                    )
+                ),
+                key=lambda f: f.evidence,
+            )
+            found.append(replace(best, evidence=best.evidence - base.evidence))
+        return sorted(found, key=lambda f: -f.evidence)
+
+    def acts_on(self, point: Point, found: Found) -> tuple[str, ...]:
+        """Channels in which a structure pushes by more than a third of where it pushes most."""
+        features, weighed = self._beside(self.families[found.name], point)
+        total = self.trial.total(weighed, 1.0)[-features.shape[-1] :]
+        own = total[:, -len(total) :]
+        weights = np.linalg.solve(own + np.eye(len(own)) / structure.SIZES[1] ** 2, total[:, 0])
+        pushed = (features @ weights).std((0, 1))
+        names = np.array(["surge", "sway", "yaw_rate"])
+        return tuple(str(n) for n in names[pushed > pushed.max() / 3.0])
+
+    def _beside(self, family: Family, point: Point) -> tuple[np.ndarray, evidence.Weighed]:
+        """The family's features at the point, and its products with them."""
+        features = family.basis.features(structure.at_knots(point.linear.cut, self.trial.grid))
+        pushed = structure.pushed(features, self.trial.reference.unrest.push)
+        return features, point.weighed.beside(pushed)
 
 
 def _structure(trial: Trial, family, weighed, before, point, included, louder) -> Iterator[Found]:

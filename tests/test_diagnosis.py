@@ -351,9 +351,9 @@ def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good,
     found = decision.named[0].evidence
     told = iter([found + (1.0 if as_good else -1.0), beside, beside])
     monkeypatch.setattr(
-        unnamed, "structures", lambda *_: [Found("controls", next(told), 1.0)]
+        unnamed.Structures, "found", lambda *_: [Found("controls", next(told), 1.0)]
     )  # fmt: skip
-    monkeypatch.setattr(unnamed, "acts_on", lambda *_: ("yaw_rate",))
+    monkeypatch.setattr(unnamed.Structures, "acts_on", lambda *_: ("yaw_rate",))
     again = diagnose.decide(trial, decision.first)
     assert again.verdict == said
     if said == "unknown":
@@ -371,7 +371,9 @@ def test_little_evidence_that_a_structure_has_too_is_none(compass, monkeypatch, 
     monkeypatch.setattr(diagnose, "UNKNOWN", found + 10.0)
     monkeypatch.setattr(diagnose, "STOCHASTIC", np.inf)
     told = iter([found + as_good, -20.0])
-    monkeypatch.setattr(unnamed, "structures", lambda *_: [Found("controls", next(told), 1.0)])
+    monkeypatch.setattr(
+        unnamed.Structures, "found", lambda *_: [Found("controls", next(told), 1.0)]
+    )
     again = diagnose.decide(trial, decision.first)
     assert (again.verdict, again.structure) == (said, None)
     assert ("explains" in again.rejected.get("heading_offset", "")) == (said == "none")
@@ -557,7 +559,7 @@ def test_in_each_others_places_nothing_depends_on_position(sea, trials, monkeypa
     base, _ = trial.scan(point, ())
 
     def explained() -> float:
-        found = unnamed.structures(trial, point, base, ())
+        found = unnamed.Structures(trial, point).found(point, base, ())
         return next(f.evidence for f in found if f.name == "position")
 
     before = explained()

@@ -111,12 +111,14 @@ def test_units_scale_columns_and_not_the_error():
     assert found.scaled(unit).logdet == found.logdet
 
 
-def test_columns_may_be_others():
-    given = linear(2)
-    other = linear(2, columns=3, seed=9).j
-    found = evidence.gram(evidence.weighed(given, NOISE, other), UNREST)
-    direct = evidence.gram(evidence.weighed(replace(given, j=other), NOISE), UNREST)
-    assert found.each == pytest.approx(direct.each)
+def test_columns_beside_bend_the_observations_as_their_acceleration_does():
+    given = linear(3)
+    pushed = np.random.default_rng(9).standard_normal((3, 9, 4))
+    found = evidence.gram(evidence.weighed(given, NOISE).beside(pushed), UNREST)
+    columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
+    written_out = replace(given, j=np.concatenate((given.j, columns), -1))
+    direct = evidence.gram(evidence.weighed(written_out, NOISE), UNREST)
+    assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
 
 
 def test_the_total_is_the_weighted_sum():
