@@ -27,8 +27,8 @@ FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 0.35  # plausible spreads that need no further round
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
-KAPPAS = (2.0, 4.0, 8.0, 16.0, 32.0)
-USUAL_KAPPA = 11.0  # between campaigns of one ship, coefficients moved 3.3 of their errors
+KAPPAS = (4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # voyages are more alike than campaigns: not less
+CAREFUL_KAPPA = 11.0  # of too few voyages, and of her own instruments: their noise is coloured
 UNREST_TIME = 4.0  # s
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 HELD = 1e8  # information that leaves a number where it is
@@ -92,6 +92,7 @@ class Reference:
 
     information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
                  latter is the run's own coefficients'
+    wider        [C] by how much each is less sure than κ alone has it
     nominal      None where the model was made on the very data that are diagnosed
     """
 
@@ -105,6 +106,7 @@ class Reference:
     pull: np.ndarray
     anchor: np.ndarray
     kappa: float
+    wider: np.ndarray
     nominal: Linear | None
 
     @cached_property
@@ -233,12 +235,25 @@ def learn(
     grams = evidence.gram(evidence.weighed(linear, at.unrest.noise), at.unrest).scaled(unit)
     held = _anchor(start, at.theta, columns)
     chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
-    total = grams.each.sum(0)
-    information = total[1:, 1:] / chosen + np.diag(columns.known)
+    wider = np.ones(len(unit))
+    seen = shown.any((0, 1, 2))  # in the ship's own motion
+    wider[columns.base :][seen] = np.sqrt(max(CAREFUL_KAPPA / chosen, 1.0))
+    information, pull = usual(grams.each.sum(0), chosen, wider, columns.known, held)
     return Reference(
-        model, setting, at.theta, columns, at.unrest, wide_of(setting), information,
-        total[1:, 0] / chosen + held, held, chosen, linear,
+        model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
+        chosen, wider, linear,
     )  # fmt: skip
+
+
+def usual(
+    total: np.ndarray, kappa: float, wider: np.ndarray, known: np.ndarray, held: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
+    beside what is `known` and `held` without them; each spread then `wider` [C] times."""
+    information = total[1:, 1:] / kappa + np.diag(known)
+    mean = np.linalg.solve(information, total[1:, 0] / kappa + held)
+    information /= np.outer(wider, wider)
+    return information, information @ mean
 
 
 def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
@@ -247,25 +262,24 @@ def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
 
 
 def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
-    """κ that predicts each voyage best from the others; never less than is usual.
+    """κ that predicts each voyage best from the others; never less than is usual, and careful with
+    fewer than three.
 
     each [S, 1 + C, 1 + C], voyage [S]; what is known before any data, information and pull, `known`
     and `held` [C]: all in units
     """
     names = np.unique(voyage)
     if len(names) < 3:
-        return USUAL_KAPPA
+        return CAREFUL_KAPPA
     of = {v: each[voyage == v].sum(0) for v in names}
     total = each.sum(0)
     said = []
     for kappa in KAPPAS:
         score = 0.0
         for left in of.values():
-            rest = total - left
-            before = rest[1:, 1:] / kappa + np.diag(known)
-            score += marginal(left, before, rest[1:, 0] / kappa + held)
+            score += marginal(left, *usual(total - left, kappa, np.ones(len(known)), known, held))
         said.append(score)
-    return max(USUAL_KAPPA, KAPPAS[int(np.argmax(said))])
+    return KAPPAS[int(np.argmax(said))]
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
@@ -352,7 +366,7 @@ def assume(
     if given:
         start = replace(start, spread=GIVEN * start.spread)
     at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
-    whole = learn(model, setting, start, record, at, kappa=USUAL_KAPPA)
+    whole = learn(model, setting, start, record, at, kappa=CAREFUL_KAPPA)
     unit = whole.columns.unit
     information = np.diag(whole.columns.known.copy())
     base = whole.columns.base

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog import evidence, structure
+from shiplog import evidence, reference, structure
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
-from shiplog.reference import HELD
 from shiplog.structure import Basis
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
@@ -130,11 +129,13 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
     ref = trial.reference
     if before is None:
         held = _beside(ref.information, more)
-        held[len(ref.pull) :, len(ref.pull) :] *= HELD
+        held[len(ref.pull) :, len(ref.pull) :] *= reference.HELD
         return held, np.concatenate((ref.pull, np.zeros(more)))
-    seen = before * np.outer(by, by) / ref.kappa
-    sure = np.diag(np.concatenate((ref.columns.known, np.ones(more))))
-    return seen[1:, 1:] + sure, seen[1:, 0] + np.concatenate((ref.anchor, np.zeros(more)))
+    ones, zeros = np.ones(more), np.zeros(more)
+    return reference.usual(
+        before * np.outer(by, by), ref.kappa, np.concatenate((ref.wider, ones)),
+        np.concatenate((ref.columns.known, ones)), np.concatenate((ref.anchor, zeros)),
+    )  # fmt: skip
 
 
 def pulses(trial: Trial, point: Point, base: Found) -> Pulses:

@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from shiplog import evidence
 from shiplog.evidence import Unrest
-from shiplog.reference import inflation, marginal
+from shiplog.reference import inflation, marginal, usual
 from shiplog.segments import KNOT, Cut, Linear, Path
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
@@ -219,6 +219,19 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
         return each
 
     voyage = np.arange(count)
-    assert inflation(grams(0.0), voyage, known, held) == 11.0  # what is usual, at least
+    assert inflation(grams(0.0), voyage, known, held) == 4.0  # at least
     assert inflation(grams(0.4), voyage, known, held) == 32.0
-    assert inflation(grams(0.4)[:2], voyage[:2], known, held) == 11.0
+    assert inflation(grams(0.4)[:2], voyage[:2], known, held) == 11.0  # too few to tell
+
+
+def test_what_is_less_sure_is_wider_and_stands_where_it_stood():
+    """The covariance P⁻¹ of (G / κ + K), its rows and columns times what each is wider."""
+    rng = np.random.default_rng(5)
+    j = rng.standard_normal((40, 4))
+    total, wider, held = j.T @ j, np.array([1.0, 3.0, 1.0]), np.array([0.1, 0.0, -0.2])
+    known = np.array([1.0, 2.0, 0.5])
+    information, pull = usual(total, 4.0, wider, known, held)
+    plain = np.linalg.inv(total[1:, 1:] / 4.0 + np.diag(known))
+    assert np.linalg.inv(information) == pytest.approx(plain * np.outer(wider, wider))
+    mean = plain @ (total[1:, 0] / 4.0 + held)
+    assert np.linalg.solve(information, pull) == pytest.approx(mean)
