@@ -79,14 +79,18 @@ class ExtendedSimulator:
         numbers: Mapping[str, np.ndarray],
         covariance: Mapping[str, np.ndarray] | None,
         constants: Mapping[str, np.ndarray] | None = None,
+        coefficients: np.ndarray | None = None,
     ) -> ExtendedSimulator:
-        """The same model with more causes in it."""
+        """The same model with more causes in it, and its base's `coefficients` [P] as they were
+        fitted beside them."""
         model = replace(
             self.model,
             causes=(*self.model.causes, *causes),
             constants={**self.model.constants, **(constants or {})},
         )
         theta = np.concatenate((self.theta, *(numbers[c.label] for c in causes)))
+        if coefficients is not None:
+            theta[: len(coefficients)] = coefficients
         whole = np.zeros((len(theta), len(theta)))
         at = len(self.theta)
         whole[:at, :at] = self.covariance
@@ -120,6 +124,7 @@ class Extension:
 
     numbers, covariance   label → of each cause
     constants             what their forces need and nobody fits
+    coefficients          [P] of the base beside them
     """
 
     causes: tuple[Cause, ...]
@@ -128,6 +133,7 @@ class Extension:
     constants: Mapping[str, np.ndarray]
     shares: Shares
     lengths: Mapping[str, float]
+    coefficients: np.ndarray
 
     @staticmethod
     def kept(simulator: ExtendedSimulator, base: int) -> tuple[dict, dict[str, np.ndarray]]:
@@ -144,7 +150,8 @@ class Extension:
             "lengths": dict(simulator.lengths),
         }  # fmt: skip
         arrays = {f"constant.{k}": np.atleast_1d(v) for k, v in simulator.model.constants.items()}
-        return told, arrays | {"covariance": simulator.covariance[base:, base:]}
+        arrays |= {"covariance": simulator.covariance[base:, base:]}
+        return told, arrays | {"coefficients": simulator.theta[:base]}
 
     @staticmethod
     def of(told: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()) -> Extension:
@@ -170,6 +177,7 @@ class Extension:
         return Extension(
             tuple(causes), numbers, covariance, constants,
             {k: (v[0], v[1]) for k, v in told["shares"].items()}, dict(told["lengths"]),
+            arrays["coefficients"],
         )  # fmt: skip
 
 

@@ -356,15 +356,24 @@ class Trial:
 
     def without(
         self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
-    ) -> dict[str, np.ndarray]:
-        """Numbers of the included causes from the other segments alone; `left_out` [S] bool."""
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Numbers of the included causes, and the coefficients [P] beside them, from the other
+        segments alone; `left_out` [S] bool."""
         kept = self.weight
         self.weight = np.where(left_out, 0.0, kept)
         try:
             level = self.level(point, louder, included)
         finally:
             self.weight = kept
-        return self._numbers(level, point, included)[0]
+        return self._numbers(level, point, included)[0], self._coefficients(level)
+
+    def coefficients(self, point: Point, base: Found) -> np.ndarray:
+        """[P] of the base, beside a hypothesis of that point."""
+        return self._coefficients(self.level(point, base.louder, tuple(base.numbers)))
+
+    def _coefficients(self, level: Level) -> np.ndarray:
+        ref, count = self.reference, self.reference.columns.base
+        return ref.theta + level.solution[:count] * ref.columns.unit[:count]
 
     def solved(self, point: Point, base: Found) -> np.ndarray:
         """[C] numbers around the point, under a hypothesis of that point: what is usual of the

@@ -94,6 +94,7 @@ class Reference:
                  latter is the run's own coefficients'
     wider        [C] by how much each is less sure than κ alone has it
     nominal      None where the model was made on the very data that are diagnosed
+    adapts       whether it has learned of what is wrong there, so that a cause takes another fit
     """
 
     model: Extended
@@ -108,6 +109,7 @@ class Reference:
     kappa: float
     wider: np.ndarray
     nominal: Linear | None
+    adapts: bool = False
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -373,4 +375,6 @@ def assume(
     causes = slice(base, len(unit))
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD
-    return replace(whole, information=information, pull=whole.anchor, nominal=None)
+    return replace(
+        whole, information=information, pull=whole.anchor, nominal=None, adapts=not given
+    )

@@ -142,6 +142,15 @@ class Run:
     def base(self) -> tuple[Any, Start, MMG, np.ndarray]:
         """What a diagnosis bends: the plain model, its coefficients, and an MMG of the ship whose
         coefficients causes change, with their values."""
+        base, start, stand_in, values = self._plain()
+        held = self.extension
+        if held is None:
+            return base, start, stand_in, values
+        own = values if not self.config.physical else held.coefficients[: len(values)]
+        return base, replace(start, values=held.coefficients), stand_in, own
+
+    def _plain(self) -> tuple[Any, Start, MMG, np.ndarray]:
+        """The same, without what an extension did to the coefficients."""
         ship, main, _ = mmg.geometry_of(self.profile, self.config.physics.without)
         path = mmg.beside(self.profile.source)
         usual = mmg.load(path, ship, self.config.physics.without) if path else None
@@ -177,7 +186,7 @@ class Run:
         """
         held = self.extension
         own = self.simulator(seed) if self.config.physical else None
-        base, start, stand_in, values = self.base()
+        base, start, stand_in, values = self._plain()
         if own is None:
             base = network.compiled(self.model(seed))
         theta = start.values if own is None else own.theta
@@ -190,7 +199,9 @@ class Run:
         plain = replace(
             plain, shares={**held.shares, **shares}, lengths={**held.lengths, **lengths}
         )
-        return plain.with_causes(held.causes, held.numbers, held.covariance, held.constants)
+        return plain.with_causes(
+            held.causes, held.numbers, held.covariance, held.constants, held.coefficients
+        )
 
     def extension_numbers(self) -> dict[str, np.ndarray]:
         """Label → numbers of the causes it has already."""

@@ -3,6 +3,10 @@
 Smooth functions of position, heading, time, motion, controls or wind, as weighted random Fourier
 features (Rahimi & Recht 2007). They stand beside the causes on one scale of evidence: what no
 cause of the catalogue explains, but a map of the pond does, is unknown and depends on position.
+
+A few plain products of what the ship's own actuators do stand beside the many features of controls:
+what has little freedom pays little for it, and shows a force of a screw that no cause has before it
+is taken for another one's.
 """
 
 from __future__ import annotations
@@ -59,10 +63,7 @@ class Basis:
         waves = self._waves(z)
         if self.level is not None:
             waves = waves - self.level
-        count = waves.shape[-1]
-        out = np.zeros((*waves.shape[:2], 3, 3 * count))
-        for channel in range(3):
-            out[..., channel, channel * count : (channel + 1) * count] = waves
+        out = _in_each_channel(waves)
         if self.family != "position":
             return out
         # what pulls towards a place pulls along the earth's axes
@@ -74,6 +75,63 @@ class Basis:
 
     def _waves(self, z: np.ndarray) -> np.ndarray:
         return np.sqrt(2.0 / len(self.phase)) * np.cos(z @ self.frequency + self.phase)
+
+
+@dataclass(frozen=True)
+class Products:
+    """a|a| of everything that drives or turns, and of each that turns with each that drives:
+    n|n| sin δ, and n|n| cos δ of what turns all the way round.
+
+    scale [V]   root mean square of each
+    turning     columns of angles, and of those that go all the way `round`; `driving` of speeds
+    """
+
+    scale: np.ndarray
+    turning: tuple[int, ...]
+    round: tuple[int, ...]
+    driving: tuple[int, ...]
+
+    def features(self, knots: Knots) -> np.ndarray:
+        """[S, J, 3, W], as of a Basis."""
+        a = self.of(knots) / self.scale
+        squares, drive = a * np.abs(a), len(self.driving)
+        jets = [
+            a[..., [i]] * squares[..., [j]] for i in range(drive, a.shape[-1]) for j in range(drive)
+        ]
+        found = np.concatenate((squares, *jets), -1)
+        return _in_each_channel(found / np.sqrt(found.shape[-1]))
+
+    def of(self, knots: Knots) -> np.ndarray:
+        """[S, J, V]: speeds, sines, cosines."""
+        a = knots.driven
+        return np.concatenate(
+            (
+                a[..., list(self.driving)],
+                np.sin(a[..., list(self.turning)]),
+                np.cos(a[..., list(self.round)]),
+            ),
+            -1,
+        )
+
+
+def products(record: Record, *campaigns: Knots) -> Products:
+    kinds = [one.kind for one in record.profile.actuators]
+    azimuths = tuple(i for i, kind in enumerate(kinds) if kind == "azimuth")
+    turning = tuple(i for i, kind in enumerate(kinds) if kind == "rudder") + azimuths
+    driving = tuple(i for i in range(len(kinds)) if i not in turning)
+    plain = Products(np.ones(1), turning, azimuths, driving)
+    rows = np.concatenate([np.concatenate(plain.of(knots)) for knots in campaigns])
+    scale = np.sqrt((rows**2).mean(0))
+    return replace(plain, scale=np.where(scale > 1e-9, scale, 1.0))
+
+
+def _in_each_channel(waves: np.ndarray) -> np.ndarray:
+    """[S, J, F] → [S, J, 3, 3F]."""
+    count = waves.shape[-1]
+    out = np.zeros((*waves.shape[:2], 3, 3 * count))
+    for channel in range(3):
+        out[..., channel, channel * count : (channel + 1) * count] = waves
+    return out
 
 
 def basis(family: str, record: Record, *campaigns: Knots) -> Basis | None:

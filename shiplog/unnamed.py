@@ -13,7 +13,7 @@ import numpy as np
 from shiplog import evidence, reference, structure
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
-from shiplog.structure import Basis
+from shiplog.structure import Basis, Products
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 
@@ -38,7 +38,8 @@ class Family:
             nothing of the structure
     """
 
-    basis: Basis
+    name: str
+    basis: Basis | Products
     before: np.ndarray | None
 
 
@@ -52,9 +53,13 @@ class Structures:
         if ref.nominal is not None:
             usual = structure.at_knots(ref.nominal.cut, trial.grid)
             weighed = evidence.weighed(ref.nominal, ref.unrest.noise)
-        self.families: dict[str, Family] = {}
-        for name in structure.FAMILIES:
-            basis = structure.basis(name, trial.record, *(k for k in (usual, here) if k))
+        both = [k for k in (usual, here) if k]
+        bases: list[tuple[str, Basis | Products | None]] = [
+            (name, structure.basis(name, trial.record, *both)) for name in structure.FAMILIES
+        ]
+        bases.append(("controls", structure.products(trial.record, *both)))
+        self.families: list[Family] = []
+        for name, basis in bases:
             if basis is None:
                 continue
             before = None
@@ -62,29 +67,32 @@ class Structures:
                 pushed = structure.pushed(basis.features(usual), ref.unrest.push)
                 every = np.ones(len(pushed))
                 before = evidence.total(weighed.beside(pushed), ref.unrest, every)
-            self.families[name] = Family(basis, before)
+            self.families.append(Family(name, basis, before))
 
     def found(self, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
         """Each family's evidence above the base hypothesis, less what is usual of it."""
-        found = []
-        for name, family in self.families.items():
+        found: dict[str, Found] = {}
+        for family in self.families:
             _, weighed = self._beside(family, point)
             best = max(
                 (
                     one
                     for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
                     for one in _structure(
-                        self.trial, name, weighed, family.before, point, included, louder
+                        self.trial, family.name, weighed, family.before, point, included, louder
                     )
                 ),
                 key=lambda f: f.evidence,
             )
-            found.append(replace(best, evidence=best.evidence - base.evidence))
-        return sorted(found, key=lambda f: -f.evidence)
+            best = replace(best, evidence=best.evidence - base.evidence)
+            if family.name not in found or best.evidence > found[family.name].evidence:
+                found[family.name] = best
+        return sorted(found.values(), key=lambda f: -f.evidence)
 
     def acts_on(self, point: Point, found: Found) -> tuple[str, ...]:
         """Channels in which a structure pushes by more than a third of where it pushes most."""
-        features, weighed = self._beside(self.families[found.name], point)
+        family = next(f for f in self.families if f.name == found.name)
+        features, weighed = self._beside(family, point)
         total = self.trial.total(weighed, 1.0)[-features.shape[-1] :]
         own = total[:, -len(total) :]
         weights = np.linalg.solve(own + np.eye(len(own)) / structure.SIZES[1] ** 2, total[:, 0])

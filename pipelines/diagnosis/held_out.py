@@ -72,9 +72,9 @@ class HeldOut(Rollouts):
         states = np.empty(tuple(self.cut.state.shape))
         needed = self._constants(decision)
         for voyage, half, rows in self._folds():
-            numbers = self._without(decision, voyage, half)
+            numbers, coefficients = self._without(decision, voyage, half)
             simulator = self.before.with_causes(
-                [n.cause for n in decision.named], numbers, None, needed
+                [n.cause for n in decision.named], numbers, None, needed, coefficients
             )
             states[rows.numpy()] = simulator.states(self.cut.pick(rows), simulator.theta)
         return states
@@ -83,12 +83,20 @@ class HeldOut(Rollouts):
         after = self.parts(self.states_after(decision))
         return gain(self.losses_before, after, self.voyages)
 
+    def adapted(self, decision: Decision) -> Gain:
+        """What the model's own coefficients take off alone, fitted again with nothing named."""
+        return self.gain(
+            replace(decision, named=(), point=decision.first, base=decision.nothing, apart={})
+        )
+
     def extended(self, decision: Decision) -> ExtendedSimulator:
         """The model with what is named in it, with numbers from all voyages."""
-        named = decision.named
+        named, adapted = decision.named, None
+        if self.trial.reference.adapts:
+            adapted = self.trial.coefficients(decision.point, decision.base)
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
-            {n.cause.label: n.covariance for n in named}, self._constants(decision),
+            {n.cause.label: n.covariance for n in named}, self._constants(decision), adapted,
         )  # fmt: skip
 
     def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
@@ -96,8 +104,10 @@ class HeldOut(Rollouts):
 
         A cause of the error makes it less, and surely so where little evidence speaks for it: what
         is outside the catalogue looks a little like something in it. An instrument's fault is a
-        fault though it is worth nothing, but not where it makes the error more.
+        fault though it is worth nothing, but not where it makes the error more. A model that has
+        learned of it is fitted again without each cause, too.
         """
+        adapts = self.trial.reference.adapts
         dropped: dict[str, str] = {}
         if not decision.named:
             return decision, None, dropped
@@ -105,7 +115,7 @@ class HeldOut(Rollouts):
         while decision.named:
             harm = found.after > HARM * found.before
             asked = [n for n in decision.named if harm or not n.cause.only_read]
-            if not asked or (found.real and len(decision.named) == 1):
+            if not asked or (found.real and len(decision.named) == 1 and not adapts):
                 break
             tried = []
             for one in asked:
@@ -192,8 +202,11 @@ class HeldOut(Rollouts):
             if len(rows):
                 yield known[0], (middle, late), rows
 
-    def _without(self, decision: Decision, voyage: str, half: Half) -> dict[str, np.ndarray]:
-        """Numbers of the named causes from all else alone."""
+    def _without(
+        self, decision: Decision, voyage: str, half: Half
+    ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+        """Numbers of the named causes from all else alone, and the coefficients beside them where
+        the model adapts."""
         recorded, segment = self.trial.record, decision.point.linear.cut
         index = recorded.names.index(voyage) if voyage in recorded.names else -1
         out = segment.voyage == index
@@ -201,8 +214,10 @@ class HeldOut(Rollouts):
             middle, late = half
             out &= (recorded.time[segment.rows] >= middle) == late
         included = tuple(decision.base.numbers)
-        numbers = dict(decision.apart.get(voyage, {}))
-        if included:
-            fitted = self.trial.without(decision.point, included, decision.louder, out)
+        numbers, adapts = dict(decision.apart.get(voyage, {})), self.trial.reference.adapts
+        coefficients = None
+        if included or adapts:
+            fitted, beside = self.trial.without(decision.point, included, decision.louder, out)
             numbers = {**fitted, **numbers}
-        return {n.cause.label: numbers[n.cause.label] for n in decision.named}
+            coefficients = beside if adapts else None
+        return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients
