@@ -342,7 +342,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
 
 @pytest.mark.parametrize(
     ("as_good", "beside", "said"),
-    [(True, 12.0, "unknown"), (True, 5.0, "named"), (False, 12.0, "named")],
+    [(True, 5.0, "unknown"), (True, -5.0, "named"), (False, 5.0, "named")],
 )
 def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good, beside, said):
     """A free structure pays for its freedom: one as good as the cause, that explains still more
@@ -377,6 +377,37 @@ def test_little_evidence_that_a_structure_has_too_is_none(compass, monkeypatch, 
     again = diagnose.decide(trial, decision.first)
     assert (again.verdict, again.structure) == (said, None)
     assert ("explains" in again.rejected.get("heading_offset", "")) == (said == "none")
+
+
+def test_a_side_force_of_the_screw_is_not_called_a_rudder_aslant(sea, trials):
+    """A tenth of the thrust to starboard is no cause of the catalogue, and looks much like one."""
+    _, decision = judged(sea.usual, trials("none", propeller_side_force=0.1))
+    assert decision.verdict == "unknown" and not decision.named
+    assert decision.structure.family == "controls" and "sway" in decision.structure.acts_on
+    assert "rudder_offset" in decision.rejected
+
+
+# --- a model that has learned of what is wrong
+
+
+def test_a_model_that_has_learned_is_fitted_again_beside_the_cause(sea, tmp_path):
+    """MMG made on the very voyages that a current set: its coefficients have taken some of it in,
+    and stand elsewhere once the current is named; so do those of the run that is kept."""
+    split = choose_physical_split(sea.store, ("trial_*",), (), "ref", 100)
+    config = Config(model="mmg", split=split, physics=Physics(folds=2))
+    run, _ = identify_run(config, sea.store, tmp_path / "mmg")
+    done = pipeline.diagnose_run(
+        run.path, sea.store, ["trial_*"], tmp_path / "out", extend=tmp_path / "extended"
+    )
+    assert labels(done.decision) == ["current"]
+    was, now = done.held.before.theta, done.after.theta[: len(done.held.before.theta)]
+    unit = done.trial.reference.columns.unit[: len(was)]
+    assert np.abs((now - was) / unit).max() > 0.1
+    again = runs.load(tmp_path / "extended").models()[0]
+    assert again.losses(done.held.cut) == pytest.approx(done.after.losses(done.held.cut))
+    alone = done.held.adapted(done.decision).reduction
+    assert done.verdict.gain.reduction > alone + 0.1
+    assert any("fitted again" in note for note in done.verdict.notes)
 
 
 # --- what is hidden, and what is not
