@@ -23,6 +23,7 @@ LEAST = 8.0  # nats that the first cause must bring
 MORE = 25.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
+FAINT = 60.0  # nats of a cause, below which a structure that explains as much takes its place
 POSES = 0.0  # nats that a structure as good as the first cause may still bring beside it
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
 LOUD = 1.4  # times the usual unrest, from which on it is asked where it comes from
@@ -208,25 +209,35 @@ class _Search:
         return True
 
     def _structure(self, best: Found | None, gain: float) -> bool:
-        """Whether an unknown structure explains far more than the best cause; or, where little
+        """Whether an unknown structure explains far more than the best cause; or, where not much
         speaks for that, as much: a structure pays for its freedom, and beside a true cause it
-        explains less."""
+        explains less. Of what is little for either nothing is said."""
         strongest = max(self.remains, key=lambda f: f.evidence, default=None)
         if strongest is None:
             return False
         far = strongest.evidence > max(UNKNOWN, gain + FLEXIBLE)
-        faint = best is not None and LEAST <= gain < MORE and strongest.evidence >= gain
+        faint = LEAST <= gain < FAINT and strongest.evidence >= gain - TEMPERATURE
         if not (far or faint):
             return False
-        if far:
+        if far or gain >= MORE:
             acts_on = self.structures.acts_on(self.point, strongest)
             self.structure = Structure(strongest.name, strongest.evidence, acts_on)
         if best is not None:
+            more = strongest.evidence - max(gain, 0.0)
+            much = f"{more:.0f} nats more" if more >= 1.0 else "as much"
             self.rejected[_last(best)] = (
-                f"a dependence on {strongest.name} that it does not have explains "
-                f"{strongest.evidence - max(gain, 0.0):.0f} nats more"
+                f"a dependence on {strongest.name} that it does not have explains {much}"
             )
+            if faint:
+                self._instead(_last(best), strongest, odds(more + TEMPERATURE, 0.0))
         return True
+
+    def _instead(self, label: str, structure: Found, sure: float) -> None:
+        """Of the probability of a cause so much is the structure's that takes its place."""
+        moved = sure * self.ranking.get(label, 0.0)
+        family = f"unknown:{structure.name}"
+        self.ranking[label] = self.ranking.get(label, 0.0) - moved
+        self.ranking[family] = self.ranking.get(family, 0.0) + moved
 
     def _poses(self) -> bool:
         """Whether what was named first only looks like what is there: a structure that anything may
@@ -243,6 +254,7 @@ class _Search:
             f"a dependence on {rival.name} explains as much, and beside it "
             f"{strongest.evidence:.0f} nats more"
         )
+        self._instead(label, rival, odds(strongest.evidence, POSES))
         self.included, self.point, self.base = self.trial.fixed, *self.start
         self.structure = Structure(
             rival.name, rival.evidence, self.structures.acts_on(self.point, rival)
@@ -381,7 +393,8 @@ def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     settled = []
     for one in contenders:
         numbers = dict(base.numbers) | dict(one.numbers)
-        at, fitted = trial.settle((*included, one.name), numbers, point.path)
+        beat = max((f.evidence for _, f in settled), default=-math.inf) - ALIKE
+        at, fitted = trial.settle((*included, one.name), numbers, point.path, beat)
         if np.isfinite(fitted.evidence):
             settled.append((at, fitted))
     return sorted(settled, key=lambda pair: -pair[1].evidence)

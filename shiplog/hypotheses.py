@@ -25,6 +25,7 @@ FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
 REST = 0.02  # of a number's size: it rests
+HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
 @dataclass(frozen=True)
@@ -325,11 +326,16 @@ class Trial:
         return found, level.inverse[start:, start:] * np.outer(whole, whole)
 
     def settle(
-        self, included: Sequence[str], numbers: Mapping[str, np.ndarray], path: Path | None
+        self,
+        included: Sequence[str],
+        numbers: Mapping[str, np.ndarray],
+        path: Path | None,
+        beat: float = -np.inf,
     ) -> tuple[Point, Found]:
-        """These causes together, linearised where they are until they rest."""
+        """These causes together, linearised where they are until they rest; or until it is plain
+        that their evidence will not `beat` what another has."""
         by = {cause.label: cause for cause in self.reference.model.causes}
-        point, louder, near = None, 1.0, None
+        point, louder, near, before = None, 1.0, None, np.inf
         for _ in range(ROUNDS):
             try:
                 point = self.at(numbers, path, louder)
@@ -349,8 +355,10 @@ class Trial:
             size = {n: self.reference.columns.unit[self.reference.columns.of[n]] for n in included}
             far = max(float(np.abs((moved[n] - numbers[n]) / size[n]).max()) for n in included)
             numbers = moved
-            if far < REST:
+            lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
+            if far < REST or (lost and np.isfinite(before)):
                 break
+            before = base.evidence
         assert point is not None
         return point, replace(base, name="+".join(included), numbers=numbers)
 

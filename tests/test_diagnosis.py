@@ -359,24 +359,35 @@ def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good,
     if said == "unknown":
         assert again.structure == diagnose.Structure("controls", found + 1.0, ("yaw_rate",))
         assert "explains as much" in again.rejected["heading_offset"] and not again.named
+        assert again.ranking["unknown:controls"] > again.ranking["heading_offset"]
         assert again.base is again.nothing or again.base.evidence == again.nothing.evidence
 
 
-@pytest.mark.parametrize(("as_good", "said"), [(1.0, "none"), (-1.0, "named")])
-def test_little_evidence_that_a_structure_has_too_is_none(compass, monkeypatch, as_good, said):
-    """Too little for the structure to be said, and no more for the cause than for that."""
+@pytest.mark.parametrize(
+    ("as_good", "little", "said"),
+    [(1.0, 1.0, "none"), (-2.0, 1.0, "none"), (-4.0, 1.0, "named"), (-2.0, -1.0, "unknown")],
+)
+def test_not_much_evidence_that_a_structure_has_too_names_nothing(
+    compass, monkeypatch, as_good, little, said
+):
+    """No more for the cause than for the structure: nothing where it is little, else unknown."""
     trial, decision = compass
     found = decision.named[0].evidence
-    monkeypatch.setattr(diagnose, "MORE", found + 1.0)
+    monkeypatch.setattr(diagnose, "MORE", found + little)
+    monkeypatch.setattr(diagnose, "FAINT", found + 1.0)
     monkeypatch.setattr(diagnose, "UNKNOWN", found + 10.0)
     monkeypatch.setattr(diagnose, "STOCHASTIC", np.inf)
     told = iter([found + as_good, -20.0])
     monkeypatch.setattr(
         unnamed.Structures, "found", lambda *_: [Found("controls", next(told), 1.0)]
     )
+    monkeypatch.setattr(unnamed.Structures, "acts_on", lambda *_: ("sway",))
     again = diagnose.decide(trial, decision.first)
-    assert (again.verdict, again.structure) == (said, None)
-    assert ("explains" in again.rejected.get("heading_offset", "")) == (said == "none")
+    assert again.verdict == said
+    assert (again.structure is not None) == (said == "unknown")
+    assert ("explains" in again.rejected.get("heading_offset", "")) == (said != "named")
+    if said == "unknown":
+        assert again.ranking["unknown:controls"] > again.ranking["heading_offset"] > 0.0
 
 
 def test_a_side_force_of_the_screw_is_not_called_a_rudder_aslant(sea, trials):
