@@ -70,7 +70,7 @@ class Extended:
         values = theta[:count]
         numbers = self.numbers(theta)
         share, actuator = actuator[..., -1], actuator[..., :-1]
-        north = east = jnp.zeros(())
+        north = east = 0.0
         for cause, p in zip(self.causes, numbers, strict=True):
             water = cause.water(p)
             if water is not None:
