@@ -20,7 +20,8 @@ from shiplog.unnamed import Pulses
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 LEAST = 8.0  # nats that the first cause must bring
-MORE = 25.0  # that each further one must: small evidence follows large ones about
+MORE = 25.0  # that one must whose gain is not sure
+FURTHER = 60.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
 FAINT = 60.0  # nats of a cause, below which a structure that explains as much takes its place
@@ -182,7 +183,7 @@ class _Search:
             return True
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
         first = self.included == self.trial.fixed
-        wanted = LEAST if first and self.pulses is None else MORE
+        wanted = LEAST if first and self.pulses is None else FURTHER
         if not self.ranking:
             self.ranking = self._ranked(settled, wanted)
         best = settled[0][1] if settled else None
@@ -328,7 +329,7 @@ class _Search:
                 continue
             assert self.base.covariance is not None
             gain, alike = self.steps[label]
-            sure = odds(gain, MORE)
+            sure = odds(gain, FURTHER)
             found.append(
                 Named(
                     cause, gain, sure if found else self.ranking.get(label, sure),

@@ -19,6 +19,7 @@ from shiplog.record import Record
 from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, resampled
 
 FAMILIES = ("position", "heading", "time", "motion", "controls", "wind")
+UNSEEN = ("position", "heading", "time")  # by any model of forces, a network too
 FEATURES = 20
 SIZES = (1.0, 3.0, 9.0)  # of the accelerations, in units of the ordinary unrest
 

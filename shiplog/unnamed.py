@@ -13,6 +13,7 @@ import numpy as np
 from shiplog import evidence, reference, structure
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
+from shiplog.models.mmg.model import MMG
 from shiplog.structure import Basis, Products
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
@@ -44,7 +45,11 @@ class Family:
 
 
 class Structures:
-    """All families, about a trial's first point: what they depend on was measured."""
+    """All families, about a trial's first point: what they depend on was measured.
+
+    Of a network that has learned of what is wrong only those that it cannot see: what is left of
+    its own inputs is a poor fit, and another training might take it in.
+    """
 
     def __init__(self, trial: Trial, point: Point) -> None:
         self.trial = trial
@@ -54,10 +59,13 @@ class Structures:
             usual = structure.at_knots(ref.nominal.cut, trial.grid)
             weighed = evidence.weighed(ref.nominal, ref.unrest.noise)
         both = [k for k in (usual, here) if k]
+        learned = ref.adapts and not isinstance(ref.model.base, MMG)
         bases: list[tuple[str, Basis | Products | None]] = [
-            (name, structure.basis(name, trial.record, *both)) for name in structure.FAMILIES
+            (name, structure.basis(name, trial.record, *both))
+            for name in (structure.UNSEEN if learned else structure.FAMILIES)
         ]
-        bases.append(("controls", structure.products(trial.record, *both)))
+        if not learned:
+            bases.append(("controls", structure.products(trial.record, *both)))
         self.families: list[Family] = []
         for name, basis in bases:
             if basis is None:

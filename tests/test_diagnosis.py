@@ -421,6 +421,25 @@ def test_a_model_that_has_learned_is_fitted_again_beside_the_cause(sea, tmp_path
     assert any("fitted again" in note for note in done.verdict.notes)
 
 
+def test_of_a_network_that_has_learned_only_what_it_cannot_see_is_asked(sea):
+    """What is left of a network's own inputs is a poor fit; an MMG has its forms, and no other."""
+    point, ref = sea.done.decision.first, sea.usual
+    bent = replace(ref.model, base="no MMG")
+    cases = {
+        "network": replace(ref, adapts=True, model=bent),
+        "MMG": replace(ref, adapts=True),
+        "before": replace(ref, model=bent),
+    }
+    asked = {
+        name: [
+            f.name for f in unnamed.Structures(Trial(one, sea.done.trial.record), point).families
+        ]
+        for name, one in cases.items()
+    }
+    assert asked["network"] == ["position", "heading", "time"]
+    assert asked["MMG"] == asked["before"] == [*structure.FAMILIES, "controls"]
+
+
 # --- what is hidden, and what is not
 
 
