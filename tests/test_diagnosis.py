@@ -398,6 +398,24 @@ def test_a_side_force_of_the_screw_is_not_called_a_rudder_aslant(sea, trials):
     assert "rudder_offset" in decision.rejected
 
 
+@pytest.mark.parametrize(("nats", "joins"), [(59.0, False), (61.0, True)])
+def test_small_evidence_follows_large_ones_about_and_names_nothing(
+    compass, monkeypatch, nats, joins
+):
+    trial, decision = compass
+    monkeypatch.setattr(unnamed.Structures, "found", lambda *_: [])
+    search = diagnose._Search(trial, decision.first, ())
+    assert search.one_more() and search.included == ("heading_offset",)
+    numbers = {**search.base.numbers, "current": np.zeros(2)}
+    more = replace(
+        search.base, name="heading_offset+current", evidence=search.base.evidence + nats,
+        numbers=numbers,
+    )  # fmt: skip
+    monkeypatch.setattr(diagnose, "_settle", lambda *_: [(search.point, more)])
+    assert search.one_more() == joins
+    assert ("current" in search.included) == joins
+
+
 # --- a model that has learned of what is wrong
 
 
