@@ -74,7 +74,7 @@ def diagnose_run(
     before = run.extended(run.config.seeds[0], recorded)
     held = None if cut is None else HeldOut(cut, before, tried)
     decision, found, dropped, lost = _decided(run, tried, point, held)
-    if held and decision.named and tried.reference.adapts:
+    if held and decision.named and decision.adapted:
         alone = held.adapted(decision).reduction
         does = "takes off" if alone > 0.0 else "adds"
         notes.append(

@@ -80,6 +80,7 @@ class Decision:
     remains    families of structure, with what they would still explain
     told       label → what these data would tell of each cause, were it there
     apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
+    adapted    whether the model's own coefficients are fitted again beside what is named
     """
 
     verdict: str
@@ -97,6 +98,7 @@ class Decision:
     remains: tuple[Found, ...] = field(default=())
     told: Mapping[str, Told] = field(default_factory=dict)
     apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    adapted: bool = False
 
     @property
     def hidden(self) -> dict[str, float]:

@@ -91,12 +91,12 @@ class HeldOut(Rollouts):
 
     def extended(self, decision: Decision) -> ExtendedSimulator:
         """The model with what is named in it, with numbers from all voyages."""
-        named, adapted = decision.named, None
-        if self.trial.reference.adapts:
-            adapted = self.trial.coefficients(decision.point, decision.base)
+        named, beside = decision.named, None
+        if decision.adapted:
+            beside = self.trial.coefficients(decision.point, decision.base)
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
-            {n.cause.label: n.covariance for n in named}, self._constants(decision), adapted,
+            {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
         )  # fmt: skip
 
     def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
@@ -105,24 +105,28 @@ class HeldOut(Rollouts):
         A cause of the error makes it less, and surely so where little evidence speaks for it: what
         is outside the catalogue looks a little like something in it. An instrument's fault is a
         fault though it is worth nothing, but not where it makes the error more. A model that has
-        learned of it is fitted again without each cause, too.
+        learned of it, and gains by being fitted again beside it, is so without each cause, too.
         """
-        adapts = self.trial.reference.adapts
         dropped: dict[str, str] = {}
         if not decision.named:
             return decision, None, dropped
         found = self.gain(decision)
+        if self.trial.reference.adapts:
+            beside = replace(decision, adapted=True)
+            again = self.gain(beside)
+            if again.after < found.after:
+                decision, found = beside, again
         while decision.named:
             harm = found.after > HARM * found.before
             asked = [n for n in decision.named if harm or not n.cause.only_read]
-            if not asked or (found.real and len(decision.named) == 1 and not adapts):
+            alone = len(decision.named) == 1
+            if not asked or (found.real and alone and not decision.adapted):
                 break
             tried = []
             for one in asked:
                 rest = diagnose.without(self.trial, decision, one)
                 tried.append((self.gain(rest), rest, one))
             best, rest, one = min(tried, key=lambda t: t[0].after)
-            alone = len(decision.named) == 1
             gains = best.after * (1.0 if alone else 1.0 - WORTH) >= found.after
             if gains and not (alone and one.evidence < diagnose.MORE):
                 break
@@ -214,10 +218,9 @@ class HeldOut(Rollouts):
             middle, late = half
             out &= (recorded.time[segment.rows] >= middle) == late
         included = tuple(decision.base.numbers)
-        numbers, adapts = dict(decision.apart.get(voyage, {})), self.trial.reference.adapts
-        coefficients = None
-        if included or adapts:
+        numbers, coefficients = dict(decision.apart.get(voyage, {})), None
+        if included or decision.adapted:
             fitted, beside = self.trial.without(decision.point, included, decision.louder, out)
             numbers = {**fitted, **numbers}
-            coefficients = beside if adapts else None
+            coefficients = beside if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients
