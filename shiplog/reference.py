@@ -311,24 +311,17 @@ def read(
     record: Record,
     rows: np.ndarray,
     numbers: dict[str, np.ndarray] | None = None,
-    known: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them.
-
-    known   the changes at other numbers: then only those of causes in `numbers` are made again
-    """
+    """Segments as read with `numbers`, and how each cause's numbers change them there."""
     given = numbers or {}
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
     count = len(columns.unit)
-    if known is None:
-        moved = np.zeros((*base.driven.shape, count))
-        shown = np.zeros((*base.y.shape, count))
-    else:
-        moved, shown = known[0].copy(), known[1].copy()
+    moved = np.zeros((*base.driven.shape, count))
+    shown = np.zeros((*base.y.shape, count))
     for cause in model.causes:
-        if not cause.reads or (known is not None and cause.label not in given):
+        if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
         for i, column in enumerate(columns.of[cause.label]):

@@ -21,7 +21,17 @@ from pipelines.identify import identify_run
 from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
-from shiplog import advise, conventions, diagnose, record, reference, runs, structure, unnamed
+from shiplog import (
+    advise,
+    conventions,
+    diagnose,
+    record,
+    reference,
+    runs,
+    segments,
+    structure,
+    unnamed,
+)
 from shiplog import profile as profiles
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
@@ -662,6 +672,21 @@ def test_in_each_others_places_nothing_depends_on_position(sea, trials, monkeypa
     monkeypatch.setattr(structure, "at_knots", exchanged)
     assert before > diagnose.UNKNOWN
     assert explained() < 0.5 * before
+
+
+def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
+    """An antenna's columns come from what is measured: 1.4 s apart they are other ones, and the
+    position and the velocity would seem to disagree."""
+    trial = Trial(sea.usual, sea.done.trial.record)
+    trial.at({})
+    numbers = {"clock_offset:gnss": np.array([1.4])}
+    late = trial.at(numbers)
+    ref = sea.usual
+    cut, moved, shown = reference.read(ref.model, ref.setting, trial.record, trial.rows, numbers)
+    whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
+    fresh = segments.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
+    columns = ref.columns.of["antenna_offset"]
+    assert late.linear.j[..., columns] == pytest.approx(fresh.j[..., columns], abs=1e-5)
 
 
 # --- traps that make simpler methods invent causes
