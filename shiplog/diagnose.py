@@ -244,10 +244,12 @@ class _Search:
 
     def _poses(self) -> bool:
         """Whether what was named first only looks like what is there: a structure that anything may
-        have explained as much, for all its freedom, and explains more beside it."""
+        have explained as much, for all its freedom, and explains more beside it, which is no
+        second cause's."""
         rival, self.rival = self.rival, None
         strongest = max(self.remains, key=lambda f: f.evidence, default=None)
-        if rival is None or strongest is None or strongest.evidence < POSES:
+        second = max((f.evidence for f in self.found), default=-math.inf)
+        if rival is None or strongest is None or strongest.evidence < max(POSES, second):
             return False
         ((label, (gain, _)),) = self.steps.items()
         if rival.evidence < gain:

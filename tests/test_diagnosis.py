@@ -373,6 +373,24 @@ def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good,
         assert again.base is again.nothing or again.base.evidence == again.nothing.evidence
 
 
+@pytest.mark.parametrize(("second", "poses"), [(4.0, True), (6.0, False)])
+def test_what_a_second_cause_explains_is_no_sign_that_the_first_one_poses(
+    compass, monkeypatch, second, poses
+):
+    trial, decision = compass
+    found = decision.named[0].evidence
+    told = iter([found + 1.0, 5.0])
+    monkeypatch.setattr(
+        unnamed.Structures, "found", lambda *_: [Found("controls", next(told), 1.0)]
+    )
+    monkeypatch.setattr(unnamed.Structures, "acts_on", lambda *_: ("sway",))
+    search = diagnose._Search(trial, decision.first, ())
+    assert search.one_more()
+    search.found = [replace(search.found[0], evidence=second)]
+    search.one_more()
+    assert (search.structure is not None) == poses
+
+
 @pytest.mark.parametrize(
     ("as_good", "little", "said"),
     [(1.0, 1.0, "none"), (-2.0, 1.0, "none"), (-4.0, 1.0, "named"), (-2.0, -1.0, "unknown")],
