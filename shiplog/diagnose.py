@@ -190,7 +190,7 @@ class _Search:
             self.ranking = self._ranked(settled, wanted)
         best = settled[0][1] if settled else None
         gain = best.evidence - self.base.evidence if best else -math.inf
-        if self._structure(best, gain):
+        if self._structure(settled, gain):
             return False
         full = len(self.included) - len(self.trial.fixed) >= MOST
         if best is None or gain < wanted or full:
@@ -211,14 +211,17 @@ class _Search:
         self.base, self.found = self.trial.scan(self.point, self._left(), self.included)
         return True
 
-    def _structure(self, best: Found | None, gain: float) -> bool:
+    def _structure(self, settled: Sequence[tuple[Point, Found]], gain: float) -> bool:
         """Whether an unknown structure explains far more than the best cause; or, where not much
         speaks for that, as much: a structure pays for its freedom, and beside a true cause it
         explains less. Of what is little for either nothing is said."""
         strongest = max(self.remains, key=lambda f: f.evidence, default=None)
         if strongest is None:
             return False
+        best = settled[0][1] if settled else None
         far = strongest.evidence > max(UNKNOWN, gain + FLEXIBLE)
+        if far and settled and strongest.evidence <= gain + self._second(*settled[0]):
+            return False
         faint = LEAST <= gain < FAINT and strongest.evidence >= gain - TEMPERATURE
         if not (far or faint):
             return False
@@ -234,6 +237,14 @@ class _Search:
             if faint:
                 self._instead(_last(best), strongest, odds(more + TEMPERATURE, 0.0))
         return True
+
+    def _second(self, point: Point, best: Found) -> float:
+        """Nats that a further cause brings beside the best one, where it would be taken: a
+        structure may explain two causes at once."""
+        included = tuple(best.numbers)
+        left = [c for c in self.catalogue if all(c.beside(label) for label in included)]
+        _, found = self.trial.scan(point, left, included)
+        return max((f.evidence for f in found if f.evidence >= FURTHER), default=0.0)
 
     def _instead(self, label: str, structure: Found, sure: float) -> None:
         """Of the probability of a cause so much is the structure's that takes its place."""

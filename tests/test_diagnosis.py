@@ -373,6 +373,33 @@ def test_what_only_looks_like_a_cause_has_no_name(compass, monkeypatch, as_good,
         assert again.base is again.nothing or again.base.evidence == again.nothing.evidence
 
 
+@pytest.mark.parametrize(("second", "said"), [(95.0, "unknown"), (105.0, "named")])
+def test_two_causes_are_no_structure_though_one_explains_less(compass, monkeypatch, second, said):
+    trial, decision = compass
+    found = decision.named[0].evidence
+    told = iter([found + 100.0, -20.0, -20.0])
+    monkeypatch.setattr(
+        unnamed.Structures, "found", lambda *_: [Found("controls", next(told), 1.0)]
+    )
+    monkeypatch.setattr(unnamed.Structures, "acts_on", lambda *_: ("sway",))
+    monkeypatch.setattr(diagnose._Search, "_second", lambda *_: second)
+    again = diagnose.decide(trial, decision.first)
+    assert (again.verdict, labels(again)) == (said, ["heading_offset"] * (said == "named"))
+
+
+def test_a_second_cause_counts_where_it_would_be_taken(compass, sea):
+    """Beside the offset of the heading nothing is hidden in the one trial, in the other a current."""
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    assert search._second(decision.point, decision.base) == 0.0
+    both = Trial(sea.usual, sea.done.trial.record)
+    point = both.begin({})
+    _, found = both.scan(point, search.catalogue)
+    first = next(f for f in found if f.name == "heading_offset")
+    at, settled = both.settle((first.name,), first.numbers, point.path)
+    assert diagnose._Search(both, point, ())._second(at, settled) > diagnose.FURTHER
+
+
 @pytest.mark.parametrize(("second", "poses"), [(4.0, True), (6.0, False)])
 def test_what_a_second_cause_explains_is_no_sign_that_the_first_one_poses(
     compass, monkeypatch, second, poses
