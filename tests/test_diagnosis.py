@@ -388,7 +388,7 @@ def test_two_causes_are_no_structure_though_one_explains_less(compass, monkeypat
 
 
 def test_a_second_cause_counts_where_it_would_be_taken(compass, sea):
-    """Beside the offset of the heading nothing is hidden in the one trial, in the other a current."""
+    """Beside the heading offset nothing is hidden in the one trial; in the other a current is."""
     trial, decision = compass
     search = diagnose._Search(trial, decision.first, ())
     assert search._second(decision.point, decision.base) == 0.0
