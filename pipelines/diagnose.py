@@ -74,13 +74,19 @@ def diagnose_run(
     before = run.extended(run.config.seeds[0], recorded)
     held = None if cut is None else HeldOut(cut, before, tried)
     decision, found, dropped, lost = _decided(run, tried, point, held)
-    if held and decision.named and decision.adapted:
-        alone = held.adapted(decision).reduction
-        does = "takes off" if alone > 0.0 else "adds"
-        notes.append(
-            f"{run.name} has learned of what is wrong: its own coefficients are fitted again "
-            f"beside what is named. Without a name that {does} {abs(alone):.0%} of the error."
+    if held and decision.named and tried.reference.adapts:
+        note = (
+            f"{run.name} was made on these very voyages and may have learned of what is wrong: "
+            "numbers are then of what is left, and smaller than the cause's."
         )
+        if decision.adapted:
+            alone = held.adapted(decision).reduction
+            does = "takes off" if alone > 0.0 else "adds"
+            note += (
+                " Its own coefficients are fitted again beside what is named; without a name that "
+                f"{does} {abs(alone):.0%} of the error."
+            )
+        notes.append(note)
     context = Context(
         run,
         before_effect and nominal is not None,

@@ -499,6 +499,7 @@ def test_a_model_that_has_learned_is_fitted_again_where_that_gains(sea, tmp_path
     kept = runs.extend(run, tmp_path / "extended", after)
     assert kept.models()[0].losses(held.cut) == pytest.approx(after.losses(held.cut))
     assert kept.base()[1].values == pytest.approx(now)
+    assert any("may have learned of what is wrong" in note for note in done.verdict.notes)
 
 
 def test_of_a_network_that_has_learned_only_what_it_cannot_see_is_asked(sea):
