@@ -155,7 +155,13 @@ class Extension:
 
     @staticmethod
     def of(told: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()) -> Extension:
-        """Back again; `own`: causes of the user's own. Raises RunError for one nobody knows."""
+        """Back again; `own`: causes of the user's own. Raises RunError for one nobody knows, and
+        for an extension of an earlier program."""
+        if "coefficients" not in arrays:
+            raise RunError(
+                "The run was extended by an earlier shiplog, which kept no coefficients with it.",
+                hint="extend its base again with `shiplog diagnose --extend`.",
+            )
         by = {c.label: c for c in (*CATALOGUE, *own)}
         causes, numbers, covariance, at = [], {}, {}, 0
         for entry in told["causes"]:
