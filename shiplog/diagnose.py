@@ -208,7 +208,9 @@ class _Search:
             return False
         self.pulses = tried
         self.trial.unrest = replace(self.trial.unrest, pulse=tried.unit * tried.force)
-        self.base, self.found = self.trial.scan(self.point, self._left(), self.included)
+        self.base, self.found = self.trial.scan(
+            self.point, self._left(self.included), self.included
+        )
         return True
 
     def _structure(self, settled: Sequence[tuple[Point, Found]], gain: float) -> bool:
@@ -242,8 +244,7 @@ class _Search:
         """Nats that a further cause brings beside the best one, where it would be taken: a
         structure may explain two causes at once."""
         included = tuple(best.numbers)
-        left = [c for c in self.catalogue if all(c.beside(label) for label in included)]
-        _, found = self.trial.scan(point, left, included)
+        _, found = self.trial.scan(point, self._left(included), included)
         return max((f.evidence for f in found if f.evidence >= FURTHER), default=0.0)
 
     def _instead(self, label: str, structure: Found, sure: float) -> None:
@@ -288,10 +289,10 @@ class _Search:
         for other, nats in less.items():
             self.rejected.setdefault(other, f"{label} explains {nats:.0f} nats more")
         self.included = tuple(self.base.numbers)
-        _, self.found = self.trial.scan(self.point, self._left(), self.included)
+        _, self.found = self.trial.scan(self.point, self._left(self.included), self.included)
 
-    def _left(self) -> list[Cause]:
-        return [c for c in self.catalogue if all(c.beside(label) for label in self.included)]
+    def _left(self, included: Sequence[str]) -> list[Cause]:
+        return [c for c in self.catalogue if all(c.beside(label) for label in included)]
 
     def _ranked(self, settled: Sequence[tuple[Point, Found]], wanted: float) -> dict[str, float]:
         """Probabilities of the first step, tempered; `none` holds the threshold."""

@@ -116,6 +116,7 @@ class Products:
 
 
 def products(record: Record, *campaigns: Knots) -> Products:
+    """Of the ship's actuators, in units of what they did in the campaigns."""
     kinds = [one.kind for one in record.profile.actuators]
     azimuths = tuple(i for i, kind in enumerate(kinds) if kind == "azimuth")
     turning = tuple(i for i, kind in enumerate(kinds) if kind == "rudder") + azimuths
