@@ -30,9 +30,9 @@ KAPPAS = (11.0, 4.0, 2.0, 1.0)
 def counted(ref: Reference, kappa: float) -> Reference:
     """The same campaign, all of it counted for 1/κ."""
     assert ref.nominal is not None
-    weighed = evidence.weighed(ref.nominal, ref.unrest.noise)
+    modes = evidence.modes(evidence.weighed(ref.nominal, ref.unrest.noise), ref.unrest)
     by = np.concatenate(([1.0], ref.columns.unit))
-    total = evidence.total(weighed, ref.unrest, np.ones(len(ref.nominal.e))) * np.outer(by, by)
+    total = modes.total(np.ones(len(ref.nominal.e))) * np.outer(by, by)
     ones = np.ones(len(ref.columns.unit))
     information, pull = reference.usual(total, kappa, ones, ref.columns.known, ref.anchor)
     return replace(ref, information=information, pull=pull, kappa=kappa, wider=ones)

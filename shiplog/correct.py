@@ -26,7 +26,7 @@ from shiplog.findings import Finding
 from shiplog.ingest import Voyage
 from shiplog.parity import Estimate
 from shiplog.profile import Profile
-from shiplog.record import Record, reduced, sighted
+from shiplog.record import Record, reduced
 
 STATE = [c.name for c in channels.STATE]
 MEASURED = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE
@@ -49,7 +49,7 @@ def _antenna(ahead: float, starboard: float) -> Remedy:
 
 
 def _velocity_scale(record: Record, p: np.ndarray) -> Record:
-    seen = sighted(record)
+    seen = record.sighted
     return reduced(record, replace(seen, velocity=seen.velocity / (1.0 + p[0])))
 
 

@@ -46,15 +46,13 @@ class Unrest:
     def louder(self, factor: float) -> Unrest:
         return replace(self, push=self.push * factor)
 
-    def precision(self, knots: int) -> tuple[np.ndarray, float]:
-        """Of z [Z, Z], and the log determinant of its knots' part."""
-        kernel = self.kernel(knots)
+    def precision(self, knots: int) -> np.ndarray:
+        """Of z [Z, Z]."""
         size = 6 + 3 * knots
         whole = np.zeros((size, size))
         whole[:6, :6] = np.diag(self.start**-2.0)
-        whole[6:, 6:] = np.linalg.inv(kernel)
-        logdet = -np.linalg.slogdet(kernel)[1]
-        return whole, float(logdet)
+        whole[6:, 6:] = np.linalg.inv(self.kernel(knots))
+        return whole
 
 
 def _decay(knots: int, time: float) -> np.ndarray:
@@ -78,20 +76,6 @@ class Weighed:
     zz: np.ndarray
     logdet: float
     knots: int
-
-    def beside(self, pushed: np.ndarray) -> Weighed:
-        """With W columns more, of which each bends the observations as the acceleration `pushed`
-        [S, 3J, W] at the knots does."""
-        by_knots = self.zz[:, :, 6:] @ pushed
-        across = np.swapaxes(self.zd[:, 6:], 1, 2) @ pushed
-        own = np.swapaxes(pushed, 1, 2) @ by_knots[:, 6:]
-        count = self.dd.shape[-1]
-        dd = np.empty((len(own), count + own.shape[-1], count + own.shape[-1]))
-        dd[:, :count, :count] = self.dd
-        dd[:, :count, count:] = across
-        dd[:, count:, :count] = np.swapaxes(across, 1, 2)
-        dd[:, count:, count:] = own
-        return replace(self, dd=dd, zd=np.concatenate((self.zd, by_knots), -1))
 
 
 def weighed(linear: Linear, noise: np.ndarray) -> Weighed:
@@ -119,37 +103,91 @@ class Gram:
         return Gram(self.each * np.outer(by, by), self.logdet)
 
 
-def gram(weighed: Weighed, unrest: Unrest) -> Gram:
-    """Start and acceleration eliminated (Woodbury)."""
-    prior, logdet = unrest.precision(weighed.knots)
-    inner = weighed.zz + prior
-    root = np.linalg.cholesky(inner)
-    solved = np.linalg.solve(root, weighed.zd)
-    each = weighed.dd - np.swapaxes(solved, 1, 2) @ solved
-    return Gram(each, _volume(weighed, prior, logdet, root))
+@dataclass(frozen=True)
+class Modes:
+    """A pass without its starts, in axes in which the acceleration at the knots is independent by
+    what was known of it and by what the data say: of any size λ of it, the rest is a division.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J], the start eliminated
+    md      [S, 3J, 1 + C]     of the modes with [e | J]
+    felt    [S, 3J]            what the data say of each mode, in units of what was known
+    axes    [S, 3J, 3J]        from accelerations at the knots to modes
+    logdet  of noise and start
+    """
+
+    dd: np.ndarray
+    md: np.ndarray
+    felt: np.ndarray
+    axes: np.ndarray
+    logdet: float
+
+    def beside(self, pushed: np.ndarray) -> Modes:
+        """With W columns more, of which each bends the observations as the acceleration `pushed`
+        [S, 3J, W] at the knots does."""
+        mode = self.axes @ pushed
+        bent = self.felt[..., None] * mode
+        across = np.swapaxes(self.md, 1, 2) @ mode
+        count, more = self.dd.shape[-1], pushed.shape[-1]
+        dd = np.empty((len(mode), count + more, count + more))
+        dd[:, :count, :count] = self.dd
+        dd[:, :count, count:] = across
+        dd[:, count:, :count] = np.swapaxes(across, 1, 2)
+        dd[:, count:, count:] = np.swapaxes(mode, 1, 2) @ bent
+        return replace(self, dd=dd, md=np.concatenate((self.md, bent), -1))
+
+    def total(self, weight: np.ndarray, louder: float = 1.0) -> np.ndarray:
+        """[1 + C, 1 + C] sum of `gram`'s matrices, weighted [S], without making each of them."""
+        part = np.sqrt(weight[:, None] / (self.felt + louder**-2.0))[..., None]
+        flat = (self.md * part).reshape(-1, self.md.shape[-1])
+        return np.tensordot(weight, self.dd, 1) - flat.T @ flat
+
+    def gram(self, louder: float = 1.0) -> Gram:
+        part = self.md / (self.felt + louder**-2.0)[..., None]
+        each = self.dd - np.swapaxes(self.md, 1, 2) @ part
+        return Gram(each, self.log_volume(louder))
+
+    def log_volume(self, louder: float = 1.0) -> float:
+        """log |C| of all segments, by itself."""
+        return self.logdet + float(np.log1p(louder**2 * self.felt).sum())
 
 
-def total(weighed: Weighed, unrest: Unrest, weight: np.ndarray) -> np.ndarray:
-    """[1 + C, 1 + C] sum of `gram`'s matrices, weighted [S], without making each of them."""
-    prior, _ = unrest.precision(weighed.knots)
-    root = np.linalg.cholesky(weighed.zz + prior)
-    solved = np.linalg.solve(root, weighed.zd) * np.sqrt(weight)[:, None, None]
-    flat = solved.reshape(-1, solved.shape[-1])
-    return np.tensordot(weight, weighed.dd, 1) - flat.T @ flat
+def modes(weighed: Weighed, unrest: Unrest) -> Modes:
+    """Start eliminated, acceleration along its principal axes (Woodbury)."""
+    kernel = unrest.kernel(weighed.knots)
+    known = np.diag(unrest.start**-2.0)
+    start = weighed.zz[:, :6, :6] + known
+    # in units of each number of the start, or its columns are too unlike to invert
+    unit = np.diagonal(start, axis1=1, axis2=2) ** -0.5
+    start = start * unit[:, :, None] * unit[:, None, :]
+    columns = np.concatenate((weighed.zz[:, :6, 6:], weighed.zd[:, :6]), -1) * unit[..., None]
+    solved = np.linalg.solve(start, columns)
+    count = weighed.zz.shape[-1] - 6
+    by_knots, by_numbers = np.swapaxes(columns[..., :count], 1, 2), columns[..., count:]
+    root = np.linalg.cholesky(kernel)
+    felt, axes = np.linalg.eigh(
+        root.T @ (weighed.zz[:, 6:, 6:] - by_knots @ solved[..., :count]) @ root
+    )
+    across = np.swapaxes(axes, 1, 2)
+    return Modes(
+        weighed.dd - np.swapaxes(by_numbers, 1, 2) @ solved[..., count:],
+        across @ (root.T @ (weighed.zd[:, 6:] - by_knots @ solved[..., count:])),
+        np.maximum(felt, 0.0),
+        across @ np.linalg.inv(root),
+        weighed.logdet + _of_start(weighed, known),
+    )
 
 
-def log_volume(weighed: Weighed, unrest: Unrest) -> float:
-    """log |C| of all segments, by itself."""
-    prior, logdet = unrest.precision(weighed.knots)
-    return _volume(weighed, prior, logdet, np.linalg.cholesky(weighed.zz + prior))
-
-
-def _volume(weighed: Weighed, prior: np.ndarray, logdet: float, root: np.ndarray) -> float:
+def _of_start(weighed: Weighed, known: np.ndarray) -> float:
     # Restricted likelihood (Patterson & Thompson 1971): how far a model lets a start be felt is
     # no evidence, and a ship with less damping would be punished for it, segment by segment.
-    of_inner = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum()
-    of_inner -= np.linalg.slogdet(weighed.zz[:, :6, :6] + 1e-9 * prior[:6, :6])[1].sum()
-    return weighed.logdet - logdet * len(weighed.zz) + float(of_inner)
+    felt = weighed.zz[:, :6, :6]
+    of = np.linalg.slogdet(felt + known)[1] - np.linalg.slogdet(felt + 1e-9 * known)[1]
+    return float(of.sum())
+
+
+def gram(weighed: Weighed, unrest: Unrest) -> Gram:
+    """Start and acceleration eliminated."""
+    return modes(weighed, unrest).gram()
 
 
 def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> Unrest:
@@ -164,7 +202,7 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> U
     flat = linear.z.reshape(count, -1, size)
     for _ in range(rounds):
         weight = np.where(used, unrest.noise**-2.0, 0.0).reshape(count, -1)
-        prior, _ = unrest.precision(knots)
+        prior = unrest.precision(knots)
         zt = np.swapaxes(flat * weight[..., None], 1, 2)
         covariance = np.linalg.inv(zt @ flat + prior)
         z = (covariance @ (zt @ left.reshape(count, -1, 1)))[..., 0]
@@ -191,7 +229,7 @@ def starts_and_knots(
     count, size = len(linear.e), linear.z.shape[-1]
     left = (linear.e - linear.j @ d).reshape(count, -1, 1)
     weight = np.where(linear.cut.used, unrest.noise**-2.0, 0.0).reshape(count, -1, 1)
-    prior, _ = unrest.precision((size - 6) // 3)
+    prior = unrest.precision((size - 6) // 3)
     z = linear.z.reshape(count, -1, size)
     zt = np.swapaxes(z * weight, 1, 2)
     covariance = np.linalg.inv(zt @ z + prior)

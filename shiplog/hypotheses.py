@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
-from shiplog.evidence import Weighed
+from shiplog.evidence import Modes, Weighed
 from shiplog.record import Record
 from shiplog.reference import HELD, Reference, read
 from shiplog.segments import Linear, Path
@@ -25,6 +25,7 @@ FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
 REST = 0.02  # of a number's size: it rests
+STALE = 0.1  # of a number's size: how other causes change what is read is the same
 HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
@@ -104,6 +105,7 @@ class Trial:
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self._first: Point | None = None
         self._volume: tuple[evidence.Unrest, CubicSpline] | None = None
+        self._modes: list[tuple[Weighed, Modes]] = []
         self.weight = np.ones(len(self.rows))
 
     # --- linearisation ---
@@ -133,9 +135,9 @@ class Trial:
         return point
 
     def _read(self, numbers: Mapping[str, np.ndarray]) -> Read:
-        """As `reference.read`, but once for the same numbers. How a cause changes what is read
-        depends on what is put right before: beside a clock that is late by a second an antenna's
-        columns are a second old, and two clocks would seem to disagree."""
+        """As `reference.read`. How a cause changes what is read depends on what is put right
+        before: beside a clock that is late by a second an antenna's columns are a second old, and
+        two clocks would seem to disagree. So columns are made anew; for a small move, a few."""
         ref = self.reference
         reading = {
             c.label: np.asarray(numbers[c.label])
@@ -143,13 +145,24 @@ class Trial:
             if c.reads and c.label in numbers
         }
         for before, found in self._known:
-            if before.keys() == reading.keys() and all(
-                np.array_equal(before[label], reading[label]) for label in reading
-            ):
+            if before.keys() != reading.keys():
+                continue
+            apart = self._apart(before, reading)
+            if apart == 0.0:
                 return found
-        found = read(ref.model, ref.setting, self.record, self.rows, dict(numbers))
+            if apart <= STALE:
+                return read(ref.model, ref.setting, self.record, self.rows, reading, found[1:])
+        found = read(ref.model, ref.setting, self.record, self.rows, reading)
         self._known = [*self._known[:1], (reading, found)]
         return found
+
+    def _apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
+        """The most that a number differs, in units of its size; of the same causes."""
+        columns = self.reference.columns
+        return max(
+            (float(np.abs((one[n] - other[n]) / columns.unit[columns.of[n]]).max()) for n in one),
+            default=0.0,
+        )
 
     def begin(self, numbers: Mapping[str, np.ndarray]) -> Point:
         """The model as it stands, with weights of the segments and a path held as firmly as the
@@ -174,17 +187,25 @@ class Trial:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
         ref = self.reference
         level = self.level(point, self.quietest(point), ())
-        gram = evidence.gram(point.weighed, self.unrest.louder(level.louder)).scaled(
-            ref.columns.unit
-        )
+        modes, louder = self.modes(point, level.louder)
+        gram = modes.gram(louder).scaled(ref.columns.unit)
         d = np.concatenate(([-1.0], level.solution[: len(ref.columns.unit)]))
         chi2 = np.einsum("i,sij,j->s", d, gram.each, d)
         self.weight = np.minimum(1.0, ROBUST * np.median(chi2) / np.maximum(chi2, 1e-9))
 
     # --- algebra ---
 
-    def total(self, weighed: Weighed, louder: float) -> np.ndarray:
-        return evidence.total(weighed, self.unrest.louder(louder), self.weight)
+    def modes(self, point: Point, louder: float) -> tuple[Modes, float]:
+        """The point's, and how much louder they are wanted: one pass serves every λ, but that of a
+        pulse beside the unrest, whose axes turn with it."""
+        if self.unrest.pulse is not None:
+            return evidence.modes(point.weighed, self.unrest.louder(louder)), 1.0
+        for of, found in self._modes:
+            if of is point.weighed:
+                return found, louder
+        found = evidence.modes(point.weighed, self.unrest)
+        self._modes = [*self._modes[-1:], (point.weighed, found)]
+        return found, louder
 
     def volume(self, louder: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
@@ -193,7 +214,10 @@ class Trial:
         if self._volume is None or self._volume[0] is not self.unrest:
             assert self._first is not None
             at = (0.5 * QUIETER[-1], *reversed(QUIETER), *LOUDER, 2.0 * LOUDER[-1])
-            values = [evidence.log_volume(self._first.weighed, self.unrest.louder(v)) for v in at]
+            values = []
+            for one in at:
+                modes, louder_by = self.modes(self._first, one)
+                values.append(modes.log_volume(louder_by))
             self._volume = (self.unrest, CubicSpline(np.log(at), values))
         return float(self._volume[1](np.log(louder)))
 
@@ -201,7 +225,8 @@ class Trial:
         """The base hypothesis at one λ: what is usual, and the included causes free."""
         ref = self.reference
         by = np.concatenate(([1.0], ref.columns.unit))
-        total = self.total(point.weighed, louder) * np.outer(by, by)
+        modes, louder_by = self.modes(point, louder)
+        total = modes.total(self.weight, louder_by) * np.outer(by, by)
         return self.solve(
             total, self.volume(louder), louder, point, included, ref.information, ref.pull
         )
@@ -370,8 +395,7 @@ class Trial:
             if not all(np.isfinite(values).all() for values in moved.values()):
                 base = replace(base, evidence=-np.inf)  # the fit ran away
                 break
-            size = {n: self.reference.columns.unit[self.reference.columns.of[n]] for n in included}
-            far = max(float(np.abs((moved[n] - numbers[n]) / size[n]).max()) for n in included)
+            far = self._apart(moved, numbers)
             numbers = moved
             lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
             if far < REST or (lost and np.isfinite(before)):

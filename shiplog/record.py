@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,19 @@ class Record:
         starboard = self.wind[:, 1] - self.state[:, 3]
         return np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
 
+    @cached_property
+    def sighted(self) -> Sighted:
+        """What the instruments saw."""
+        sensors, state = self.profile.sensors, self.state
+        heading, yaw_rate = state[:, 4], state[:, 5]
+        ahead, aside = sensors.position.lever_arm_m
+        position = midship.position_at_midship(state[:, [0, 2]], heading, (-ahead, -aside))
+        ahead, aside = sensors.velocity.lever_arm_m
+        velocity = midship.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
+        if sensors.kind("velocity") != "body":
+            velocity = midship.to_body(velocity, -heading)
+        return Sighted(position, velocity, heading, yaw_rate)
+
     def pick(self, voyages: Sequence[str]) -> Record:
         """The rows of these voyages, shares of the campaign as they were."""
         keep = np.isin(self.voyage, [self.names.index(v) for v in voyages])
@@ -162,19 +176,6 @@ class Sighted:
     velocity: np.ndarray
     heading: np.ndarray
     yaw_rate: np.ndarray
-
-
-def sighted(record: Record) -> Sighted:
-    sensors = record.profile.sensors
-    state = record.state
-    heading, yaw_rate = state[:, 4], state[:, 5]
-    ahead, aside = sensors.position.lever_arm_m
-    position = midship.position_at_midship(state[:, [0, 2]], heading, (-ahead, -aside))
-    ahead, aside = sensors.velocity.lever_arm_m
-    velocity = midship.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
-    if sensors.kind("velocity") != "body":
-        velocity = midship.to_body(velocity, -heading)
-    return Sighted(position, velocity, heading, yaw_rate)
 
 
 def reduced(

@@ -213,8 +213,8 @@ def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
 def _solved(linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray) -> np.ndarray:
     """[C] numbers that the campaign itself and what was known of them ask for."""
     unit, by = columns.unit, np.concatenate(([1.0], columns.unit))
-    total = evidence.total(evidence.weighed(linear, unrest.noise), unrest, np.ones(len(linear.e)))
-    total *= np.outer(by, by)
+    modes = evidence.modes(evidence.weighed(linear, unrest.noise), unrest)
+    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0] + held) * unit
 
 
@@ -310,29 +310,47 @@ def read(
     setting: Setting,
     record: Record,
     rows: np.ndarray,
-    numbers: dict[str, np.ndarray] | None = None,
+    numbers: Mapping[str, np.ndarray] | None = None,
+    nearly: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them there."""
-    given = numbers or {}
+    """Segments as read with `numbers`, and how each cause's numbers change them there.
+
+    nearly   the same changes from close by: then only those of what is given are made anew. Theirs
+             must be: a derivative from beside the place shares its noise with what is left there,
+             and that pulls
+    """
+    given = dict(numbers or {})
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
-    count = len(columns.unit)
-    moved = np.zeros((*base.driven.shape, count))
-    shown = np.zeros((*base.y.shape, count))
-    for cause in model.causes:
-        if not cause.reads:
+    if nearly is None:
+        moved = np.zeros((*base.driven.shape, len(columns.unit)))
+        shown = np.zeros((*base.y.shape, len(columns.unit)))
+    else:
+        moved, shown = (one.copy() for one in nearly)
+    before = record  # as the causes before this one have it
+    for place, cause in enumerate(model.causes):
+        if not cause.reads or (nearly is not None and cause.label not in given):
             continue
         here = given.get(cause.label, np.zeros(cause.count))
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = STEP * sizes[cause.label][i]
             more, less = (
-                segments.cut(corrected(model.causes, record, given | {cause.label: here + s}), rows)
+                corrected(model.causes[place + 1 :], cause.read(before, here + s), given)
                 for s in (step, -step)
             )
-            moved[..., column] = (more.driven - less.driven) / (2.0 * step[i])
-            shown[..., column] = (more.y - less.y) / (2.0 * step[i])
+            # of what both share nothing changes
+            if more.actuator is not less.actuator:
+                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
+                moved[..., : change.shape[-1], column] = change / (2.0 * step[i])
+            if more.wind is not less.wind or more.state is not less.state:
+                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
+                moved[..., -2:, column] = change / (2.0 * step[i])
+            if more.state is not less.state:
+                change = segments.measured(more, rows)[0] - segments.measured(less, rows)[0]
+                shown[..., column] = change / (2.0 * step[i])
+        before = corrected((cause,), before, given)
     return base, moved, shown
 
 

@@ -92,27 +92,44 @@ def begins(record: Record) -> np.ndarray:
 
 def cut(record: Record, rows: np.ndarray) -> Cut:
     """The segments that begin at these rows of a record (as recorded, or put right)."""
+    y, used = measured(record, rows)
+    return Cut(rows, y, used, driving(record, rows), record.voyage[rows], record.step * NODE_ROWS)
+
+
+def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """State [S, B, 6], averaged over bins, and whether it was seen there."""
     g = grid(record)
-    share = record.share[:, None]
-    driven = np.concatenate((record.actuator, share, record.true_wind), 1)
-    driven = _smooth(record, driven)
-    nodes = rows[:, None] + NODE_ROWS * np.arange(g.nodes)
     per = round(BIN / record.step)
+    inside = rows[:, None] + np.arange(g.rows + 1)
+    mean = _means(g.bins, per)
+    y = np.einsum("br,src->sbc", mean, record.state[inside], optimize=True)
+    seen = record.seen[inside].astype(float) @ (mean > 0.0).T / (per + 1) > 0.5
+    return y, np.repeat(seen[..., None], 6, axis=-1)
+
+
+def _means(bins: int, per: int) -> np.ndarray:
+    """[B, R] by the trapezium over each bin of so many rows."""
     weight = np.ones(per + 1)
     weight[[0, -1]] = 0.5
-    every = rows[:, None, None] + per * np.arange(g.bins)[:, None] + np.arange(per + 1)
-    y = np.einsum("sbrc,r->sbc", record.state[every], weight / weight.sum())
-    seen = record.seen[every].mean(-1) > 0.5
-    used = np.repeat(seen[..., None], 6, axis=-1)
-    return Cut(rows, y, used, driven[nodes], record.voyage[rows], record.step * NODE_ROWS)
+    found = np.zeros((bins, bins * per + 1))
+    for i in range(bins):
+        found[i, i * per : (i + 1) * per + 1] = weight / weight.sum()
+    return found
 
 
-def _smooth(record: Record, values: np.ndarray) -> np.ndarray:
-    """¼ ½ ¼: what lies between two nodes counts too."""
-    at = np.arange(len(values))
-    before = np.maximum(at - 1, record.firsts)
-    after = np.minimum(at + 1, record.lasts)
-    return 0.25 * values[before] + 0.5 * values + 0.25 * values[after]
+def driving(record: Record, rows: np.ndarray) -> np.ndarray:
+    """Actuators, share of the campaign and true wind at the steps' nodes [S, K, A + 3]."""
+    driven = np.concatenate((record.actuator, record.share[:, None], record.true_wind), 1)
+    return at_nodes(record, rows, driven)
+
+
+def at_nodes(record: Record, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of a record's rows [n, c] those at the steps' nodes [S, K, c], each with a quarter of either
+    neighbour: what lies between two nodes counts too."""
+    at = rows[:, None] + NODE_ROWS * np.arange(grid(record).nodes)
+    before = np.maximum(at - 1, record.firsts[at])
+    after = np.minimum(at + 1, record.lasts[at])
+    return 0.25 * values[before] + 0.5 * values[at] + 0.25 * values[after]
 
 
 # --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------

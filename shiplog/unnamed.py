@@ -54,10 +54,10 @@ class Structures:
     def __init__(self, trial: Trial, point: Point) -> None:
         self.trial = trial
         ref = trial.reference
-        here, usual, weighed = structure.at_knots(point.linear.cut, trial.grid), None, None
+        here, usual, modes = structure.at_knots(point.linear.cut, trial.grid), None, None
         if ref.nominal is not None:
             usual = structure.at_knots(ref.nominal.cut, trial.grid)
-            weighed = evidence.weighed(ref.nominal, ref.unrest.noise)
+            modes = evidence.modes(evidence.weighed(ref.nominal, ref.unrest.noise), ref.unrest)
         both = [k for k in (usual, here) if k]
         learned = ref.adapts and not isinstance(ref.model.base, MMG)
         bases: list[tuple[str, Basis | Products | None]] = [
@@ -71,27 +71,22 @@ class Structures:
             if basis is None:
                 continue
             before = None
-            if usual is not None and weighed is not None and name != "time":
+            if usual is not None and modes is not None and name != "time":
                 pushed = structure.pushed(basis.features(usual), ref.unrest.push)
-                every = np.ones(len(pushed))
-                before = evidence.total(weighed.beside(pushed), ref.unrest, every)
+                before = modes.beside(pushed).total(np.ones(len(pushed)))
             self.families.append(Family(name, basis, before))
 
     def found(self, point: Point, base: Found, included: Sequence[str]) -> list[Found]:
         """Each family's evidence above the base hypothesis, less what is usual of it."""
         found: dict[str, Found] = {}
         for family in self.families:
-            _, weighed = self._beside(family, point)
-            best = max(
-                (
-                    one
-                    for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}
-                    for one in _structure(
-                        self.trial, family.name, weighed, family.before, point, included, louder
-                    )
-                ),
-                key=lambda f: f.evidence,
-            )
+            tried = []
+            for louder in {base.louder, 1.0 if base.louder > LOUD else base.louder}:
+                _, total = self._beside(family, point, louder)
+                tried += _structure(
+                    self.trial, family.name, total, family.before, point, included, louder
+                )
+            best = max(tried, key=lambda f: f.evidence)
             best = replace(best, evidence=best.evidence - base.evidence)
             if family.name not in found or best.evidence > found[family.name].evidence:
                 found[family.name] = best
@@ -100,28 +95,29 @@ class Structures:
     def acts_on(self, point: Point, found: Found) -> tuple[str, ...]:
         """Channels in which a structure pushes by more than a third of where it pushes most."""
         family = next(f for f in self.families if f.name == found.name)
-        features, weighed = self._beside(family, point)
-        total = self.trial.total(weighed, 1.0)[-features.shape[-1] :]
+        features, total = self._beside(family, point, 1.0)
+        total = total[-features.shape[-1] :]
         own = total[:, -len(total) :]
         weights = np.linalg.solve(own + np.eye(len(own)) / structure.SIZES[1] ** 2, total[:, 0])
         pushed = (features @ weights).std((0, 1))
         names = np.array(["surge", "sway", "yaw_rate"])
         return tuple(str(n) for n in names[pushed > pushed.max() / 3.0])
 
-    def _beside(self, family: Family, point: Point) -> tuple[np.ndarray, evidence.Weighed]:
-        """The family's features at the point, and its products with them."""
-        features = family.basis.features(structure.at_knots(point.linear.cut, self.trial.grid))
-        pushed = structure.pushed(features, self.trial.reference.unrest.push)
-        return features, point.weighed.beside(pushed)
+    def _beside(self, family: Family, point: Point, louder: float) -> tuple[np.ndarray, np.ndarray]:
+        """The family's features at the point, and the trial's products with them."""
+        trial = self.trial
+        features = family.basis.features(structure.at_knots(point.linear.cut, trial.grid))
+        pushed = structure.pushed(features, trial.reference.unrest.push)
+        modes, louder = trial.modes(point, louder)
+        return features, modes.beside(pushed).total(trial.weight, louder)
 
 
-def _structure(trial: Trial, family, weighed, before, point, included, louder) -> Iterator[Found]:
+def _structure(trial: Trial, family, whole, before, point, included, louder) -> Iterator[Found]:
     """At one λ, in each size."""
     ref = trial.reference
     unit = ref.columns.unit
-    count, more = len(unit), weighed.dd.shape[-1] - 1 - len(unit)
+    count, more = len(unit), len(whole) - 1 - len(unit)
     volume = trial.volume(louder)
-    whole = trial.total(weighed, louder)
     for size in structure.SIZES:
         by = np.concatenate(([1.0], unit, np.full(more, size)))
         total = whole * np.outer(by, by)

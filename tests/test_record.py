@@ -173,7 +173,7 @@ def test_no_time_later_is_the_same():
 def test_sights_are_reduced_as_ingest_does(profile):
     """`reduced` undoes `sighted`, and both are the formulas of `midship`."""
     seen = closed.record(profile)
-    sight = record.sighted(seen)
+    sight = seen.sighted
     again = record.reduced(seen, sight)
     assert again.state == pytest.approx(seen.state, abs=1e-12)
     arm = profile.sensors.position.lever_arm_m
@@ -191,16 +191,16 @@ def test_sights_are_reduced_as_ingest_does(profile):
 def test_an_antenna_that_is_sighted_moves_as_its_velocity_says():
     """Over ground, the sighted velocity is the derivative of the sighted position."""
     seen = closed.record(PROFILE)
-    sight = record.sighted(seen)
+    sight = seen.sighted
     moved = (sight.position[2:] - sight.position[:-2]) / 0.2
     assert moved == pytest.approx(sight.velocity[1:-1], abs=2e-5)  # h²/6 of the third derivative
-    still = record.sighted(replace(seen, state=seen.state * [1, 1, 1, 1, 1, 0]))
+    still = replace(seen, state=seen.state * [1, 1, 1, 1, 1, 0]).sighted
     assert np.abs(moved - still.velocity[1:-1]).max() > 0.01  # the swing of the arm counts
 
 
 def test_an_antenna_elsewhere_takes_its_velocity_along():
     seen = closed.record(PROFILE)
-    sight = record.sighted(seen)
+    sight = seen.sighted
     found = record.reduced(seen, sight, (0.4, -0.1))
     c, s, r = np.cos(seen.state[:, 4]), np.sin(seen.state[:, 4]), seen.state[:, 5]
     back = found.state - seen.state

@@ -224,7 +224,7 @@ def white_total(
     """[1 + C, 1 + C] products of [e | J] in units, the starts eliminated, no knots."""
     by = np.concatenate(([1.0], unit))
     weighed = evidence.weighed(_white(linear), noise)
-    total = evidence.total(weighed, _quiet(noise, start), np.ones(len(linear.e)))
+    total = evidence.modes(weighed, _quiet(noise, start)).total(np.ones(len(linear.e)))
     return total * np.outer(by, by)
 
 

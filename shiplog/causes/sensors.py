@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.causes.base import Cause, Parameter, Setting, Shown
-from shiplog.record import Record, reduced, sighted
+from shiplog.record import Record, reduced
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class HeadingOffset(Cause):
     }
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = sighted(record)
+        seen = record.sighted
         return reduced(record, replace(seen, heading=seen.heading - p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
@@ -41,7 +41,7 @@ class YawRateBias(Cause):
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = sighted(record)
+        seen = record.sighted
         return reduced(record, replace(seen, yaw_rate=seen.yaw_rate - p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
@@ -58,7 +58,7 @@ class YawRateScale(Cause):
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = sighted(record)
+        seen = record.sighted
         return reduced(record, replace(seen, yaw_rate=seen.yaw_rate / (1.0 + p[0])))
 
     def inverse(self, p: np.ndarray) -> np.ndarray:
@@ -113,7 +113,7 @@ class ClockOffset(Cause):
         late = float(p[0])
         if self.channel == "wind":
             return replace(record, wind=record.later(record.wind, late))
-        seen = sighted(record)
+        seen = record.sighted
         if self.channel in ("position", "gnss"):
             seen = replace(seen, position=record.later(seen.position, late))
         if self.channel in ("velocity", "gnss"):
@@ -148,7 +148,7 @@ class AntennaOffset(Cause):
     separated_by = {"clock_offset": "spin on the spot against straight acceleration"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return reduced(record, sighted(record), (float(p[0]), float(p[1])))
+        return reduced(record, record.sighted, (float(p[0]), float(p[1])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         x, y = shown["x"].value, shown["y"].value

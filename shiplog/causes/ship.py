@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, ClassVar
 
+import numba
 import numpy as np
-from scipy.signal import lfilter
 
 from shiplog.causes.base import Cause, Parameter, Setting, Shown
 from shiplog.profile import Profile
@@ -291,16 +290,20 @@ def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
     # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact
     b1 = 1.0 - time / record.step * (1.0 - decay)
     b0 = 1.0 - decay - b1
-    out = np.empty_like(values)
-    at = np.append(np.flatnonzero(starts), len(values))
-    for a, b in pairwise(at):
-        x = values[a:b]
-        if len(x) == 0:
-            continue
-        # begins in balance with its first row
-        state = (x[:1] - b1 * x[:1]).copy()
-        out[a:b] = lfilter([b1, b0], [1.0, -decay], x, axis=0, zi=state)[0]
-    return out
+    return _filtered(values, starts, decay, b0, b1)
+
+
+@numba.njit(cache=True)
+def _filtered(x, starts, decay, b0, b1):
+    """y₁ = decay y₀ + b₀ x₀ + b₁ x₁; a stretch begins in balance with its first row."""
+    y = np.empty_like(x)
+    for i in range(len(x)):
+        for k in range(x.shape[1]):
+            if i == 0 or starts[i]:
+                y[i, k] = x[i, k]
+            else:
+                y[i, k] = decay * y[i - 1, k] + b0 * x[i - 1, k] + b1 * x[i, k]
+    return y
 
 
 @dataclass(frozen=True)
