@@ -81,6 +81,19 @@ class Record:
         part = (rows - low).reshape(-1, *[1] * (values.ndim - 1))
         return values[low] * (1.0 - part) + values[high] * part
 
+    def smoothed(self, seconds: float) -> Record:
+        """The state averaged twice over so many seconds about each row, over fewer at the ends of a
+        stretch."""
+        at = np.arange(len(self))
+        half = np.minimum(round(0.5 * seconds / self.step), at - self.firsts)
+        half = np.minimum(half, self.lasts - at)
+        count = (2 * half + 1)[:, None]
+        state = self.state
+        for _ in range(2):
+            upto = np.cumsum(np.pad(state, ((1, 0), (0, 0))), axis=0)
+            state = (upto[at + half + 1] - upto[at - half]) / count
+        return replace(self, state=state)
+
     @property
     def true_wind(self) -> np.ndarray:
         """[n, 2] where the wind over ground comes from, along x₀ and y₀ [m/s]."""

@@ -26,6 +26,7 @@ ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 0.35  # plausible spreads that need no further round
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
+SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # voyages are more alike than campaigns: not less
 CAREFUL_KAPPA = 11.0  # of too few voyages, and of her own instruments: their noise is coloured
@@ -311,26 +312,17 @@ def read(
     record: Record,
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
-    nearly: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them there.
-
-    nearly   the same changes from close by: then only those of what is given are made anew. Theirs
-             must be: a derivative from beside the place shares its noise with what is left there,
-             and that pulls
-    """
+    """Segments as read with `numbers`, and how each cause's numbers change them there."""
     given = dict(numbers or {})
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
-    if nearly is None:
-        moved = np.zeros((*base.driven.shape, len(columns.unit)))
-        shown = np.zeros((*base.y.shape, len(columns.unit)))
-    else:
-        moved, shown = (one.copy() for one in nearly)
-    before = record  # as the causes before this one have it
+    moved = np.zeros((*base.driven.shape, len(columns.unit)))
+    shown = np.zeros((*base.y.shape, len(columns.unit)))
+    before = record.smoothed(SMOOTH)  # as the causes before this one have it
     for place, cause in enumerate(model.causes):
-        if not cause.reads or (nearly is not None and cause.label not in given):
+        if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
         for i, column in enumerate(columns.of[cause.label]):

@@ -166,6 +166,21 @@ def test_no_time_later_is_the_same():
     assert found.later(values, 0.0) is values
 
 
+def test_a_smoothed_ramp_stays_and_a_wave_is_less_by_its_mean():
+    """A ramp to the very ends of its stretch; of a wave of f hertz a mean over T leaves
+    sin(πfT)/πfT (of n samples sin(πfnh)/(n sin πfh)), and two of them its square."""
+    found, ramp, _ = ramps()
+    given = replace(found, state=np.repeat(ramp[:, None], 6, 1))
+    assert given.smoothed(2.0).state == pytest.approx(given.state, abs=1e-9)
+    t = 0.1 * np.arange(len(found))
+    wave = replace(found, state=np.repeat(np.cos(2.0 * np.pi * 0.3 * t)[:, None], 6, 1))
+    left = wave.smoothed(2.0).state[:, 0]
+    wanted = (np.sin(np.pi * 0.3 * 2.1) / (21.0 * np.sin(np.pi * 0.3 * 0.1))) ** 2
+    inside = slice(21, 39)  # two half widths from either end of the first stretch
+    assert left[inside] == pytest.approx(wanted * wave.state[inside, 0], abs=1e-9)
+    assert wanted < 0.25
+
+
 # --- sights ---------------------------------------------------------------------------------------
 
 
