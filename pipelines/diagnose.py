@@ -11,9 +11,10 @@ from pipelines.diagnosis import answer, pictures, trial, where
 from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
+from shiplog import decision as decisions
 from shiplog import diagnose, runs, segments
 from shiplog import verdict as verdicts
-from shiplog.diagnose import Decision
+from shiplog.decision import Decision
 from shiplog.exceptions import RunError, listed
 from shiplog.gain import Gain
 from shiplog.hypotheses import Point, Trial
@@ -141,7 +142,7 @@ def _decided(
     lost = held.lost(found)
     if lost:
         dropped |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
-        decision, found = diagnose.untold(decision), None
+        decision, found = decisions.untold(decision), None
     return decision, found, dropped, lost
 
 

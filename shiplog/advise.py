@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog import evidence, segments
-from shiplog.diagnose import Named
+from shiplog.decision import Named
 from shiplog.hypotheses import Trial
 from shiplog.record import Record
 from shiplog.reference import read

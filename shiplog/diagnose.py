@@ -8,18 +8,18 @@ beats them all, is large enough to matter, and did not come out of a fit that fa
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from shiplog import unnamed
-from shiplog.causes import Cause, Shown
-from shiplog.hypotheses import Found, Point, Told, Trial
+from shiplog.causes import Cause
+from shiplog.decision import LEAST, PULSES, Decision, Named, Structure
+from shiplog.hypotheses import Found, Point, Trial
 from shiplog.unnamed import Pulses
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
-LEAST = 8.0  # nats that the first cause must bring
 MORE = 25.0  # that one must whose gain is not sure
 FURTHER = 60.0  # that each further one must: small evidence follows large ones about
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
@@ -34,88 +34,6 @@ ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 SETTLED = 3  # contenders that are linearised again
 SHARE = 0.3  # of the best one's evidence that makes a contender
-CHANGED = 2.0 / 3.0  # before any data: whoever asks has a reason to
-SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as likely
-PULSES = "side_thrust"
-
-
-@dataclass(frozen=True)
-class Named:
-    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual."""
-
-    cause: Cause
-    evidence: float
-    probability: float
-    numbers: np.ndarray
-    covariance: np.ndarray
-    alike: tuple[str, ...] = ()
-
-    @property
-    def shown(self) -> dict[str, Shown]:
-        return self.cause.told(self.numbers, self.covariance)
-
-
-@dataclass(frozen=True)
-class Structure:
-    """What is left and has no name."""
-
-    family: str
-    evidence: float
-    acts_on: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What the trial says, before anything was held out.
-
-    verdict    named, none or unknown
-    named      in the order they were found
-    pulses     the unrecorded thruster, where it is one of the causes
-    rejected   label → why not
-    traces     there, but too small to matter
-    ranking    label or family → probability, of the first step
-    louder     λ that is left
-    point, base      the trial linearised with what is named, and that hypothesis
-    first, nothing   the same with nothing named
-    remains    families of structure, with what they would still explain
-    told       label → what these data would tell of each cause, were it there
-    apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
-    adapted    whether the model's own coefficients are fitted again beside what is named
-    """
-
-    verdict: str
-    named: tuple[Named, ...]
-    structure: Structure | None
-    pulses: Pulses | None
-    traces: tuple[Named, ...]
-    rejected: Mapping[str, str]
-    ranking: Mapping[str, float]
-    louder: float
-    point: Point
-    base: Found
-    first: Point
-    nothing: Found
-    remains: tuple[Found, ...] = field(default=())
-    told: Mapping[str, Told] = field(default_factory=dict)
-    apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-    adapted: bool = False
-
-    @property
-    def hidden(self) -> dict[str, float]:
-        """Label → share of its plausible sizes at which these data would not show it."""
-        low, high = (math.log(size) for size in SIZES)
-        return {
-            label: min(max((math.log(told.together(LEAST)) - low) / (high - low), 0.0), 1.0)
-            for label, told in self.told.items()
-        }
-
-    @property
-    def nothing_there(self) -> float:
-        """Probability that nothing changed where nothing was found: of what may have, some is too
-        small for these data."""
-        hidden = list(self.hidden.values())
-        missed = CHANGED * (sum(hidden) / len(hidden)) if hidden else CHANGED
-        return (1.0 - CHANGED) / (1.0 - CHANGED + missed)
 
 
 def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision:
@@ -358,46 +276,6 @@ class _Search:
 def _last(found: Found) -> str:
     """The label that joined last."""
     return found.name.split("+")[-1]
-
-
-def without(trial: Trial, decision: Decision, one: Named) -> Decision:
-    """The same verdict with one cause less, the others fitted again."""
-    named = tuple(n for n in decision.named if n is not one)
-    labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
-    if labels:
-        numbers = {n: decision.base.numbers[n] for n in labels}
-        point, base = trial.settle(labels, numbers, decision.point.path)
-    else:
-        point, base = decision.first, decision.nothing
-    again, at = [], 0
-    by = {n.cause.label: n for n in named}
-    for label in labels:
-        count = len(base.numbers[label])
-        part = slice(at, at + count)
-        at += count
-        if label in by:
-            assert base.covariance is not None
-            again.append(
-                replace(
-                    by[label],
-                    numbers=np.asarray(base.numbers[label]),
-                    covariance=base.covariance[part, part],
-                )
-            )
-    verdict = "named" if again or decision.pulses else "none"
-    return replace(
-        decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
-    )
-
-
-def untold(decision: Decision) -> Decision:
-    """Of a model that simulates nothing: what is left, without a name."""
-    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
-    found = ("motion", 0.0) if strongest is None else (strongest.name, strongest.evidence)
-    return replace(
-        decision, verdict="unknown", named=(), pulses=None, traces=(),
-        structure=Structure(*found, ()),
-    )  # fmt: skip
 
 
 def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from shiplog.advise import Advice
 from shiplog.causes import Cause, Setting, si
 from shiplog.channels import VELOCITY
-from shiplog.diagnose import LEAST, PULSES, UNKNOWN, Decision, Named
+from shiplog.decision import LEAST, PULSES, Decision, Named
+from shiplog.diagnose import UNKNOWN
 from shiplog.exceptions import listed
 from shiplog.findings import CONTRACT
 from shiplog.gain import Gain
@@ -232,7 +233,7 @@ def sentence(
 ) -> str:
     """The verdict in a sentence."""
     if verdict == "named":
-        said = " ".join(cause["sentence"] for cause in causes)
+        said = " ".join(_or(cause) for cause in causes)
         if gain is None:
             return said
         if not gain.real:
@@ -291,6 +292,20 @@ def remains(decision: Decision, verdict: str) -> list[str]:
     ]
 
 
+def _or(cause: dict) -> str:
+    """A cause's sentence, and what it may be instead."""
+    others = cause["indistinguishable_from"]
+    if not others:
+        return cause["sentence"]
+    return (
+        f"{cause['sentence'].removesuffix('.')}; or it is {listed(others)}: these data cannot tell."
+    )
+
+
+def _less(share: float) -> str:
+    return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"
+
+
 def markdown(verdict: Verdict) -> str:
     """One page."""
     lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
@@ -324,11 +339,12 @@ def markdown(verdict: Verdict) -> str:
         g = verdict.gain
         lines += [
             "## Gain on held-out windows", "",
-            f"L {g.before:.0f} before, {g.after:.0f} after: {g.reduction:.1%} less "
-            f"({g.low:.1%} to {g.high:.1%}, {g.windows} windows, each predicted with numbers "
+            f"L {g.before:.0f} before, {g.after:.0f} after: {_less(g.reduction)} "
+            f"({_less(g.low)} to {_less(g.high)}, {g.windows} windows, each predicted with numbers "
             "fitted without its voyage).", "",
-            "By channel: "
-            + ", ".join(f"{c.replace('_', ' ')} {v:.0%}" for c, v in g.channels.items()) + ".", "",
+            "By channel: " + ", ".join(
+                f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items()
+            ) + ".", "",
         ]  # fmt: skip
     if verdict.ranking:
         lines += ["## Ranking", "", "| hypothesis | probability |", "| --- | ---: |"]

@@ -24,6 +24,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"unexplained", "reference", "structure", "conventions"},
     {"unseen", "external", "hypotheses", "remembered", "direct"},
     {"unnamed"},
+    {"decision"},
     {"diagnose"},
     {"advise"},
     {"runs", "report", "viewer", "verdict"},

@@ -10,7 +10,7 @@ from pipelines.diagnosis import where
 from pipelines.diagnosis.held_out import HeldOut
 from shiplog import advise, diagnose, segments
 from shiplog import verdict as verdicts
-from shiplog.diagnose import Decision
+from shiplog.decision import Decision
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain
 from shiplog.hypotheses import Trial

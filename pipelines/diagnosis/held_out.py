@@ -10,8 +10,9 @@ import numpy as np
 import torch
 
 from shiplog import conventions, diagnose, direct
+from shiplog import decision as decisions
 from shiplog.causes import constants_of
-from shiplog.diagnose import Decision, Named
+from shiplog.decision import Decision, Named
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain, gain, parts
 from shiplog.hypotheses import Trial
@@ -104,8 +105,10 @@ class HeldOut(Rollouts):
 
         A cause of the error makes it less, and surely so where little evidence speaks for it: what
         is outside the catalogue looks a little like something in it. An instrument's fault is a
-        fault though it is worth nothing, but not where it makes the error more. A model that has
-        learned of it, and gains by being fitted again beside it, is so without each cause, too.
+        fault though it is worth nothing, but not where it makes the error more; so is what differs
+        from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
+        steps of a second hide a lag of a third of one. A model that has learned of it, and gains
+        by being fitted again beside it, is so without each cause, too.
         """
         dropped: dict[str, str] = {}
         if not decision.named:
@@ -124,11 +127,13 @@ class HeldOut(Rollouts):
                 break
             tried = []
             for one in asked:
-                rest = diagnose.without(self.trial, decision, one)
+                rest = decisions.without(self.trial, decision, one)
                 tried.append((self.gain(rest), rest, one))
             best, rest, one = min(tried, key=lambda t: t[0].after)
             gains = best.after * (1.0 if alone else 1.0 - WORTH) >= found.after
             if gains and not (alone and one.evidence < diagnose.MORE):
+                break
+            if alone and not harm and self._beyond_doubt(one) and found.high > 0.0:
                 break
             share = 1.0 - found.after / best.after
             why = f"{share:+.1%}"
@@ -137,6 +142,9 @@ class HeldOut(Rollouts):
             dropped[one.cause.label] = f"no gain on held-out voyages ({why})"
             decision, found = rest, best
         return decision, found if decision.named else None, dropped
+
+    def _beyond_doubt(self, one: Named) -> bool:
+        return self.trial.reference.nominal is not None and one.evidence > diagnose.FURTHER
 
     def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
         """Beside a model that nobody fitted: instruments by evidence, and of the causes of the

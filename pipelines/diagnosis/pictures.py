@@ -13,7 +13,7 @@ from pipelines.diagnosis.answer import Diagnosis
 from shiplog import unexplained, unnamed, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
-from shiplog.diagnose import PULSES, Decision
+from shiplog.decision import PULSES, Decision
 from shiplog.exceptions import listed
 from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.hypotheses import Trial

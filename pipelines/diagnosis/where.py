@@ -12,7 +12,7 @@ from pipelines.prepare import seconds
 from shiplog import coverage as covering
 from shiplog import external, segments, table, unexplained, unnamed, unseen, wrong
 from shiplog import verdict as verdicts
-from shiplog.diagnose import Decision
+from shiplog.decision import Decision
 from shiplog.extend import campaign
 from shiplog.hypotheses import Point, Trial
 from shiplog.profile import Profile

@@ -282,9 +282,7 @@ def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
     rate = np.gradient(values, record.step, axis=0)
     starts = record.starts
     rate[starts] = 0.0
-    if abs(time) < 0.5 * record.step:
-        return values - time * rate
-    if time < 0.0:
+    if time <= 0.0:
         return values - time * rate
     decay = np.exp(-record.step / time)
     # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact

@@ -1,0 +1,137 @@
+"""What a trial was found to say: the causes that are named, or a structure, or nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shiplog.causes import Cause, Shown
+from shiplog.hypotheses import Found, Point, Told, Trial
+from shiplog.unnamed import Pulses
+
+PULSES = "side_thrust"
+LEAST = 8.0  # nats that the first cause must bring
+CHANGED = 2.0 / 3.0  # before any data: whoever asks has a reason to
+SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as likely
+
+
+@dataclass(frozen=True)
+class Named:
+    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual."""
+
+    cause: Cause
+    evidence: float
+    probability: float
+    numbers: np.ndarray
+    covariance: np.ndarray
+    alike: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> dict[str, Shown]:
+        return self.cause.told(self.numbers, self.covariance)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is left and has no name."""
+
+    family: str
+    evidence: float
+    acts_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the trial says, before anything was held out.
+
+    verdict    named, none or unknown
+    named      in the order they were found
+    pulses     the unrecorded thruster, where it is one of the causes
+    rejected   label → why not
+    traces     there, but too small to matter
+    ranking    label or family → probability, of the first step
+    louder     λ that is left
+    point, base      the trial linearised with what is named, and that hypothesis
+    first, nothing   the same with nothing named
+    remains    families of structure, with what they would still explain
+    told       label → what these data would tell of each cause, were it there
+    apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
+    adapted    whether the model's own coefficients are fitted again beside what is named
+    """
+
+    verdict: str
+    named: tuple[Named, ...]
+    structure: Structure | None
+    pulses: Pulses | None
+    traces: tuple[Named, ...]
+    rejected: Mapping[str, str]
+    ranking: Mapping[str, float]
+    louder: float
+    point: Point
+    base: Found
+    first: Point
+    nothing: Found
+    remains: tuple[Found, ...] = field(default=())
+    told: Mapping[str, Told] = field(default_factory=dict)
+    apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    adapted: bool = False
+
+    @property
+    def hidden(self) -> dict[str, float]:
+        """Label → share of its plausible sizes at which these data would not show it."""
+        low, high = (math.log(size) for size in SIZES)
+        return {
+            label: min(max((math.log(told.together(LEAST)) - low) / (high - low), 0.0), 1.0)
+            for label, told in self.told.items()
+        }
+
+    @property
+    def nothing_there(self) -> float:
+        """Probability that nothing changed where nothing was found: of what may have, some is too
+        small for these data."""
+        hidden = list(self.hidden.values())
+        missed = CHANGED * (sum(hidden) / len(hidden)) if hidden else CHANGED
+        return (1.0 - CHANGED) / (1.0 - CHANGED + missed)
+
+
+def without(trial: Trial, decision: Decision, one: Named) -> Decision:
+    """The same verdict with one cause less, the others fitted again."""
+    named = tuple(n for n in decision.named if n is not one)
+    labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
+    if labels:
+        numbers = {n: decision.base.numbers[n] for n in labels}
+        point, base = trial.settle(labels, numbers, decision.point.path)
+    else:
+        point, base = decision.first, decision.nothing
+    again, at = [], 0
+    by = {n.cause.label: n for n in named}
+    for label in labels:
+        count = len(base.numbers[label])
+        part = slice(at, at + count)
+        at += count
+        if label in by:
+            assert base.covariance is not None
+            again.append(
+                replace(
+                    by[label],
+                    numbers=np.asarray(base.numbers[label]),
+                    covariance=base.covariance[part, part],
+                )
+            )
+    verdict = "named" if again or decision.pulses else "none"
+    return replace(
+        decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
+    )
+
+
+def untold(decision: Decision) -> Decision:
+    """Of a model that simulates nothing: what is left, without a name."""
+    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
+    found = ("motion", 0.0) if strongest is None else (strongest.name, strongest.evidence)
+    return replace(
+        decision, verdict="unknown", named=(), pulses=None, traces=(),
+        structure=Structure(*found, ()),
+    )  # fmt: skip
