@@ -20,7 +20,11 @@ SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as li
 
 @dataclass(frozen=True)
 class Named:
-    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual."""
+    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual.
+
+    alike    those that it explains hardly more than
+    beaten   label → nats by which it explains more than that one instead of it
+    """
 
     cause: Cause
     evidence: float
@@ -28,6 +32,7 @@ class Named:
     numbers: np.ndarray
     covariance: np.ndarray
     alike: tuple[str, ...] = ()
+    beaten: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def shown(self) -> dict[str, Shown]:

@@ -78,7 +78,7 @@ class _Search:
         self.told = {f.name: f.told for f in self.found if f.told is not None}
         self.rejected: dict[str, str] = {}
         self.ranking: dict[str, float] = {}
-        self.steps: dict[str, tuple[float, tuple[str, ...]]] = {}  # evidence, and what is alike
+        self.steps: dict[str, tuple[float, dict[str, float]]] = {}  # evidence, and over others
         self.pulses: Pulses | None = None
         self.structures = unnamed.Structures(trial, point)
         self.structure: Structure | None = None
@@ -203,7 +203,7 @@ class _Search:
         self.point, self.base = settled[0]
         label = _last(self.base)
         less = {_last(one): self.base.evidence - one.evidence for _, one in settled[1:]}
-        self.steps[label] = (gain, tuple(other for other, nats in less.items() if nats < ALIKE))
+        self.steps[label] = (gain, less)
         for other, nats in less.items():
             self.rejected.setdefault(other, f"{label} explains {nats:.0f} nats more")
         self.included = tuple(self.base.numbers)
@@ -262,12 +262,14 @@ class _Search:
             if label in self.trial.fixed:
                 continue
             assert self.base.covariance is not None
-            gain, alike = self.steps[label]
+            gain, less = self.steps[label]
             sure = odds(gain, FURTHER)
+            alike = tuple(other for other, nats in less.items() if nats < ALIKE)
             found.append(
                 Named(
                     cause, gain, sure if found else self.ranking.get(label, sure),
                     np.asarray(self.base.numbers[label]), self.base.covariance[part, part], alike,
+                    less,
                 )
             )  # fmt: skip
         return tuple(found)

@@ -237,7 +237,10 @@ def sentence(
         if gain is None:
             return said
         if not gain.real:
-            return f"{said} On held-out windows that gains nothing."
+            return (
+                f"{said} On {gain.windows} held-out windows no gain is sure: the error is "
+                f"{_less(gain.reduction)} ({_less(gain.low)} to {_less(gain.high)})."
+            )
         return (
             f"{said} With it in the model, the error on {gain.windows} held-out windows falls by "
             f"{gain.reduction:.0%} ({gain.low:.0%} to {gain.high:.0%})."

@@ -23,6 +23,7 @@ WORTH = 0.02  # of the error, that each of several causes must take off held-out
 LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
 TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
 HARM = 1.2  # times the error, from which on even an instrument's fault is refuted
+BESIDE = 2.0  # times the evidence that is beyond doubt, of a cause beside others
 VOYAGES = 3  # fewer cannot choose causes by voyages left out
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
@@ -128,23 +129,35 @@ class HeldOut(Rollouts):
             tried = []
             for one in asked:
                 rest = decisions.without(self.trial, decision, one)
-                tried.append((self.gain(rest), rest, one))
-            best, rest, one = min(tried, key=lambda t: t[0].after)
-            gains = best.after * (1.0 if alone else 1.0 - WORTH) >= found.after
+                tried.append((self.worth(rest, decision), rest, one))
+            worth, rest, one = min(tried, key=lambda t: t[0].before)
+            gains = worth.reduction >= (0.0 if alone else WORTH)
             if gains and not (alone and one.evidence < diagnose.MORE):
                 break
-            if alone and not harm and self._beyond_doubt(one) and found.high > 0.0:
+            if not harm and worth.high > (0.0 if alone else WORTH) and self._sure(one, alone):
                 break
-            share = 1.0 - found.after / best.after
-            why = f"{share:+.1%}"
+            why = f"{worth.reduction:+.1%}"
             if gains:
-                why = f"{why}, {found.low:+.1%} to {found.high:+.1%}: none that is sure"
+                why = f"{why}, {worth.low:+.1%} to {worth.high:+.1%}: none that is sure"
             dropped[one.cause.label] = f"no gain on held-out voyages ({why})"
-            decision, found = rest, best
+            dropped |= {
+                other: f"{one.cause.label} explains {nats:.0f} nats more, and gains nothing"
+                for other, nats in one.beaten.items() if nats > diagnose.MORE
+            }  # fmt: skip
+            decision, found = rest, self.gain(rest)
         return decision, found if decision.named else None, dropped
 
-    def _beyond_doubt(self, one: Named) -> bool:
-        return self.trial.reference.nominal is not None and one.evidence > diagnose.FURTHER
+    def worth(self, rest: Decision, decision: Decision) -> Gain:
+        """What a decision takes off beside one with a cause less."""
+        return gain(
+            self.parts(self.states_after(rest)), self.parts(self.states_after(decision)),
+            self.voyages,
+        )  # fmt: skip
+
+    def _sure(self, one: Named, alone: bool) -> bool:
+        """Whether it differs from her nominal campaign beyond doubt."""
+        wanted = diagnose.FURTHER * (1.0 if alone else BESIDE)
+        return self.trial.reference.nominal is not None and one.evidence > wanted
 
     def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
         """Beside a model that nobody fitted: instruments by evidence, and of the causes of the
