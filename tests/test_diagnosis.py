@@ -606,10 +606,11 @@ def test_of_what_is_too_small_to_be_seen_the_size_is_told(sea, still):
 
 
 def test_nothing_is_said_with_what_may_be_too_small(sea, still):
-    """Each cause's sizes that would not show, a decade of them as likely as another."""
+    """Each cause's sizes that would not show, a decade of them as likely as another: here half of
+    one, up to 0.1^0.5."""
     _, decision = still
     assert {"bank", "current", "payload"} <= set(decision.hidden)
-    one = replace(decision, told={"bank": Told(np.array([2.0 * 8.0 / 0.1]), 0.0)})  # 0.1^0.5
+    one = replace(decision, told={"bank": Told(np.array([2.0 * diagnose.LEAST / 0.1]), 0.0)})
     assert one.hidden == pytest.approx({"bank": 0.5})
     assert one.nothing_there == pytest.approx((1 / 3) / (1 / 3 + 2 / 3 * 0.5))
     ranked = {r["name"]: r["probability"] for r in ranking_json(one, "none", ())}
