@@ -348,8 +348,9 @@ def test_a_second_cause_that_is_refuted_takes_along_what_it_beat(sea, evidence, 
     first = sea.done.decision.named[0]
     cause = next(c for c in sea.usual.model.causes if c.label == "thrust_loss")
     second = replace(
-        first, cause=cause, evidence=evidence, beaten={"thrust_drift": 45.0, "payload": 12.0}
-    )
+        first, cause=cause, evidence=evidence,
+        beaten={"thrust_drift": 45.0, "payload": 12.0, "current": 45.0},
+    )  # fmt: skip
     numbers = {**sea.done.decision.base.numbers, "thrust_loss": np.zeros(1)}
     decision = replace(
         sea.done.decision,

@@ -140,9 +140,10 @@ class HeldOut(Rollouts):
             if gains:
                 why = f"{why}, {worth.low:+.1%} to {worth.high:+.1%}: none that is sure"
             dropped[one.cause.label] = f"no gain on held-out voyages ({why})"
+            left = {n.cause.label for n in rest.named}
             dropped |= {
                 other: f"{one.cause.label} explains {nats:.0f} nats more, and gains nothing"
-                for other, nats in one.beaten.items() if nats > diagnose.MORE
+                for other, nats in one.beaten.items() if nats > diagnose.MORE and other not in left
             }  # fmt: skip
             decision, found = rest, self.gain(rest)
         return decision, found if decision.named else None, dropped
