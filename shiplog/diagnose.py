@@ -21,7 +21,8 @@ from shiplog.unnamed import Pulses
 
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 MORE = 25.0  # that one must whose gain is not sure
-FURTHER = 60.0  # that each further one must: small evidence follows large ones about
+FURTHER = 30.0  # that each further one must: small evidence follows large ones about
+SURE = 60.0  # that leave no doubt, where held-out voyages cannot tell gain from loss
 FLEXIBLE = 40.0  # nats that an unknown structure must bring beyond a cause: it fits anything
 UNKNOWN = 60.0  # nats that it must bring where no cause is named
 FAINT = 60.0  # nats of a cause, below which a structure that explains as much takes its place

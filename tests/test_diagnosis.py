@@ -511,7 +511,7 @@ def test_a_side_force_of_the_screw_is_not_called_a_rudder_aslant(sea, trials):
     assert "rudder_offset" in decision.rejected
 
 
-@pytest.mark.parametrize(("nats", "joins"), [(59.0, False), (61.0, True)])
+@pytest.mark.parametrize(("nats", "joins"), [(29.0, False), (31.0, True)])
 def test_small_evidence_follows_large_ones_about_and_names_nothing(
     compass, monkeypatch, nats, joins
 ):

@@ -157,7 +157,7 @@ class HeldOut(Rollouts):
 
     def _sure(self, one: Named, alone: bool) -> bool:
         """Whether it differs from her nominal campaign beyond doubt."""
-        wanted = diagnose.FURTHER * (1.0 if alone else BESIDE)
+        wanted = diagnose.SURE * (1.0 if alone else BESIDE)
         return self.trial.reference.nominal is not None and one.evidence > wanted
 
     def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
