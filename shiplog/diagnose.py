@@ -95,6 +95,11 @@ class _Search:
         usual = self.trial.level(self.point, 1.0, self.included).value
         return self.base.evidence - usual
 
+    @property
+    def _rough(self) -> bool:
+        causes = self.trial.reference.model.causes
+        return any(c.rough for c in causes if c.label in self.included)
+
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
         self.remains = self.structures.found(self.point, self.base, self.included)
@@ -104,7 +109,8 @@ class _Search:
             return True
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
         first = self.included == self.trial.fixed
-        wanted = LEAST if first and self.pulses is None else FURTHER
+        further = SURE if self._rough else FURTHER
+        wanted = LEAST if first and self.pulses is None else further
         if not self.ranking:
             self.ranking = self._ranked(settled, wanted)
         best = settled[0][1] if settled else None
@@ -118,8 +124,9 @@ class _Search:
         return True
 
     def _pulses(self) -> bool:
-        """Whether a force that comes and goes explains the unrest better than all else."""
-        if self.pulses is not None or self.base.louder < LOUD:
+        """Whether a force that comes and goes explains the unrest better than all else. What a
+        map leaves of a shoal comes and goes, too, as the ship passes it."""
+        if self.pulses is not None or self.base.louder < LOUD or self._rough:
             return False
         tried = unnamed.pulses(self.trial, self.point, self.base)
         rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]

@@ -239,7 +239,7 @@ def learn(
     held = _anchor(start, at.theta, columns)
     chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
     wider = np.ones(len(unit))
-    seen = shown.any((0, 1))
+    seen = np.asarray(shown.any((0, 1)))
     gyro = seen[5] & ~seen[:5].any(0)
     wider[columns.base :][gyro] = np.sqrt(max(CAREFUL_KAPPA / chosen, 1.0))
     information, pull = usual(grams.each.sum(0), chosen, wider, columns.known, held)
@@ -321,16 +321,17 @@ def read(
     base = segments.cut(corrected(model.causes, record, given), rows)
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
     shown = np.zeros((*base.y.shape, len(columns.unit)))
-    before = record.smoothed(SMOOTH)  # as the causes before this one have it
+    before = record  # as the causes before this one have it
     for place, cause in enumerate(model.causes):
         if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
+        from_here = before.smoothed(SMOOTH) if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = STEP * sizes[cause.label][i]
             more, less = (
-                corrected(model.causes[place + 1 :], cause.read(before, here + s), given)
+                corrected(model.causes[place + 1 :], cause.read(from_here, here + s), given)
                 for s in (step, -step)
             )
             # of what both share nothing changes

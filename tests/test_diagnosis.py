@@ -33,6 +33,7 @@ from shiplog import (
     unnamed,
 )
 from shiplog import profile as profiles
+from shiplog.causes.sensors import HeadingOffset
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
 from shiplog.gain import Gain
@@ -511,11 +512,16 @@ def test_a_side_force_of_the_screw_is_not_called_a_rudder_aslant(sea, trials):
     assert "rudder_offset" in decision.rejected
 
 
-@pytest.mark.parametrize(("nats", "joins"), [(29.0, False), (31.0, True)])
+@pytest.mark.parametrize(
+    ("nats", "rough", "joins"),
+    [(29.0, False, False), (31.0, False, True), (59.0, True, False), (61.0, True, True)],
+)
 def test_small_evidence_follows_large_ones_about_and_names_nothing(
-    compass, monkeypatch, nats, joins
+    compass, monkeypatch, nats, rough, joins
 ):
+    """More of it, where the form of what was named is a rough one."""
     trial, decision = compass
+    monkeypatch.setattr(HeadingOffset, "rough", rough)
     monkeypatch.setattr(unnamed.Structures, "found", lambda *_: [])
     search = diagnose._Search(trial, decision.first, ())
     assert search.one_more() and search.included == ("heading_offset",)
@@ -527,6 +533,26 @@ def test_small_evidence_follows_large_ones_about_and_names_nothing(
     monkeypatch.setattr(diagnose, "_settle", lambda *_: [(search.point, more)])
     assert search.one_more() == joins
     assert ("current" in search.included) == joins
+
+
+@pytest.mark.parametrize("rough", (False, True))
+def test_what_a_map_leaves_of_a_shoal_is_no_thruster(compass, monkeypatch, rough):
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    assert search.one_more()
+    search.base = replace(search.base, louder=2.0)
+    found = unnamed.Pulses(0.0, 900.0, 0.0, 1.0, np.array([0.0, 0.01, 0.0]))
+    monkeypatch.setattr(unnamed, "pulses", lambda *_: found)
+    monkeypatch.setattr(HeadingOffset, "rough", rough)
+    monkeypatch.setattr(trial, "unrest", trial.unrest)  # as it was, after this
+    assert search._pulses() != rough
+
+
+def test_what_a_rough_form_leaves(sea):
+    by = {c.label: c for c in sea.usual.model.causes}
+    assert [label for label, cause in by.items() if cause.rough] == ["shallow_water", "bank"]
+    assert not by["cross_flow_drag"].beside("shallow_water")
+    assert by["cross_flow_drag"].beside("current") and by["payload"].beside("shallow_water")
 
 
 # --- a model that has learned of what is wrong

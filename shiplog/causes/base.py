@@ -91,6 +91,8 @@ class Cause:
     parameters: ClassVar[tuple[Parameter, ...]]
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
+    shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
+    rough: ClassVar[bool] = False  # no two waters have its form: what it leaves is not another's
 
     @property
     def label(self) -> str:

@@ -80,6 +80,7 @@ class ClockOffset(Cause):
     name = "clock_offset"
     kind = "sensor"
     story = "A channel's clock is off."
+    shifts = True
     equation = "measured(t) = true(t - {time:.2f} s)"
     parameters = (Parameter("time", "s", 0.8, 0.04, low=-5.0, high=5.0),)
     separated_by = {

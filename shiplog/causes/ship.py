@@ -71,6 +71,10 @@ class CrossFlowDrag(_Factor):
         "payload": "step of the screw from rest (inertia) against a pure decay of sway",
     }
 
+    def beside(self, label: str) -> bool:
+        """Shallow water makes it grow where it is shallow, and a map of that is rough."""
+        return super().beside(label) and label != "shallow_water"
+
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"Cross-flow drag is {shown['factor'].value:.2f} times the model's."
 
