@@ -29,7 +29,7 @@ FREE = 2.0  # times the unrest that a path's knots may be pulled by
 SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # voyages are more alike than campaigns: not less
-CAREFUL_KAPPA = 11.0  # of too few voyages, and of the gyro's own faults: its noise is coloured
+CAREFUL_KAPPA = 11.0  # of too few voyages, and of her own instruments: their noise is coloured
 UNREST_TIME = 4.0  # s
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 HELD = 1e8  # information that leaves a number where it is
@@ -239,9 +239,8 @@ def learn(
     held = _anchor(start, at.theta, columns)
     chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
     wider = np.ones(len(unit))
-    seen = np.asarray(shown.any((0, 1)))
-    gyro = seen[5] & ~seen[:5].any(0)
-    wider[columns.base :][gyro] = np.sqrt(max(CAREFUL_KAPPA / chosen, 1.0))
+    seen = shown.any((0, 1, 2))  # in the ship's own motion
+    wider[columns.base :][seen] = np.sqrt(max(CAREFUL_KAPPA / chosen, 1.0))
     information, pull = usual(grams.each.sum(0), chosen, wider, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
