@@ -19,7 +19,7 @@ import numpy as np
 import polars as pl
 
 from pipelines.diagnosis import trial
-from shiplog import evidence, reference, runs
+from shiplog import reference, runs
 from shiplog.hypotheses import Found, Trial
 from shiplog.reference import Reference
 from shiplog.store import Store
@@ -29,10 +29,9 @@ KAPPAS = (11.0, 4.0, 2.0, 1.0)
 
 def counted(ref: Reference, kappa: float) -> Reference:
     """The same campaign, all of it counted for 1/κ."""
-    assert ref.nominal is not None
-    modes = evidence.modes(evidence.weighed(ref.nominal, ref.unrest.noise), ref.unrest)
+    assert ref.nominal is not None and ref.modes is not None
     by = np.concatenate(([1.0], ref.columns.unit))
-    total = modes.total(np.ones(len(ref.nominal.e))) * np.outer(by, by)
+    total = ref.modes.total(np.ones(len(ref.nominal.e))) * np.outer(by, by)
     ones = np.ones(len(ref.columns.unit))
     information, pull = reference.usual(total, kappa, ones, ref.columns.known, ref.anchor)
     return replace(ref, information=information, pull=pull, kappa=kappa, wider=ones)

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
@@ -103,7 +102,7 @@ class Trial:
         self.rows = segments.begins(record)
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self._first: Point | None = None
-        self._volume: tuple[evidence.Unrest, CubicSpline] | None = None
+        self._volume: Modes | None = None
         self._modes: list[tuple[Weighed, Modes]] = []
         self.weight = np.ones(len(self.rows))
 
@@ -206,15 +205,13 @@ class Trial:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
         model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
         own misfit it would count as such."""
-        if self._volume is None or self._volume[0] is not self.unrest:
-            assert self._first is not None
-            at = (0.5 * QUIETER[-1], *reversed(QUIETER), *LOUDER, 2.0 * LOUDER[-1])
-            values = []
-            for one in at:
-                modes, louder_by = self.modes(self._first, one)
-                values.append(modes.log_volume(louder_by))
-            self._volume = (self.unrest, CubicSpline(np.log(at), values))
-        return float(self._volume[1](np.log(louder)))
+        assert self._first is not None
+        if self.unrest.pulse is not None:
+            modes = evidence.modes(self._first.weighed, self.unrest.louder(louder))
+            return modes.log_volume()
+        if self._volume is None:
+            self._volume = evidence.modes(self._first.weighed, self.unrest)
+        return self._volume.log_volume(louder)
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: what is usual, and the included causes free."""

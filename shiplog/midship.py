@@ -2,8 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pymap3d
+
+
+class Axes(NamedTuple):
+    """Cosine and sine [n] of the heading: they cost more than all that is done with them."""
+
+    cos: np.ndarray
+    sin: np.ndarray
+
+    def turned(self, angle: float) -> Axes:
+        """Clockwise by so much [rad]."""
+        c, s = np.cos(angle), np.sin(angle)
+        return Axes(c * self.cos - s * self.sin, c * self.sin + s * self.cos)
+
+    @property
+    def back(self) -> Axes:
+        """Of the opposite heading: from body axes to the earth's."""
+        return Axes(self.cos, -self.sin)
+
+
+def axes(heading: np.ndarray | Axes) -> Axes:
+    """Of a heading [n], or as they are known."""
+    return heading if isinstance(heading, Axes) else Axes(np.cos(heading), np.sin(heading))
 
 
 def local_plane(
@@ -22,19 +46,19 @@ def earth_velocity(speed: np.ndarray, course: np.ndarray) -> np.ndarray:
     return np.stack((speed * np.cos(course), speed * np.sin(course)), axis=-1)
 
 
-def to_body(earth: np.ndarray, heading: np.ndarray) -> np.ndarray:
+def to_body(earth: np.ndarray, heading: np.ndarray | Axes) -> np.ndarray:
     """Earth-fixed (north, east) [n, 2] to body axes (ahead, starboard) [n, 2]."""
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = axes(heading)
     return np.stack(
         (c * earth[:, 0] + s * earth[:, 1], -s * earth[:, 0] + c * earth[:, 1]), axis=-1
     )
 
 
 def position_at_midship(
-    position: np.ndarray, heading: np.ndarray, arm: tuple[float, float]
+    position: np.ndarray, heading: np.ndarray | Axes, arm: tuple[float, float]
 ) -> np.ndarray:
     """Antenna position [n, 2] minus the lever arm (ahead, starboard) turned by the heading."""
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = axes(heading)
     ahead, starboard = arm
     return position - np.stack((c * ahead - s * starboard, s * ahead + c * starboard), axis=-1)
 

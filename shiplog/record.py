@@ -17,6 +17,7 @@ import polars as pl
 from shiplog import channels, midship
 from shiplog.align import RATE_HZ
 from shiplog.channels import Quality
+from shiplog.midship import Axes
 from shiplog.profile import Profile
 from shiplog.quality import stretches
 
@@ -74,11 +75,10 @@ class Record:
         """Values [n, ...] as they stand `seconds` later; at the ends of a stretch they stay."""
         if seconds == 0.0:
             return values
-        rows = np.arange(len(self)) + seconds / self.step
-        rows = np.clip(rows, self.firsts, self.lasts)
-        low = np.minimum(rows.astype(int), self.lasts)
-        high = np.minimum(low + 1, self.lasts)
-        part = (rows - low).reshape(-1, *[1] * (values.ndim - 1))
+        whole, part = divmod(seconds / self.step, 1.0)
+        rows = np.arange(len(self)) + int(whole)
+        firsts, lasts = self.firsts, self.lasts
+        low, high = (np.clip(at, firsts, lasts) for at in (rows, rows + 1))
         return values[low] * (1.0 - part) + values[high] * part
 
     def smoothed(self, seconds: float) -> Record:
@@ -94,26 +94,27 @@ class Record:
             state = (upto[at + half + 1] - upto[at - half]) / count
         return replace(self, state=state)
 
+    @cached_property
+    def axes(self) -> Axes:
+        return midship.axes(self.state[:, 4])
+
     @property
     def true_wind(self) -> np.ndarray:
         """[n, 2] where the wind over ground comes from, along x₀ and y₀ [m/s]."""
-        c, s = np.cos(self.state[:, 4]), np.sin(self.state[:, 4])
-        ahead = self.wind[:, 0] - self.state[:, 1]
-        starboard = self.wind[:, 1] - self.state[:, 3]
-        return np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+        return midship.to_body(self.wind - self.state[:, [1, 3]], self.axes.back)
 
     @cached_property
     def sighted(self) -> Sighted:
         """What the instruments saw."""
         sensors, state = self.profile.sensors, self.state
-        heading, yaw_rate = state[:, 4], state[:, 5]
+        yaw_rate = state[:, 5]
         ahead, aside = sensors.position.lever_arm_m
-        position = midship.position_at_midship(state[:, [0, 2]], heading, (-ahead, -aside))
+        position = midship.position_at_midship(state[:, [0, 2]], self.axes, (-ahead, -aside))
         ahead, aside = sensors.velocity.lever_arm_m
         velocity = midship.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
         if sensors.kind("velocity") != "body":
-            velocity = midship.to_body(velocity, -heading)
-        return Sighted(position, velocity, heading, yaw_rate)
+            velocity = midship.to_body(velocity, self.axes.back)
+        return Sighted(position, velocity, state[:, 4], self.axes, yaw_rate)
 
     def pick(self, voyages: Sequence[str]) -> Record:
         """The rows of these voyages, shares of the campaign as they were."""
@@ -183,12 +184,17 @@ def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
 @dataclass(frozen=True)
 class Sighted:
     """What the instruments saw: position of the antenna over ground, its velocity [n, 2] (in body
-    axes or over ground, as the profile says), heading and yaw rate [n]."""
+    axes or over ground, as the profile says), heading with its axes and yaw rate [n]."""
 
     position: np.ndarray
     velocity: np.ndarray
     heading: np.ndarray
+    axes: Axes
     yaw_rate: np.ndarray
+
+    def turned(self, angle: float) -> Sighted:
+        """With a heading that is by so much greater [rad]."""
+        return replace(self, heading=self.heading + angle, axes=self.axes.turned(angle))
 
 
 def reduced(
@@ -201,10 +207,10 @@ def reduced(
     arm = np.array(sensors.position.lever_arm_m)
     of_velocity = np.array(sensors.velocity.lever_arm_m)
     shared = bool(np.array_equal(arm, of_velocity))
-    position = midship.position_at_midship(seen.position, seen.heading, tuple(arm + moved))
+    position = midship.position_at_midship(seen.position, seen.axes, tuple(arm + moved))
     velocity = seen.velocity
     if sensors.kind("velocity") != "body":
-        velocity = midship.to_body(velocity, seen.heading)
+        velocity = midship.to_body(velocity, seen.axes)
     velocity = midship.velocity_at_midship(
         velocity, seen.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
     )
@@ -214,4 +220,6 @@ def reduced(
             seen.heading, seen.yaw_rate,
         ), -1,
     )  # fmt: skip
-    return replace(record, state=state)
+    found = replace(record, state=state)
+    vars(found)["axes"] = seen.axes  # known already
+    return found

@@ -16,7 +16,7 @@ import numpy as np
 
 from shiplog import evidence, segments
 from shiplog.causes import Cause, Setting
-from shiplog.evidence import Unrest
+from shiplog.evidence import Modes, Unrest
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
 from shiplog.record import Record
@@ -94,7 +94,8 @@ class Reference:
     information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
                  latter is the run's own coefficients'
     wider        [C] by how much each is less sure than κ alone has it
-    nominal      None where the model was made on the very data that are diagnosed
+    nominal      that campaign, and its `modes` under the usual unrest; None where the model was
+                 made on the very data that are diagnosed
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
     """
 
@@ -110,6 +111,7 @@ class Reference:
     kappa: float
     wider: np.ndarray
     nominal: Linear | None
+    modes: Modes | None
     adapts: bool = False
 
     @cached_property
@@ -235,7 +237,8 @@ def learn(
     unit = columns.unit
     whole = np.concatenate((at.theta, np.zeros(len(unit) - columns.base)))
     linear = segments.linear(model, whole, cut, segments.grid(record), at.path, moved, shown)
-    grams = evidence.gram(evidence.weighed(linear, at.unrest.noise), at.unrest).scaled(unit)
+    modes = evidence.modes(evidence.weighed(linear, at.unrest.noise), at.unrest)
+    grams = modes.gram().scaled(unit)
     held = _anchor(start, at.theta, columns)
     chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
     wider = np.ones(len(unit))
@@ -244,7 +247,7 @@ def learn(
     information, pull = usual(grams.each.sum(0), chosen, wider, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
-        chosen, wider, linear,
+        chosen, wider, linear, modes,
     )  # fmt: skip
 
 
@@ -313,7 +316,8 @@ def read(
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them there."""
+    """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
+    by the motion averaged over seconds, as its noise tells nothing of a clock."""
     given = dict(numbers or {})
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
@@ -325,12 +329,12 @@ def read(
         if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
-        from_here = before.smoothed(SMOOTH) if cause.shifts else before
+        moving = before.smoothed(SMOOTH) if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = STEP * sizes[cause.label][i]
             more, less = (
-                corrected(model.causes[place + 1 :], cause.read(from_here, here + s), given)
+                corrected(model.causes[place + 1 :], cause.read(moving, here + s), given)
                 for s in (step, -step)
             )
             # of what both share nothing changes
@@ -341,7 +345,8 @@ def read(
                 change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
                 moved[..., -2:, column] = change / (2.0 * step[i])
             if more.state is not less.state:
-                change = segments.measured(more, rows)[0] - segments.measured(less, rows)[0]
+                apart = replace(more, state=more.state - less.state)
+                change = segments.measured(apart, rows)[0]
                 shown[..., column] = change / (2.0 * step[i])
         before = corrected((cause,), before, given)
     return base, moved, shown
@@ -380,5 +385,6 @@ def assume(
     # no cause has a usual size where nothing was usual
     information[causes, causes] = np.eye(len(unit) - base) * HELD
     return replace(
-        whole, information=information, pull=whole.anchor, nominal=None, adapts=not given
-    )
+        whole, information=information, pull=whole.anchor, nominal=None, modes=None,
+        adapts=not given,
+    )  # fmt: skip

@@ -54,10 +54,9 @@ class Structures:
     def __init__(self, trial: Trial, point: Point) -> None:
         self.trial = trial
         ref = trial.reference
-        here, usual, modes = structure.at_knots(point.linear.cut, trial.grid), None, None
+        here, usual = structure.at_knots(point.linear.cut, trial.grid), None
         if ref.nominal is not None:
             usual = structure.at_knots(ref.nominal.cut, trial.grid)
-            modes = evidence.modes(evidence.weighed(ref.nominal, ref.unrest.noise), ref.unrest)
         both = [k for k in (usual, here) if k]
         learned = ref.adapts and not isinstance(ref.model.base, MMG)
         bases: list[tuple[str, Basis | Products | None]] = [
@@ -71,9 +70,9 @@ class Structures:
             if basis is None:
                 continue
             before = None
-            if usual is not None and modes is not None and name != "time":
+            if usual is not None and ref.modes is not None and name != "time":
                 pushed = structure.pushed(basis.features(usual), ref.unrest.push)
-                before = modes.beside(pushed).total(np.ones(len(pushed)))
+                before = ref.modes.beside(pushed).total(np.ones(len(pushed)))
             self.families.append(Family(name, basis, before))
 
     def found(self, point: Point, base: Found, included: Sequence[str]) -> list[Found]:

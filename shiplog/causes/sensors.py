@@ -24,8 +24,7 @@ class HeadingOffset(Cause):
     }
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = record.sighted
-        return reduced(record, replace(seen, heading=seen.heading - p[0]))
+        return reduced(record, record.sighted.turned(-float(p[0])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."
