@@ -32,9 +32,8 @@ def counted(ref: Reference, kappa: float) -> Reference:
     assert ref.nominal is not None and ref.modes is not None
     by = np.concatenate(([1.0], ref.columns.unit))
     total = ref.modes.total(np.ones(len(ref.nominal.e))) * np.outer(by, by)
-    ones = np.ones(len(ref.columns.unit))
-    information, pull = reference.usual(total, kappa, ones, ref.columns.known, ref.anchor)
-    return replace(ref, information=information, pull=pull, kappa=kappa, wider=ones)
+    information, pull = reference.usual(total, kappa, ref.columns.known, ref.anchor)
+    return replace(ref, information=information, pull=pull, kappa=kappa)
 
 
 def square(found: Found, unit: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from shiplog.hypotheses import Found, Point, Told, Trial
 from shiplog.unnamed import Pulses
 
 PULSES = "side_thrust"
-LEAST = 8.0  # nats that the first cause must bring
+LEAST = 5.0  # nats that the first cause must bring
 CHANGED = 2.0 / 3.0  # before any data: whoever asks has a reason to
 SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as likely
 

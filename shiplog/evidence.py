@@ -4,17 +4,22 @@
 
 The start is free, the acceleration is what no model of this ship explains: an Ornstein-Uhlenbeck
 process whose size is learned where the model was made (Kennedy & O'Hagan 2001). Both are
-eliminated segment by segment; what is left of all data is one small matrix over [e | J].
+eliminated segment by segment; what is left of all data is one small matrix over [e | J]. An
+instrument's noise lasts from one observation to the next: taken for white, it would make causes
+that it looks like, and intervals that are too narrow.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.segments import KNOT, Linear
+from shiplog.segments import BIN, KNOT, Linear
 
+SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
+FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
+ENOUGH = 8  # unbroken segments, fewer of which do not show it
 LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
 
 
@@ -22,7 +27,8 @@ LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, 
 class Unrest:
     """Sizes of what is random.
 
-    noise   [6]  of one observation (2 s), channels.STATE
+    noise   [6]  of one observation (2 s), channels.STATE; of its variance a share `coloured` [6]
+                 lasts, and fades within `fade` [6] s
     push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
     time         s over which that stays
     start   [6]  how free the initial state is
@@ -35,6 +41,12 @@ class Unrest:
     start: np.ndarray
     pulse: np.ndarray | None = None
     pulse_time: float = 12.0
+    coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    fade: np.ndarray = field(default_factory=lambda: np.ones(6))
+
+    def correlation(self, channel: int, bins: int) -> np.ndarray:
+        """[B, B] of one channel's noise."""
+        return _correlation(self.coloured[channel], self.fade[channel], bins)
 
     def kernel(self, knots: int) -> np.ndarray:
         """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
@@ -61,6 +73,37 @@ def _decay(knots: int, time: float) -> np.ndarray:
     return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(knots)
 
 
+def _correlation(share: float, fade: float, bins: int) -> np.ndarray:
+    apart = np.abs(np.subtract.outer(np.arange(bins), np.arange(bins))) * BIN
+    return (1.0 - share) * np.eye(bins) + share * np.exp(-apart / fade)
+
+
+class _Whitening:
+    """Observations in units in which their noise is white and of unit size."""
+
+    def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
+        """used   [S, B, 6] bool: what was not seen is nothing"""
+        bins = used.shape[1]
+        self.by: list[np.ndarray] = []  # [S or 1, B, B] of each channel
+        self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
+        for channel in range(6):
+            patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
+            correlation = unrest.correlation(channel, bins)
+            roots = np.zeros((len(patterns), bins, bins))
+            for root, pattern in zip(roots, patterns, strict=True):
+                seen = np.ix_(pattern, pattern)
+                root[seen] = np.linalg.inv(np.linalg.cholesky(correlation[seen]))
+            logs = [
+                -2.0 * np.log(np.diagonal(r)[p]).sum() for r, p in zip(roots, patterns, strict=True)
+            ]
+            self.logdet += float(np.array(logs)[of].sum())
+            self.by.append(roots[of] / unrest.noise[channel])
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """[S, B, 6, n] → [S, 6 B, n]"""
+        return np.concatenate([by @ values[:, :, c] for c, by in enumerate(self.by)], axis=1)
+
+
 @dataclass(frozen=True)
 class Weighed:
     """Products of one pass under one noise R; what depends on the push alone comes after.
@@ -78,15 +121,13 @@ class Weighed:
     knots: int
 
 
-def weighed(linear: Linear, noise: np.ndarray) -> Weighed:
-    count, j = len(linear.e), linear.j
-    weight = np.where(linear.cut.used, 1.0 / noise, 0.0)[..., None]
-    d = (np.concatenate((linear.e[..., None], j), -1) * weight).reshape(count, -1, 1 + j.shape[-1])
-    z = (linear.z * weight).reshape(count, -1, linear.z.shape[-1])
+def weighed(linear: Linear, unrest: Unrest) -> Weighed:
+    white = _Whitening(linear.cut.used, unrest)
+    d = white(np.concatenate((linear.e[..., None], linear.j), -1))
+    z = white(linear.z)
     zt = np.swapaxes(z, 1, 2)
-    used = linear.cut.used
-    logdet = 2.0 * float((used * np.log(noise)).sum())
-    return Weighed(np.swapaxes(d, 1, 2) @ d, zt @ d, zt @ z, logdet, (z.shape[-1] - 6) // 3)
+    knots = (z.shape[-1] - 6) // 3
+    return Weighed(np.swapaxes(d, 1, 2) @ d, zt @ d, zt @ z, white.logdet, knots)
 
 
 @dataclass(frozen=True)
@@ -152,7 +193,10 @@ class Modes:
 
 
 def modes(weighed: Weighed, unrest: Unrest) -> Modes:
-    """Start eliminated, acceleration along its principal axes (Woodbury)."""
+    """Start eliminated, acceleration along its principal axes (Woodbury). Raises
+    np.linalg.LinAlgError where the path ran away."""
+    if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
+        raise np.linalg.LinAlgError("a path that ran away has no products")
     kernel = unrest.kernel(weighed.knots)
     known = np.diag(unrest.start**-2.0)
     start = weighed.zz[:, :6, :6] + known
@@ -191,46 +235,76 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
 
 
 def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> Unrest:
-    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977).
+    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977). How
+    the noise is coloured is asked once, at the end.
 
     d   [C] the numbers of the columns
     """
-    left = linear.e - linear.j @ d
+    left = (linear.e - linear.j @ d)[..., None]
     count, size = len(left), linear.z.shape[-1]
     knots = (size - 6) // 3
     used = linear.cut.used
-    flat = linear.z.reshape(count, -1, size)
+    seen = np.maximum(used.sum((0, 1)), 1)
+    inverse = np.linalg.inv(_decay(knots, unrest.time))
     for _ in range(rounds):
-        weight = np.where(used, unrest.noise**-2.0, 0.0).reshape(count, -1)
-        prior = unrest.precision(knots)
-        zt = np.swapaxes(flat * weight[..., None], 1, 2)
-        covariance = np.linalg.inv(zt @ flat + prior)
-        z = (covariance @ (zt @ left.reshape(count, -1, 1)))[..., 0]
-        gap = left - (flat @ z[..., None])[..., 0].reshape(left.shape)
-        spread = ((flat @ covariance) * flat).sum(-1).reshape(left.shape)
-        squares = np.where(used, gap**2 + spread, 0.0).sum((0, 1))
-        noise = np.maximum(np.sqrt(squares / np.maximum(used.sum((0, 1)), 1)), LEAST)
-        inverse = np.linalg.inv(_decay(knots, unrest.time))
+        white = _Whitening(used, unrest)
+        columns, error = white(linear.z), white(left)
+        z, covariance = _posterior(columns, error, unrest)
+        gap = (error - columns @ z)[..., 0].reshape(count, 6, -1)
+        spread = ((columns @ covariance) * columns).sum(-1).reshape(gap.shape)
+        noise = unrest.noise * np.sqrt((gap**2 + spread).sum((0, 2)) / seen)
         push = np.empty(3)
         for channel in range(3):
             part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
-            own = z[:, part]
+            own = z[:, part, 0]
             second = np.einsum("si,ij,sj->", own, inverse, own)
             second += np.einsum("ij,sji->", inverse, covariance[:, part, part])
             push[channel] = np.sqrt(second / (count * knots))
-        unrest = replace(unrest, noise=noise, push=push)
-    return unrest
+        unrest = replace(unrest, noise=np.maximum(noise, LEAST), push=push)
+    return _coloured(linear, left, unrest)
+
+
+def _posterior(z: np.ndarray, left: np.ndarray, unrest: Unrest) -> tuple[np.ndarray, np.ndarray]:
+    """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
+    zt = np.swapaxes(z, 1, 2)
+    covariance = np.linalg.inv(zt @ z + unrest.precision((z.shape[-1] - 6) // 3))
+    return covariance @ (zt @ left), covariance
+
+
+def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
+    """With the colour that is likeliest for each channel's noise, of its second moments where all
+    was seen; its size goes with that."""
+    used = linear.cut.used
+    whole = used.all((1, 2))
+    if whole.sum() < ENOUGH:
+        return unrest
+    z, error = linear.z[whole], left[whole]
+    white = _Whitening(used[whole], unrest)
+    mean, covariance = _posterior(white(z), white(error), unrest)
+    bins = used.shape[1]
+    noise, coloured, fade = unrest.noise.copy(), unrest.coloured.copy(), unrest.fade.copy()
+    for channel in range(6):
+        columns = z[:, :, channel]
+        gap = error[:, :, channel] - columns @ mean
+        second = gap[..., 0].T @ gap[..., 0]
+        second += (columns @ covariance @ np.swapaxes(columns, 1, 2)).sum(0)
+        best = np.inf
+        for share in SHARES:
+            for time in FADES if share > 0.0 else FADES[:1]:
+                correlation = _correlation(share, time, bins)
+                variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))
+                cost = np.linalg.slogdet(correlation)[1] + bins * np.log(variance)
+                if cost < best:
+                    best, coloured[channel], fade[channel] = cost, share, time
+                    noise[channel] = np.sqrt(variance)
+    return replace(unrest, noise=np.maximum(noise, LEAST), coloured=coloured, fade=fade)
 
 
 def starts_and_knots(
     linear: Linear, d: np.ndarray, unrest: Unrest
 ) -> tuple[np.ndarray, np.ndarray]:
     """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
-    count, size = len(linear.e), linear.z.shape[-1]
-    left = (linear.e - linear.j @ d).reshape(count, -1, 1)
-    weight = np.where(linear.cut.used, unrest.noise**-2.0, 0.0).reshape(count, -1, 1)
-    prior = unrest.precision((size - 6) // 3)
-    z = linear.z.reshape(count, -1, size)
-    zt = np.swapaxes(z * weight, 1, 2)
-    covariance = np.linalg.inv(zt @ z + prior)
-    return (covariance @ (zt @ left))[..., 0], covariance
+    white = _Whitening(linear.cut.used, unrest)
+    left = white((linear.e - linear.j @ d)[..., None])
+    z, covariance = _posterior(white(linear.z), left, unrest)
+    return z[..., 0], covariance

@@ -127,7 +127,7 @@ class Trial:
             ref.model, whole, cut, self.grid, wide, path, rounds=1 if path else 2
         )
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
-        point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest.noise))
+        point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest))
         if self._first is None:
             self._first = point
         return point

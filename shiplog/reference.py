@@ -29,7 +29,7 @@ FREE = 2.0  # times the unrest that a path's knots may be pulled by
 SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # voyages are more alike than campaigns: not less
-CAREFUL_KAPPA = 11.0  # of too few voyages, and of her own instruments: their noise is coloured
+CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 HELD = 1e8  # information that leaves a number where it is
@@ -93,7 +93,6 @@ class Reference:
 
     information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
                  latter is the run's own coefficients'
-    wider        [C] by how much each is less sure than κ alone has it
     nominal      that campaign, and its `modes` under the usual unrest; None where the model was
                  made on the very data that are diagnosed
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
@@ -109,7 +108,6 @@ class Reference:
     pull: np.ndarray
     anchor: np.ndarray
     kappa: float
-    wider: np.ndarray
     nominal: Linear | None
     modes: Modes | None
     adapts: bool = False
@@ -216,7 +214,7 @@ def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
 def _solved(linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray) -> np.ndarray:
     """[C] numbers that the campaign itself and what was known of them ask for."""
     unit, by = columns.unit, np.concatenate(([1.0], columns.unit))
-    modes = evidence.modes(evidence.weighed(linear, unrest.noise), unrest)
+    modes = evidence.modes(evidence.weighed(linear, unrest), unrest)
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0] + held) * unit
 
@@ -237,29 +235,23 @@ def learn(
     unit = columns.unit
     whole = np.concatenate((at.theta, np.zeros(len(unit) - columns.base)))
     linear = segments.linear(model, whole, cut, segments.grid(record), at.path, moved, shown)
-    modes = evidence.modes(evidence.weighed(linear, at.unrest.noise), at.unrest)
+    modes = evidence.modes(evidence.weighed(linear, at.unrest), at.unrest)
     grams = modes.gram().scaled(unit)
     held = _anchor(start, at.theta, columns)
     chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
-    wider = np.ones(len(unit))
-    seen = shown.any((0, 1, 2))  # in the ship's own motion
-    wider[columns.base :][seen] = np.sqrt(max(CAREFUL_KAPPA / chosen, 1.0))
-    information, pull = usual(grams.each.sum(0), chosen, wider, columns.known, held)
+    information, pull = usual(grams.each.sum(0), chosen, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
-        chosen, wider, linear, modes,
+        chosen, linear, modes,
     )  # fmt: skip
 
 
 def usual(
-    total: np.ndarray, kappa: float, wider: np.ndarray, known: np.ndarray, held: np.ndarray
+    total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
-    beside what is `known` and `held` without them; each spread then `wider` [C] times."""
-    information = total[1:, 1:] / kappa + np.diag(known)
-    mean = np.linalg.solve(information, total[1:, 0] / kappa + held)
-    information /= np.outer(wider, wider)
-    return information, information @ mean
+    beside what is `known` and `held` without them."""
+    return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
 
 
 def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
@@ -283,7 +275,7 @@ def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray, held: np.
     for kappa in KAPPAS:
         score = 0.0
         for left in of.values():
-            score += marginal(left, *usual(total - left, kappa, np.ones(len(known)), known, held))
+            score += marginal(left, *usual(total - left, kappa, known, held))
         said.append(score)
     return KAPPAS[int(np.argmax(said))]
 

@@ -24,6 +24,8 @@ from shiplog.record import Record
 from shiplog.reference import Settled, Start
 from shiplog.segments import Path
 
+UNREST = ("noise", "push", "start", "coloured", "fade")
+
 log = logging.getLogger(__name__)
 
 
@@ -46,8 +48,8 @@ def settled(model: Extended, setting: Setting, start: Start, record: Record) -> 
 
 def _settled(arrays) -> Settled:
     path = Path(arrays["start"], arrays["push"])
-    noise, push, free = (arrays[f"unrest_{name}"] for name in ("noise", "push", "start"))
-    return Settled(arrays["theta"], path, Unrest(noise, push, float(arrays["time"]), free))
+    unrest = {name: arrays[f"unrest_{name}"] for name in UNREST}
+    return Settled(arrays["theta"], path, Unrest(time=float(arrays["time"]), **unrest))
 
 
 def _keep(kept: File, found: Settled) -> None:
@@ -56,8 +58,8 @@ def _keep(kept: File, found: Settled) -> None:
     with partial.open("wb") as file:
         np.savez(
             file, theta=found.theta, start=found.path.start, push=found.path.push,
-            unrest_noise=found.unrest.noise, unrest_push=found.unrest.push,
-            unrest_start=found.unrest.start, time=found.unrest.time,
+            time=found.unrest.time,
+            **{f"unrest_{name}": getattr(found.unrest, name) for name in UNREST},
         )  # fmt: skip
     partial.replace(kept)
 

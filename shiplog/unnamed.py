@@ -144,7 +144,7 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
         return held, np.concatenate((ref.pull, np.zeros(more)))
     ones, zeros = np.ones(more), np.zeros(more)
     return reference.usual(
-        before * np.outer(by, by), ref.kappa, np.concatenate((ref.wider, ones)),
+        before * np.outer(by, by), ref.kappa,
         np.concatenate((ref.columns.known, ones)), np.concatenate((ref.anchor, zeros)),
     )  # fmt: skip
 

@@ -45,6 +45,18 @@ def covariance(unrest: Unrest, knots: int) -> np.ndarray:
     return whole
 
 
+def observed(unrest: Unrest, bins: int) -> np.ndarray:
+    """R of one segment [6B, 6B], bin by bin: a share of each channel's noise lasts into the next
+    observations, 2 s apart."""
+    whole = np.zeros((6 * bins, 6 * bins))
+    for i in range(bins):
+        for k in range(bins):
+            lasts = unrest.coloured * np.exp(-2.0 * abs(i - k) / unrest.fade)
+            both = unrest.noise**2 * (lasts + (1.0 - unrest.coloured) * (i == k))
+            whole[6 * i : 6 * i + 6, 6 * k : 6 * k + 6] = np.diag(both)
+    return whole
+
+
 def dense(given: Linear, unrest: Unrest, fitted: bool = False):
     """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
     `fitted`: without what the start adds to it."""
@@ -55,22 +67,28 @@ def dense(given: Linear, unrest: Unrest, fitted: bool = False):
     for s in range(len(given.e)):
         used = given.cut.used[s].ravel()
         z = given.z[s].reshape(-1, given.z.shape[-1])[used]
-        noise = np.tile(unrest.noise, given.e.shape[1])[used]
-        c = np.diag(noise**2) + z @ kernel @ z.T
+        r = observed(unrest, given.e.shape[1])[np.ix_(used, used)]
+        c = r + z @ kernel @ z.T
         j = given.j[s].reshape(-1, given.j.shape[-1])[used]
         yield given.e[s].ravel()[used], j, c
 
 
 PULSED = replace(UNREST, pulse=np.array([0.0, 0.9, -0.4]), pulse_time=12.0)
-BOTH = pytest.mark.parametrize("unrest", (UNREST, PULSED), ids=("plain", "pulse"))
+COLOURED = replace(
+    UNREST, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
+    fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
+)  # fmt: skip
+EACH = pytest.mark.parametrize(
+    "unrest", (UNREST, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
+)
 
 
-@BOTH
+@EACH
 def test_gram_is_the_dense_gaussian(unrest):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
     restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
     given = linear(3)
-    found = evidence.gram(evidence.weighed(given, unrest.noise), unrest)
+    found = evidence.gram(evidence.weighed(given, unrest), unrest)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         block = np.concatenate((e[:, None], j), 1)
         assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
@@ -78,7 +96,7 @@ def test_gram_is_the_dense_gaussian(unrest):
     for s, (_, _, v) in enumerate(dense(given, unrest, fitted=True)):
         used = given.cut.used[s].ravel()
         start = given.z[s].reshape(-1, 15)[used, :6]
-        r = np.diag(np.tile(unrest.noise, given.e.shape[1])[used] ** 2)
+        r = observed(unrest, given.e.shape[1])[np.ix_(used, used)]
         felt = start.T @ np.linalg.solve(v, start) + np.diag(unrest.start**-2.0)
         logdet += np.linalg.slogdet(v)[1] + np.linalg.slogdet(felt)[1]
         logdet -= np.linalg.slogdet(start.T @ np.linalg.solve(r, start))[1]
@@ -92,7 +110,7 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
     towards = np.concatenate(([1.0], -d))
     found, wanted = [], []
     for unrest in (sure, sure.louder(3.0)):
-        gram = evidence.gram(evidence.weighed(given, NOISE), unrest)
+        gram = evidence.gram(evidence.weighed(given, UNREST), unrest)
         found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
         every = dense(given, unrest)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
@@ -102,10 +120,10 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
 
 def test_units_scale_columns_and_not_the_error():
     given = linear(2)
-    found = evidence.gram(evidence.weighed(given, NOISE), UNREST)
+    found = evidence.gram(evidence.weighed(given, UNREST), UNREST)
     unit = np.array([1e-3, 40.0])
     bent = replace(given, j=given.j * unit)
-    direct = evidence.gram(evidence.weighed(bent, NOISE), UNREST)
+    direct = evidence.gram(evidence.weighed(bent, UNREST), UNREST)
     assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
     assert found.scaled(unit).logdet == found.logdet
 
@@ -113,16 +131,16 @@ def test_units_scale_columns_and_not_the_error():
 def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     given = linear(3)
     pushed = np.random.default_rng(9).standard_normal((3, 9, 4))
-    found = evidence.modes(evidence.weighed(given, NOISE), UNREST).beside(pushed).gram()
+    found = evidence.modes(evidence.weighed(given, UNREST), UNREST).beside(pushed).gram()
     columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
-    direct = evidence.gram(evidence.weighed(written_out, NOISE), UNREST)
+    direct = evidence.gram(evidence.weighed(written_out, UNREST), UNREST)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
 
 
 def test_the_total_is_the_weighted_sum():
     given, weight = linear(3), np.array([1.0, 0.0, 0.4])
-    weighed = evidence.weighed(given, NOISE)
+    weighed = evidence.weighed(given, UNREST)
     each = evidence.gram(weighed, UNREST.louder(2.0)).each
     whole = evidence.modes(weighed, UNREST.louder(2.0)).total(weight)
     assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
@@ -130,7 +148,7 @@ def test_the_total_is_the_weighted_sum():
 
 def test_one_pass_serves_every_size_of_unrest():
     given = linear(3)
-    weighed, weight = evidence.weighed(given, NOISE), np.array([1.0, 0.0, 0.4])
+    weighed, weight = evidence.weighed(given, UNREST), np.array([1.0, 0.0, 0.4])
     modes = evidence.modes(weighed, UNREST)
     for louder in (0.5, 2.0, 5.0):
         found, wanted = modes.gram(louder), evidence.gram(weighed, UNREST.louder(louder))
@@ -140,7 +158,7 @@ def test_one_pass_serves_every_size_of_unrest():
         assert modes.total(weight, louder) == pytest.approx(whole, rel=1e-6)
 
 
-@BOTH
+@EACH
 def test_start_and_knots_are_the_posterior_mean(unrest):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
@@ -155,7 +173,7 @@ def test_start_and_knots_are_the_posterior_mean(unrest):
 def test_marginal_is_the_dense_gaussian():
     """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
     given = linear(3)
-    total = evidence.modes(evidence.weighed(given, NOISE), UNREST).total(np.ones(len(given.e)))
+    total = evidence.modes(evidence.weighed(given, UNREST), UNREST).total(np.ones(len(given.e)))
     found, wanted = [], []
     for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
         information = np.diag(sure)
@@ -210,6 +228,30 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     assert found.noise == pytest.approx(NOISE, rel=0.15)
     assert found.push == pytest.approx(UNREST.push, rel=0.15)
     assert found.time == UNREST.time and (found.start == UNREST.start).all()
+    assert (found.coloured <= 0.2).all()
+
+
+def test_colour_of_the_noise_is_learnt_from_draws_of_it():
+    """Four fifths of one channel's noise last for 4 s; the others' is white. A few segments with
+    holes take no part, and a campaign of nothing else says nothing."""
+    rng = np.random.default_rng(12)
+    given = linear(400, bins=15, knots=5)
+    share = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.8])
+    true = replace(UNREST, coloured=share, fade=np.full(6, 4.0))
+    kernel, d = covariance(true, 5), np.array([0.3, -0.7])
+    z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
+    noise = rng.multivariate_normal(np.zeros(90), observed(true, 15), len(given.e))
+    e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise.reshape(given.e.shape)
+    drawn, found = replace(given, e=e), UNREST
+    for _ in range(4):
+        found = evidence.learnt(drawn, d, found, rounds=6)
+    assert found.coloured[5] == pytest.approx(0.8, abs=0.1) and found.fade[5] == 4.0
+    assert (found.coloured[:5] <= 0.2).all()
+    assert found.noise == pytest.approx(NOISE, rel=0.1)
+    holes = replace(
+        drawn, cut=replace(drawn.cut, used=drawn.cut.used & (np.arange(15) != 7)[:, None])
+    )
+    assert (evidence.learnt(holes, d, UNREST, rounds=1).coloured == 0.0).all()
 
 
 def test_one_campaign_is_believed_less_where_voyages_disagree():
@@ -233,14 +275,12 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
     assert inflation(grams(0.4)[:2], voyage[:2], known, held) == 11.0  # too few to tell
 
 
-def test_what_is_less_sure_is_wider_and_stands_where_it_stood():
-    """The covariance P⁻¹ of (G / κ + K), its rows and columns times what each is wider."""
+def test_a_campaign_counts_for_a_part_of_itself():
+    """Covariance (G / κ + K)⁻¹ about what both it and the run's own coefficients ask for."""
     rng = np.random.default_rng(5)
     j = rng.standard_normal((40, 4))
-    total, wider, held = j.T @ j, np.array([1.0, 3.0, 1.0]), np.array([0.1, 0.0, -0.2])
-    known = np.array([1.0, 2.0, 0.5])
-    information, pull = usual(total, 4.0, wider, known, held)
+    total, known, held = j.T @ j, np.array([1.0, 2.0, 0.5]), np.array([0.1, 0.0, -0.2])
+    information, pull = usual(total, 4.0, known, held)
     plain = np.linalg.inv(total[1:, 1:] / 4.0 + np.diag(known))
-    assert np.linalg.inv(information) == pytest.approx(plain * np.outer(wider, wider))
-    mean = plain @ (total[1:, 0] / 4.0 + held)
-    assert np.linalg.solve(information, pull) == pytest.approx(mean)
+    assert np.linalg.inv(information) == pytest.approx(plain)
+    assert np.linalg.solve(information, pull) == pytest.approx(plain @ (total[1:, 0] / 4.0 + held))

@@ -223,8 +223,10 @@ def white_total(
 ) -> np.ndarray:
     """[1 + C, 1 + C] products of [e | J] in units, the starts eliminated, no knots."""
     by = np.concatenate(([1.0], unit))
-    weighed = evidence.weighed(_white(linear), noise)
-    total = evidence.modes(weighed, _quiet(noise, start)).total(np.ones(len(linear.e)))
+    quiet = _quiet(noise, start)
+    total = evidence.modes(evidence.weighed(_white(linear), quiet), quiet).total(
+        np.ones(len(linear.e))
+    )
     return total * np.outer(by, by)
 
 
