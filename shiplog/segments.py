@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +31,15 @@ KNOT = 2.0  # s between knots of the acceleration
 NODE_ROWS = 2  # rows of the record to a step of the integration
 CHUNK = 64  # segments at a time
 PER_SEGMENT = ("rows", "y", "used", "driven", "voyage")  # of a Cut
+
+
+class Smooth(Physical, Protocol):
+    """Equations that are linearised along a path."""
+
+    @property
+    def smooth(self) -> float:
+        """s within which their derivatives may be taken to go straight; 0 where none do."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -241,7 +251,7 @@ class Wide:
     push: np.ndarray
 
 
-def first_path(model: Physical, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
+def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
     """From the measured path itself: its acceleration less the model's."""
     y = segments.y
     centre = (np.arange(g.bins) + 0.5) * BIN
@@ -275,7 +285,7 @@ def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndar
 
 
 def pulled(
-    model: Physical,
+    model: Smooth,
     theta: np.ndarray,
     segments: Cut,
     g: Grid,
@@ -303,7 +313,7 @@ def pulled(
 
 
 def linear(
-    model: Physical,
+    model: Smooth,
     theta: np.ndarray,
     segments: Cut,
     g: Grid,
@@ -342,6 +352,25 @@ def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarr
         yield part, filled
 
 
+def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
+    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P]. Those of a model that is smooth
+    and takes long (a network) are worked out as often as they change, and go straight between."""
+    nodes = states.shape[1]
+    stride = max(round(model.smooth / step), 1)
+    at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))
+    found = _slopes(model, theta, states[:, at], driven[:, at], coefficients=coefficients)
+    right = np.clip(np.searchsorted(at, np.arange(nodes)), 1, len(at) - 1)
+    part = ((np.arange(nodes) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
+    every = []
+    for values in found:
+        values = np.asarray(values).reshape(*values.shape[:2], len(states), len(at))
+        if stride > 1:
+            left = values[..., right - 1]
+            values = left + part * (values[..., right] - left)
+        every.append(np.moveaxis(values, (2, 3), (0, 1)))
+    return every
+
+
 def _run(model, theta, segments, path, g, moved=None):
     """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ."""
     push = path.at_nodes(g)
@@ -351,10 +380,8 @@ def _run(model, theta, segments, path, g, moved=None):
         driven = filled(segments.driven)
         states = _path(model, theta, filled(path.start), filled(push), driven, segments.step)
         keep = slice(part.stop - part.start)
-        slopes = _slopes(model, theta, states, driven, coefficients=moved is not None)
-        by_state, by_driven, by_theta = (
-            np.moveaxis(np.asarray(found).reshape(*found.shape[:2], CHUNK, g.nodes), (2, 3), (0, 1))
-            for found in slopes
+        by_state, by_driven, by_theta = _along(
+            model, theta, states, driven, segments.step, coefficients=moved is not None
         )
         states = np.asarray(states)[keep]
         how = moved[part] if moved is not None else np.zeros((*driven[keep].shape, 0))

@@ -28,6 +28,7 @@ class Toy:
 
     causes: tuple[Cause, ...] = ()
     substeps: int = 1
+    smooth: float = 0.0
 
     @property
     def names(self):
@@ -48,6 +49,7 @@ class Coasting:
 
     names: tuple[str, ...] = ("k",)
     substeps: int = 1
+    smooth: float = 0.0
 
     def acceleration(self, theta, state, actuator, true_wind):
         return -theta[0] * state[..., jnp.array([1, 3, 5])]
@@ -251,6 +253,26 @@ def test_nothing_is_left_of_what_the_model_made():
     assert found.j.shape[-1] == 4
     picked = found.pick(np.array([False, True, True, False]))
     assert np.array_equal(picked.z, found.z[1:3]) and len(picked.cut) == 2
+
+
+def test_slopes_of_a_smooth_model_go_straight_between_seconds():
+    """One in a second serves the toy, whose rudder goes slowly: what it bends by is within 1 % of
+    what every node's slopes say, and what is constant stays exact."""
+    at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(at)
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    exact, found = (
+        segments.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none) for smooth in (0.0, 1.0)
+    )
+    assert np.array_equal(found.e, exact.e)
+    for one, other in ((found.z, exact.z), (found.j, exact.j)):
+        size = np.abs(other).max((0, 1, 3), keepdims=True)
+        assert 0.0 < np.abs((one - other) / size).max() < 0.01
+    k = np.array([0.3])
+    same = [
+        segments.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z for smooth in (0.0, 1.0)
+    ]
+    assert same[0] == pytest.approx(same[1], abs=1e-12)
 
 
 def test_a_path_is_pulled_onto_a_known_push():

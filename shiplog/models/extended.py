@@ -55,6 +55,10 @@ class Extended:
     def substeps(self) -> int:
         return self.base.substeps
 
+    @property
+    def smooth(self) -> float:
+        return self.base.smooth
+
     def numbers(self, theta: Array) -> list[tuple[Array, ...]]:
         """Of each cause."""
         at, found = len(self.base.names), []

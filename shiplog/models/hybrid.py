@@ -78,6 +78,10 @@ class Hybrid:
         return self.physics.substeps
 
     @property
+    def smooth(self) -> float:
+        return self.physics.smooth
+
+    @property
     def names(self) -> tuple[str, ...]:
         weights = [
             f"network.{name}_{i}"

@@ -30,7 +30,7 @@ BENDS = 24  # features, each in three channels
 class Network:
     """θ is w [3K], zero for the network as it was trained.
 
-    weights     (W₁, b₁, W₂, b₂, ...), each W [out, in]
+    weights     (W₁, b₁, W₂, b₂, ...), each W [out, in], in the precision it was trained in
     frequency   [inputs, K] and phase [K] of φ on the standardised inputs
     """
 
@@ -53,6 +53,10 @@ class Network:
     def substeps(self) -> int:
         return 1
 
+    @property
+    def smooth(self) -> float:
+        return 1.0  # it was trained to steps of a second
+
     def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3]; arguments as for MMG.acceleration."""
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
@@ -70,6 +74,7 @@ class Network:
         z = (jnp.concatenate(parts, -1) - self.mean) / self.std
         hidden = jnp.tanh(z) if self.input_tanh else z
         pairs = list(zip(self.weights[::2], self.weights[1::2], strict=True))
+        hidden = hidden.astype(pairs[0][0].dtype)
         for w, b in pairs[:-1]:
             hidden = jnp.tanh(hidden @ w.T + b)
         w, b = pairs[-1]
@@ -102,7 +107,7 @@ def compiled(model: FeedForward, seed: int = 0) -> Network:
     rng = np.random.default_rng([seed, 77])
     inputs = shape.inputs
     return Network(
-        weights=tuple(w.detach().double().numpy() for w in model.weights),
+        weights=tuple(w.detach().numpy() for w in model.weights),
         mean=scale.input_mean.double().numpy(),
         std=scale.input_std.double().numpy(),
         out_mean=scale.output_mean.double().numpy(),

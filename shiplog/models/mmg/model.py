@@ -26,6 +26,10 @@ class MMG:
     substeps: int = 1  # Euler steps within each measured second; small craft are stiff
 
     @property
+    def smooth(self) -> float:
+        return 0.0  # a rudder is put over in a second
+
+    @property
     def names(self) -> tuple[str, ...]:
         return parameters.names(self.geometry)
 
