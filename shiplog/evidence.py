@@ -84,7 +84,7 @@ class _Whitening:
     def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
         """used   [S, B, 6] bool: what was not seen is nothing"""
         bins = used.shape[1]
-        self.by: list[np.ndarray] = []  # [S or 1, B, B] of each channel
+        self.by: list[np.ndarray] = []  # [S, B, B] of each channel
         self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
         for channel in range(6):
             patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
@@ -93,11 +93,10 @@ class _Whitening:
             for root, pattern in zip(roots, patterns, strict=True):
                 seen = np.ix_(pattern, pattern)
                 root[seen] = np.linalg.inv(np.linalg.cholesky(correlation[seen]))
-            logs = [
-                -2.0 * np.log(np.diagonal(r)[p]).sum() for r, p in zip(roots, patterns, strict=True)
-            ]
-            self.logdet += float(np.array(logs)[of].sum())
-            self.by.append(roots[of] / unrest.noise[channel])
+            each = roots[of.reshape(-1)]
+            seen = np.diagonal(each, axis1=1, axis2=2)[used[..., channel]]
+            self.logdet -= 2.0 * float(np.log(seen).sum())
+            self.by.append(each / unrest.noise[channel])
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """[S, B, 6, n] → [S, 6 B, n]"""
