@@ -44,10 +44,6 @@ class Unrest:
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
 
-    def correlation(self, channel: int, bins: int) -> np.ndarray:
-        """[B, B] of one channel's noise."""
-        return _correlation(self.coloured[channel], self.fade[channel], bins)
-
     def kernel(self, knots: int) -> np.ndarray:
         """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
         whole = np.kron(np.diag(self.push**2), _decay(knots, self.time))
@@ -74,6 +70,7 @@ def _decay(knots: int, time: float) -> np.ndarray:
 
 
 def _correlation(share: float, fade: float, bins: int) -> np.ndarray:
+    """[B, B] of noise of which a share lasts, as an Ornstein-Uhlenbeck process does."""
     apart = np.abs(np.subtract.outer(np.arange(bins), np.arange(bins))) * BIN
     return (1.0 - share) * np.eye(bins) + share * np.exp(-apart / fade)
 
@@ -88,7 +85,7 @@ class _Whitening:
         self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
         for channel in range(6):
             patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
-            correlation = unrest.correlation(channel, bins)
+            correlation = _correlation(unrest.coloured[channel], unrest.fade[channel], bins)
             roots = np.zeros((len(patterns), bins, bins))
             for root, pattern in zip(roots, patterns, strict=True):
                 seen = np.ix_(pattern, pattern)

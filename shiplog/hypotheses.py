@@ -102,7 +102,6 @@ class Trial:
         self.rows = segments.begins(record)
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self._first: Point | None = None
-        self._volume: Modes | None = None
         self._modes: list[tuple[Weighed, Modes]] = []
         self.weight = np.ones(len(self.rows))
 
@@ -198,7 +197,8 @@ class Trial:
             if of is point.weighed:
                 return found, louder
         found = evidence.modes(point.weighed, self.unrest)
-        self._modes = [*self._modes[-1:], (point.weighed, found)]
+        # the first point's, for `volume`, and the last two
+        self._modes = [*self._modes[:1], *self._modes[1:][-1:], (point.weighed, found)]
         return found, louder
 
     def volume(self, louder: float) -> float:
@@ -206,12 +206,8 @@ class Trial:
         model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
         own misfit it would count as such."""
         assert self._first is not None
-        if self.unrest.pulse is not None:
-            modes = evidence.modes(self._first.weighed, self.unrest.louder(louder))
-            return modes.log_volume()
-        if self._volume is None:
-            self._volume = evidence.modes(self._first.weighed, self.unrest)
-        return self._volume.log_volume(louder)
+        modes, louder_by = self.modes(self._first, louder)
+        return modes.log_volume(louder_by)
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: what is usual, and the included causes free."""

@@ -378,12 +378,14 @@ def _run(model, theta, segments, path, g, moved=None):
     ys, columns = [], []
     for part, filled in _chunks(len(segments)):
         driven = filled(segments.driven)
-        states = _path(model, theta, filled(path.start), filled(push), driven, segments.step)
+        states = np.asarray(
+            _path(model, theta, filled(path.start), filled(push), driven, segments.step)
+        )
         keep = slice(part.stop - part.start)
         by_state, by_driven, by_theta = _along(
             model, theta, states, driven, segments.step, coefficients=moved is not None
         )
-        states = np.asarray(states)[keep]
+        states = states[keep]
         how = moved[part] if moved is not None else np.zeros((*driven[keep].shape, 0))
         pairs = 0.5 * (states[:, 1:] + states[:, :-1])
         ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
