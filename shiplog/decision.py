@@ -24,6 +24,7 @@ class Named:
 
     alike    those that it explains hardly more than
     beaten   label → nats by which it explains more than that one instead of it
+    freedom  degrees of it with which the covariance's size is known
     """
 
     cause: Cause
@@ -33,10 +34,11 @@ class Named:
     covariance: np.ndarray
     alike: tuple[str, ...] = ()
     beaten: Mapping[str, float] = field(default_factory=dict)
+    freedom: float = math.inf
 
     @property
     def shown(self) -> dict[str, Shown]:
-        return self.cause.told(self.numbers, self.covariance)
+        return self.cause.told(self.numbers, self.covariance, self.freedom)
 
 
 @dataclass(frozen=True)

@@ -103,10 +103,10 @@ class _Search:
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
         self.remains = self.structures.found(self.point, self.base, self.included)
-        if self._poses():
-            return False
         if self._pulses():
             return True
+        if self._poses():
+            return False
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
         first = self.included == self.trial.fixed
         further = SURE if self._rough else FURTHER
@@ -130,14 +130,22 @@ class _Search:
             return False
         tried = unnamed.pulses(self.trial, self.point, self.base)
         rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]
+        if self.rival is not None:  # it may do without cause and thruster
+            rivals.append(self.rival.evidence + SURE - self._first_gain)
         if tried.gain <= max(PULSED, *rivals):
             return False
+        self.rival = None
         self.pulses = tried
         self.trial.unrest = replace(self.trial.unrest, pulse=tried.unit * tried.force)
         self.base, self.found = self.trial.scan(
             self.point, self._left(self.included), self.included
         )
         return True
+
+    @property
+    def _first_gain(self) -> float:
+        """Nats of what was named first."""
+        return next(iter(self.steps.values()))[0]
 
     def _structure(self, settled: Sequence[tuple[Point, Found]], gain: float) -> bool:
         """Whether an unknown structure explains far more than the best cause; or, where not much
@@ -149,6 +157,8 @@ class _Search:
         best = settled[0][1] if settled else None
         far = strongest.evidence > max(UNKNOWN, gain + FLEXIBLE)
         if far and settled and strongest.evidence <= gain + self._second(*settled[0]):
+            if not self.steps:
+                self._inherits(_last(settled[0][1]), f"unknown:{strongest.name}")
             return False
         faint = LEAST <= gain < FAINT and strongest.evidence >= gain - TEMPERATURE
         if not (far or faint):
@@ -179,6 +189,10 @@ class _Search:
         family = f"unknown:{structure.name}"
         self.ranking[label] = self.ranking.get(label, 0.0) - moved
         self.ranking[family] = self.ranking.get(family, 0.0) + moved
+
+    def _inherits(self, label: str, other: str) -> None:
+        """The probability of another answer is a cause's, which explains what that one does."""
+        self.ranking[label] = self.ranking.get(label, 0.0) + self.ranking.pop(other, 0.0)
 
     def _poses(self) -> bool:
         """Whether what was named first only looks like what is there: a structure that anything may
@@ -242,7 +256,8 @@ class _Search:
         return {PULSES: sure} | {k: (1.0 - sure) * v for k, v in ranking.items()}
 
     def backwards(self) -> None:
-        """Each named cause must still be missed when the others are refitted without it."""
+        """Each named cause must still be missed when the others are refitted without it. What the
+        first one that is not had of evidence and probability is the next one's."""
         fixed = len(self.trial.fixed)
         while len(self.included) - fixed > 1:
             losses = {}
@@ -257,8 +272,14 @@ class _Search:
                 break
             less = max(loss, 0.0)
             self.rejected[label] = f"without it the others explain all but {less:.0f} nats"
-            self.steps.pop(label, None)
+            first = label == self.included[fixed]
+            gone = self.steps.pop(label, None)
             self.included, self.point, self.base = rest, point, base
+            if first and gone is not None:
+                heir = rest[fixed]
+                gain, beaten = self.steps[heir]
+                self.steps[heir] = (gone[0] + gain - loss, beaten)
+                self._inherits(heir, label)
 
     def named(self) -> tuple[Named, ...]:
         by = {c.label: c for c in self.trial.reference.model.causes}
@@ -277,7 +298,7 @@ class _Search:
                 Named(
                     cause, gain, sure if found else self.ranking.get(label, sure),
                     np.asarray(self.base.numbers[label]), self.base.covariance[part, part], alike,
-                    less,
+                    less, self.trial.reference.freedom,
                 )
             )  # fmt: skip
         return tuple(found)

@@ -95,6 +95,7 @@ class Reference:
                  latter is the run's own coefficients'
     nominal      that campaign, and its `modes` under the usual unrest; None where the model was
                  made on the very data that are diagnosed
+    freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
     """
 
@@ -110,6 +111,7 @@ class Reference:
     kappa: float
     nominal: Linear | None
     modes: Modes | None
+    freedom: float
     adapts: bool = False
 
     @cached_property
@@ -242,8 +244,13 @@ def learn(
     information, pull = usual(grams.each.sum(0), chosen, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
-        chosen, linear, modes,
+        chosen, linear, modes, freedom(len(np.unique(linear.cut.voyage))),
     )  # fmt: skip
+
+
+def freedom(voyages: int) -> float:
+    """Degrees of it that so many voyages leave to what they have in common."""
+    return float(max(voyages - 1, 2))
 
 
 def usual(

@@ -562,6 +562,16 @@ def test_told_holds_its_value_and_ninety_percent(cause):
         assert (one.high - one.low) * unit == pytest.approx(2.0 * 1.645 * spread[0], rel=0.06)
 
 
+def test_an_interval_knows_of_how_many_voyages_its_width_is():
+    """Student's t: 2.015 standard deviations with 5 degrees of freedom, 2.920 with 2."""
+    cause = BY["heading_offset"]
+    for freedom, wide in ((5.0, 2.015), (2.0, 2.920)):
+        (one,) = cause.told(np.array([0.05]), np.array([[1e-4]]), freedom, draws=100_000).values()
+        half = 0.5 * (one.high - one.low) * DEGREE / 0.01
+        assert half == pytest.approx(wide, rel=0.03)
+        assert one.low < one.value < one.high
+
+
 def test_a_direction_near_north_has_a_short_interval():
     """359 deg and 1 deg are two degrees apart: 0.01 m/s across 0.3 m/s is 1.9 deg."""
     cause = Current()

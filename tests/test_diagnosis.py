@@ -444,6 +444,8 @@ def test_two_causes_are_no_structure_though_one_explains_less(compass, monkeypat
     monkeypatch.setattr(diagnose._Search, "_second", lambda *_: second)
     again = diagnose.decide(trial, decision.first)
     assert (again.verdict, labels(again)) == (said, ["heading_offset"] * (said == "named"))
+    if said == "named":
+        assert again.named[0].probability > 0.9
 
 
 def test_a_second_cause_counts_where_it_would_be_taken(compass, sea):
@@ -535,6 +537,32 @@ def test_small_evidence_follows_large_ones_about_and_names_nothing(
     assert ("current" in search.included) == joins
 
 
+@pytest.mark.parametrize("loss", [4.0, 6.0])
+def test_what_is_not_missed_leaves_evidence_and_probability_to_what_explains_it(
+    compass, monkeypatch, loss
+):
+    """Of a current of 90 nats all but 4 are explained by what was named after it."""
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    search.included = ("current", "heading_offset")
+    search.steps = {"current": (90.0, {}), "heading_offset": (40.0, {})}
+    search.ranking = {"current": 0.9, "heading_offset": 0.1}
+    both = dict.fromkeys(search.included, np.zeros(1))
+    search.base = replace(search.base, evidence=1000.0, numbers=both)
+    missed = {"current": 130.0, "heading_offset": loss}  # of what is left alone
+    monkeypatch.setattr(
+        trial, "settle",
+        lambda rest, *_: (decision.first, Found(rest[0], 1000.0 - missed[rest[0]], 1.0)),
+    )  # fmt: skip
+    search.backwards()
+    if loss == 6.0:
+        assert search.included == ("current", "heading_offset") and not search.rejected
+        return
+    assert search.included == ("heading_offset",) and list(search.rejected) == ["current"]
+    assert search.steps == {"heading_offset": (126.0, {})}
+    assert search.ranking == {"heading_offset": pytest.approx(1.0)}
+
+
 @pytest.mark.parametrize("rough", (False, True))
 def test_what_a_map_leaves_of_a_shoal_is_no_thruster(compass, monkeypatch, rough):
     trial, decision = compass
@@ -546,6 +574,26 @@ def test_what_a_map_leaves_of_a_shoal_is_no_thruster(compass, monkeypatch, rough
     monkeypatch.setattr(HeadingOffset, "rough", rough)
     monkeypatch.setattr(trial, "unrest", trial.unrest)  # as it was, after this
     assert search._pulses() != rough
+
+
+@pytest.mark.parametrize(("gain", "found"), [(62.0, True), (60.0, False)])
+def test_a_thruster_beside_a_cause_is_asked_before_a_structure_takes_the_place_of_both(
+    compass, monkeypatch, gain, found
+):
+    """The structure explains 1 nat more than the cause, and 60 leave no doubt."""
+    trial, decision = compass
+    told = iter([decision.named[0].evidence + 1.0, 55.0])
+    monkeypatch.setattr(unnamed.Structures, "found", lambda *_: [Found("motion", next(told), 1.0)])
+    monkeypatch.setattr(unnamed.Structures, "acts_on", lambda *_: ("sway",))
+    pulses = unnamed.Pulses(0.0, gain, 0.0, 1.0, np.array([0.0, 0.01, 0.0]))
+    monkeypatch.setattr(unnamed, "pulses", lambda *_: pulses)
+    monkeypatch.setattr(trial, "unrest", trial.unrest)  # as it was, after this
+    search = diagnose._Search(trial, decision.first, ())
+    assert search.one_more()
+    search.base = replace(search.base, louder=2.0)
+    assert search.one_more() == found
+    assert (search.pulses is not None, search.structure is not None) == (found, not found)
+    assert search.included == (("heading_offset",) if found else ())
 
 
 def test_what_a_rough_form_leaves(sea):

@@ -181,7 +181,7 @@ class HeldOut(Rollouts):
         named = tuple(
             Named(
                 by[label], float("nan"), selected.probability[label], numbers,
-                selected.covariance[label],
+                selected.covariance[label], freedom=ref.freedom,
             )
             for label, numbers in selected.numbers.items()
         )  # fmt: skip

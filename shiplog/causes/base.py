@@ -177,11 +177,19 @@ class Cause:
         """The contract's parameters and units, of numbers [..., count]."""
         return {q.name: (p[..., i] / si(q.unit), q.unit) for i, q in enumerate(self.parameters)}
 
-    def told(self, p: np.ndarray, covariance: np.ndarray, draws: int = 4000) -> dict[str, Shown]:
-        """The contract's parameters with 90 % intervals."""
+    def told(
+        self, p: np.ndarray, covariance: np.ndarray, freedom: float = math.inf, draws: int = 4000
+    ) -> dict[str, Shown]:
+        """The contract's parameters with 90 % intervals.
+
+        freedom   degrees of it with which the covariance's size is known: Student's t
+        """
         rng = np.random.default_rng(0)
         root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(p)))
-        many = self.shown(p + rng.standard_normal((draws, len(p))) @ root.T)
+        drawn = rng.standard_normal((draws, len(p))) @ root.T
+        if math.isfinite(freedom):
+            drawn *= np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
+        many = self.shown(p + drawn)
         found = {}
         for name, (value, unit) in self.shown(np.asarray(p, dtype=float)).items():
             spread = many[name][0] - value
