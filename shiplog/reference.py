@@ -328,25 +328,27 @@ def read(
         if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
+        low, high = cause.bounds(setting)
         moving = before.smoothed(SMOOTH) if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = STEP * sizes[cause.label][i]
+            # not beyond what it may be: a lag that is negative sharpens steps and noise
+            ends = np.minimum(here + step, high), np.maximum(here - step, low)
+            apart = ends[0][i] - ends[1][i]
             more, less = (
-                corrected(model.causes[place + 1 :], cause.read(moving, here + s), given)
-                for s in (step, -step)
+                corrected(model.causes[place + 1 :], cause.read(moving, end), given) for end in ends
             )
             # of what both share nothing changes
             if more.actuator is not less.actuator:
                 change = segments.at_nodes(record, rows, more.actuator - less.actuator)
-                moved[..., : change.shape[-1], column] = change / (2.0 * step[i])
+                moved[..., : change.shape[-1], column] = change / apart
             if more.wind is not less.wind or more.state is not less.state:
                 change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
-                moved[..., -2:, column] = change / (2.0 * step[i])
+                moved[..., -2:, column] = change / apart
             if more.state is not less.state:
-                apart = replace(more, state=more.state - less.state)
-                change = segments.measured(apart, rows)[0]
-                shown[..., column] = change / (2.0 * step[i])
+                between = replace(more, state=more.state - less.state)
+                shown[..., column] = segments.measured(between, rows)[0] / apart
         before = corrected((cause,), before, given)
     return base, moved, shown
 

@@ -614,16 +614,18 @@ def test_a_model_that_has_learned_is_fitted_again_where_that_gains(sea, tmp_path
     run, _ = identify_run(config, sea.store, tmp_path / "mmg")
     done = pipeline.diagnose_run(run.path, sea.store, ["trial_*"], tmp_path / "out")
     held, decision = done.held, done.decision
-    assert labels(decision) == ["current"] and not decision.adapted
-    beside = replace(decision, adapted=True)
-    assert done.verdict.gain.after < min(held.gain(beside).after, held.adapted(beside).after)
+    assert labels(decision) == ["current"]
+    alone, beside = (replace(decision, adapted=a) for a in (False, True))
+    either = held.gain(alone).after, held.gain(beside).after
+    assert decision.adapted == (either[1] < either[0])
+    assert done.verdict.gain.after == min(either) < held.adapted(beside).after
 
     class Better(HeldOut):
         def gain(self, decided):
             return Gain(500.0, 300.0 - 50.0 * decided.adapted + 200.0 * (not decided.named), 0.1,
                         0.5, 18, {})  # fmt: skip
 
-    chosen, found, _ = Better(held.cut, held.before, held.trial).refuted(decision)
+    chosen, found, _ = Better(held.cut, held.before, held.trial).refuted(alone)
     assert chosen.adapted and found.after == 250.0
     after = held.extended(chosen)
     was, now = held.before.theta, after.theta[: len(held.before.theta)]
@@ -883,6 +885,25 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / segments.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
     assert np.corrcoef(between.ravel(), change.ravel())[0, 1] > 0.75
+
+
+def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
+    """(y_T - y_0) / T of a step by h: -h exp(-t/T) / T from the step on. With a lead's difference
+    in it, a step would be a spike, and a rudder recorded in steps would tell of no lag."""
+    seen, ref = sea.done.trial.record, sea.usual
+    time = reference.STEP * 2.0
+    (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
+    assert lag.sizes(ref.setting)[0] == 2.0
+    column = ref.columns.of["rudder_lag"][0] - ref.columns.base
+    step = np.zeros_like(seen.actuator)
+    step[1000:, 0] = 0.2
+    stepped = replace(seen, actuator=step)
+    moved = reference.read(ref.model, ref.setting, stepped, np.array([900]))[1][0, :, 0, column]
+    # straight from row to row: the step is half a row before
+    t = (900 - 1000 + 0.5 + segments.NODE_ROWS * np.arange(len(moved))) * seen.step
+    assert np.abs(moved[t < -0.15]).max() == 0.0
+    after = (t > 0.15) & (t < 5.0 * time)
+    assert moved[after] == pytest.approx(-0.2 * np.exp(-t[after] / time) / time, rel=0.02)
 
 
 # --- traps that make simpler methods invent causes

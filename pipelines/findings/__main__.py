@@ -5,6 +5,8 @@
     python -m pipelines.findings direct      FRT-DS-ESSO --out findings
     python -m pipelines.findings refitted    FRT-DS-ESSO --out findings
     python -m pipelines.findings wind        FRT-DS-ESSO --out findings
+    python -m pipelines.findings faults      FRT-DS-ESSO --out findings
+    python -m pipelines.findings faults-other OTHER-SHIP --out findings
     python -m pipelines.findings milliampere MILLIAMPERE --out findings
     python -m pipelines.findings kvlcc2      KVLCC2      --out findings
 
@@ -19,11 +21,12 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from pipelines.findings import direct, esso_osaka, kvlcc2, milliampere
+from pipelines.findings import direct, esso_osaka, faults, kvlcc2, milliampere
 
 FINDINGS: dict[str, Callable[[Path, Path], str]] = {
     "sensors": esso_osaka.sensors, "published": esso_osaka.published, "direct": direct.direct,
     "refitted": esso_osaka.refitted, "wind": esso_osaka.wind,
+    "faults": faults.esso_osaka, "faults-other": faults.other_ship,
     "milliampere": milliampere.milliampere, "kvlcc2": kvlcc2.kvlcc2,
 }  # fmt: skip
 

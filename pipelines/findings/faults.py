@@ -1,0 +1,161 @@
+"""Known faults, written into measured voyages.
+
+The ship and her model, the waves, the wind and the noise are not ours; one thing is changed in what
+two of her voyages recorded. Her model was learned from the others. What is written is worked out
+here from the table alone, and shares nothing with the causes that are to find it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from pipelines.diagnose import diagnose_run
+from pipelines.esso_osaka import trials_store
+from pipelines.extrapolation import physics
+from pipelines.prepare import expand, ingest_logs
+from shiplog import report
+from shiplog.config import Split
+from shiplog.ingest import ingest
+from shiplog.profile import Profile
+from shiplog.store import Store
+
+Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become
+
+NONE = "none"
+DEGREE = np.pi / 180.0
+# Of a size that a yard would find: (what is written, in the contract's words, and how)
+FAULTS: dict[str, tuple[str, Callable[[Columns, np.ndarray], None]]] = {
+    NONE: ("", lambda c, t: None),
+    "heading_offset": ("angle 3 deg", lambda c, t: _add(c, "heading", 3.0 * DEGREE)),
+    "yaw_rate_bias": ("value 0.3 deg/s", lambda c, t: _add(c, "yaw_rate", 0.3 * DEGREE)),
+    "yaw_rate_scale": ("value 1.06", lambda c, t: _scale(c, "yaw_rate", 1.06)),
+    "clock_offset, position": ("time 0.5 s", lambda c, t: _late(c, t, 0.5, "x0", "y0")),
+    "clock_offset, velocity": ("time 0.5 s", lambda c, t: _late(c, t, 0.5, "surge", "sway")),
+    "antenna_offset": ("x 0.3 m, y -0.25 m", lambda c, t: _antenna(c, 0.3, -0.25)),
+    "rudder_offset": ("3 deg each", lambda c, t: _add(c, "rudder", -3.0 * DEGREE)),
+    "rudder_delay": ("time 1 s", lambda c, t: _late(c, t, -1.0, "rudder")),
+    "rudder_lag": ("time 1.2 s", lambda c, t: _ahead(c, t, 1.2, "rudder")),
+    "thrust_loss": ("factor about 0.85", lambda c, t: _scale(c, "prop", 0.85**-0.5)),
+    "wind_direction_offset": ("angle 12 deg", lambda c, t: _add(c, "wind_angle", 12 * DEGREE)),
+    "wind_speed_scale": ("value 1.15", lambda c, t: _scale(c, "wind_speed", 1.15)),
+}  # fmt: skip
+
+ESSO_TRIAL = ("random_06-Aug-2020_16_24_25_4", "random_06-Aug-2020_16_24_25_6")
+OTHER_TRIAL = ("nominal_4", "nominal_6")
+
+
+def esso_osaka(folder: Path, out: Path) -> str:
+    """Two random voyages of 22 minutes together; the six others are the nominal campaign."""
+    store = trials_store(folder, out)
+    return _table(store, expand([out / "logs"]), "random_*", ESSO_TRIAL, out / "faults")
+
+
+def other_ship(folder: Path, out: Path) -> str:
+    """Two nominal voyages of 50 minutes together, of another simulator's ship; the four others are
+    the nominal campaign."""
+    store, logs = Store(out / "other" / "store"), sorted(folder.glob("*.mcap"))
+    if not store.entries():
+        ingest_logs(logs, str(next(folder.glob("*.toml"))), store)
+    return _table(store, logs, "nominal_*", OTHER_TRIAL, out / "other")
+
+
+def _table(
+    store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path
+) -> str:
+    """A row a fault: what was written, and what was said of it."""
+    of = {path.stem: path for path in logs}
+    others = tuple(n for n in store.select([nominal]) if n not in trial and "+" not in n)
+    run = physics(store, out / "base", Split(training=others, validation=()))
+    profile = store.profile(trial)
+    rows = []
+    for fault, (size, write) in FAULTS.items():
+        folder = out / fault.replace(", ", "-")
+        if not (folder / "verdict.json").exists():
+            names = [_written(store, of[n], profile, fault, write) for n in trial]
+            diagnose_run(run, store, names, folder)
+        said = json.loads((folder / "verdict.json").read_text("utf-8"))
+        rows.append((fault, size, *_said(said, fault)))
+    return report.table(("written", "", "said", "least that would be seen"), rows)
+
+
+def _written(store: Store, log: Path, profile: Profile, fault: str, write) -> str:
+    """The voyage with that fault in the store, under a name of its own."""
+    voyage = ingest(log, profile)
+    seconds = voyage.table["time"].dt.epoch("ns").to_numpy() / 1e9
+    columns = {
+        c.name: c.to_numpy().copy() for c in voyage.table if c.dtype == pl.Float64
+    }  # fmt: skip
+    write(columns, seconds - seconds[0])
+    columns["heading"] = np.angle(np.exp(1j * columns["heading"]))
+    name = f"{voyage.name}+{fault}"
+    table = voyage.table.with_columns(pl.Series(n, v) for n, v in columns.items())
+    contents = replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{fault}")
+    store.add(replace(voyage, name=name, table=table, contents=contents))
+    return name
+
+
+def _said(said: dict, fault: str) -> tuple[str, str]:
+    causes = [
+        f"{c['name']} ({c['probability']:.2f}): " + ", ".join(
+            f"{k} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g})"
+            if isinstance(p["value"], float) else f"{p['value']}"
+            for k, p in c["parameters"].items()
+        )
+        for c in said["causes"]
+    ]  # fmt: skip
+    name, _, channel = fault.partition(", ")
+    least = [
+        ", ".join(f"{k} {p['value']:.2g} {p['unit']}".strip() for k, p in one["parameters"].items())
+        for one in said["limits"]
+        if one["name"] == name and one.get("channel", channel) == channel
+    ]
+    structure = said.get("structure") or {}
+    word = f"{said['verdict']} {structure.get('family', '')}".strip()
+    return "; ".join(causes) or word, "" if causes else "; ".join(least)
+
+
+def _of(c: Columns, name: str) -> list[str]:
+    """Columns of that name or beginning: a ship may have two rudders."""
+    return [n for n in c if n.startswith(name)]
+
+
+def _add(c: Columns, name: str, value: float) -> None:
+    for n in _of(c, name):
+        c[n] += value
+
+
+def _scale(c: Columns, name: str, factor: float) -> None:
+    for n in _of(c, name):
+        c[n] *= factor
+
+
+def _late(c: Columns, t: np.ndarray, seconds: float, *names: str) -> None:
+    """What is shown was so many seconds ago; negative: it is shown before it is so."""
+    for name in names:
+        for n in _of(c, name):
+            c[n] = np.interp(t - seconds, t, c[n])
+
+
+def _ahead(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
+    """What is shown, that the ship's own follows with this time constant; of her own without steps,
+    or what is shown would be a row of spikes."""
+    second = np.ones(11) / 11.0
+    for n in _of(c, name):
+        ends = np.pad(c[n], 10, mode="edge")
+        smooth = np.convolve(np.convolve(ends, second, "valid"), second, "valid")
+        c[n] = smooth + seconds * np.gradient(smooth, t)
+
+
+def _antenna(c: Columns, ahead: float, aside: float) -> None:
+    """It stands so far from where the profile has it: position and velocity are of there."""
+    cos, sin = np.cos(c["heading"]), np.sin(c["heading"])
+    c["x0"] += ahead * cos - aside * sin
+    c["y0"] += ahead * sin + aside * cos
+    c["surge"] -= c["yaw_rate"] * aside
+    c["sway"] += c["yaw_rate"] * ahead
