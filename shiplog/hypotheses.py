@@ -232,6 +232,7 @@ class Trial:
         """The base hypothesis of a trial's products `total` [1 + C, 1 + C] in units; `information`
         [P, P] and `pull` [P] of the first P numbers are what is usual, the included ones join."""
         columns = self.reference.columns
+        total, logdet = self.reference.counts * total, self.reference.counts * logdet
         extra = np.concatenate([columns.of[name] for name in included] or [np.zeros(0, int)])
         chosen = np.concatenate((np.arange(len(total) - 1), extra)).astype(int)
         gram = np.block(

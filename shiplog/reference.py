@@ -97,6 +97,8 @@ class Reference:
                  made on the very data that are diagnosed
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
+    counts       for how much of itself a trial counts: what a network gets wrong lasts as long as
+                 the ship does the same, and each voyage has its own of that
     """
 
     model: Extended
@@ -113,6 +115,7 @@ class Reference:
     modes: Modes | None
     freedom: float
     adapts: bool = False
+    counts: float = 1.0
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -378,7 +381,8 @@ def assume(
     if given:
         start = replace(start, spread=GIVEN * start.spread)
     at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
-    whole = learn(model, setting, start, record, at, kappa=CAREFUL_KAPPA)
+    learned = not (given or isinstance(model.base, MMG))
+    whole = learn(model, setting, start, record, at, kappa=None if learned else CAREFUL_KAPPA)
     unit = whole.columns.unit
     information = np.diag(whole.columns.known.copy())
     base = whole.columns.base
@@ -387,5 +391,5 @@ def assume(
     information[causes, causes] = np.eye(len(unit) - base) * HELD
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
-        adapts=not given,
+        adapts=not given, counts=1.0 / whole.kappa if learned else 1.0,
     )  # fmt: skip

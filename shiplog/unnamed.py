@@ -162,7 +162,7 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
 
     def value(unrest: evidence.Unrest) -> float:
         found = evidence.gram(alone, unrest)
-        return -0.5 * (float(trial.weight @ found.each[:, 0, 0]) + found.logdet)
+        return -0.5 * ref.counts * (float(trial.weight @ found.each[:, 0, 0]) + found.logdet)
 
     isotropic = max(value(trial.unrest.louder(v)) for v in LOUDER)
     best: Pulses | None = None

@@ -655,6 +655,60 @@ def test_of_a_network_that_has_learned_only_what_it_cannot_see_is_asked(sea):
     assert asked["MMG"] == asked["before"] == [*structure.FAMILIES, "controls"]
 
 
+def test_what_a_network_learned_from_counts_for_what_its_voyages_predict_of_each_other(
+    sea, monkeypatch
+):
+    """κ of those voyages and not a careful one; evidence is that of so much less data."""
+    asked = []
+
+    def learn(model, setting, start, record, at=None, kappa=None):
+        asked.append(kappa)
+        return replace(sea.usual, kappa=kappa or 16.0)
+
+    monkeypatch.setattr(reference, "learn", learn)
+    monkeypatch.setattr(reference, "settled", lambda *_, **__: None)
+    start = reference.Start(np.zeros(1), np.ones(1), np.zeros(1), np.ones(1))
+    network = replace(sea.usual.model, base="no MMG")
+    counts = [
+        reference.assume(model, sea.usual.setting, start, sea.done.trial.record, given).counts
+        for model, given in ((network, False), (sea.usual.model, False), (sea.usual.model, True))
+    ]
+    assert counts == [1.0 / 16.0, 1.0, 1.0]
+    assert asked == [None, reference.CAREFUL_KAPPA, reference.CAREFUL_KAPPA]
+
+    point = sea.done.decision.first
+    said = []
+    for count, weight in ((0.25, 1.0), (1.0, 0.25)):
+        trial = Trial(replace(sea.usual, counts=count), sea.done.trial.record)
+        trial._first, trial.weight = point, np.full(len(trial.rows), weight)
+        level = trial.level(point, 1.0, ())
+        found = trial._with(level, "current")
+        said.append((found.evidence - level.value, *found.numbers["current"]))
+    assert said[0] == pytest.approx(said[1])
+
+
+@pytest.mark.parametrize(
+    ("evidence", "after", "left"), [(60.0, 505.0, 0), (61.0, 505.0, 1), (61.0, 610.0, 0)]
+)
+def test_no_voyage_is_held_out_to_a_network_that_has_seen_them_all(sea, evidence, after, left):
+    """Of what is beyond doubt a loss that is sure does not refute it; what does harm, does."""
+    one = replace(sea.done.decision.named[0], evidence=evidence)
+    decision = replace(sea.done.decision, named=(one,))
+
+    class Said(HeldOut):
+        def gain(self, decided):
+            return Gain(500.0, after if decided.named else 500.0, -0.3, -0.005, 18, {})
+
+        def worth(self, rest, decided):
+            return self.gain(decided)
+
+    held = sea.done.held
+    learned = Trial(replace(sea.usual, counts=1.0 / 8.0), sea.done.trial.record)
+    learned._first = sea.done.trial._first
+    assert len(Said(held.cut, held.before, learned).refuted(decision)[0].named) == left
+    assert not Said(held.cut, held.before, sea.done.trial).refuted(decision)[0].named
+
+
 # --- what is hidden, and what is not
 
 

@@ -109,7 +109,9 @@ class HeldOut(Rollouts):
         fault though it is worth nothing, but not where it makes the error more; so is what differs
         from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
         steps of a second hide a lag of a third of one. A model that has learned of it, and gains
-        by being fitted again beside it, is so without each cause, too.
+        by being fitted again beside it, is so without each cause, too. To a network no voyage that
+        it has seen is held out: it is the better without what it has taken in a part of, and what
+        is beyond doubt is named.
         """
         dropped: dict[str, str] = {}
         if not decision.named:
@@ -134,7 +136,8 @@ class HeldOut(Rollouts):
             gains = worth.reduction >= (0.0 if alone else WORTH)
             if gains and not (alone and one.evidence < diagnose.MORE):
                 break
-            if not harm and worth.high > (0.0 if alone else WORTH) and self._sure(one, alone):
+            open_ = worth.high > (0.0 if alone else WORTH) or self.trial.reference.counts < 1.0
+            if not harm and open_ and self._sure(one, alone):
                 break
             why = f"{worth.reduction:+.1%}"
             if gains:
@@ -156,9 +159,11 @@ class HeldOut(Rollouts):
         )  # fmt: skip
 
     def _sure(self, one: Named, alone: bool) -> bool:
-        """Whether it differs from her nominal campaign beyond doubt."""
+        """Whether it differs from her nominal campaign beyond doubt, or from what a network has
+        learned."""
+        ref = self.trial.reference
         wanted = diagnose.SURE * (1.0 if alone else BESIDE)
-        return self.trial.reference.nominal is not None and one.evidence > wanted
+        return (ref.nominal is not None or ref.counts < 1.0) and one.evidence > wanted
 
     def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
         """Beside a model that nobody fitted: instruments by evidence, and of the causes of the
