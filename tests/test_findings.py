@@ -5,7 +5,8 @@ import polars as pl
 import pytest
 
 from pipelines.convert import convert
-from pipelines.findings import kvlcc2, milliampere
+from pipelines.demo import sample_logs
+from pipelines.findings import faults, kvlcc2, milliampere
 from pipelines.prepare import expand, ingest_logs
 from shiplog import parity
 from shiplog import profile as profiles
@@ -67,3 +68,59 @@ def test_marin_at_hsvas_scale_keeps_what_froude_keeps(shared_data):
     seconds = turned["t_s"].to_numpy()
     swept = float(np.sum(0.5 * (rate[1:] + rate[:-1]) * np.diff(seconds)))
     assert swept == pytest.approx(heading[-1] - heading[0], rel=0.03)  # the time is scaled with it
+
+
+# --- faults written into measured voyages
+
+
+def turning(seconds: float = 60.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """A ship on a circle of 10 m at 0.5 m/s, 10 Hz, her rudder a slow sine."""
+    t = np.arange(0.0, seconds, 0.1)
+    heading = 0.05 * t
+    return t, {
+        "x0": 10.0 * np.sin(heading), "y0": -10.0 * np.cos(heading), "heading": heading,
+        "surge": np.full_like(t, 0.5), "sway": np.zeros_like(t), "yaw_rate": np.full_like(t, 0.05),
+        "rudder_port": np.sin(0.2 * t), "rudder_starboard": np.sin(0.2 * t),
+    }  # fmt: skip
+
+
+def test_a_moved_antenna_moves_as_its_velocity_says():
+    t, c = turning()
+    faults._antenna(c, 0.3, -0.25)
+    north, east = np.gradient(c["x0"], t), np.gradient(c["y0"], t)
+    cos, sin = np.cos(c["heading"]), np.sin(c["heading"])
+    inner = slice(1, -1)
+    assert (cos * north + sin * east)[inner] == pytest.approx(c["surge"][inner], abs=1e-5)
+    assert (cos * east - sin * north)[inner] == pytest.approx(c["sway"][inner], abs=1e-5)
+    assert c["surge"][0] == pytest.approx(0.5 + 0.05 * 0.25) and c["sway"][0] == 0.05 * 0.3
+
+
+def test_what_is_late_was_so_before_and_what_lags_follows():
+    t, c = turning()
+    faults._late(c, t, -1.0, "rudder")
+    assert c["rudder_port"][:500] == pytest.approx(np.sin(0.2 * (t[:500] + 1.0)), abs=1e-3)
+    t, c = turning()
+    faults._ahead(c, t, 1.2, "rudder")
+    # x = y + T y' of a sine; the averaging over a second, twice, takes 0.4 % off
+    assert c["rudder_starboard"][20:-20] == pytest.approx(
+        (np.sin(0.2 * t) + 0.24 * np.cos(0.2 * t))[20:-20], abs=0.006
+    )
+    assert c["surge"] == pytest.approx(0.5)
+
+
+def test_a_fault_is_written_into_a_voyage_of_its_own_and_nowhere_else(tmp_path):
+    log = sample_logs() / "voyage_1.mcap"
+    store = Store(tmp_path / "store")
+    ingest_logs([log], None, store)
+    profile = store.profile(["voyage_1"])
+    before = store.tables(["voyage_1"])[0].collect()
+    _, write = faults.FAULTS["yaw_rate_bias"]
+    name = faults._written(store, log, profile, "yaw_rate_bias", write)
+    assert store.select() == ["voyage_1", name]
+    assert store.tables(["voyage_1"])[0].collect().equals(before)
+    after = store.tables([name])[0].collect()
+    assert (after["yaw_rate"] - before["yaw_rate"]).to_numpy() == pytest.approx(np.radians(0.3))
+    same = [n for n in before.columns if n not in ("voyage", "yaw_rate", "heading")]
+    assert after.select(same).equals(before.select(same))
+    turned = np.exp(1j * (after["heading"] - before["heading"]).to_numpy())
+    assert np.nanmax(np.abs(turned - 1.0)) < 1e-12

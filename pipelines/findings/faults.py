@@ -95,8 +95,12 @@ def _written(store: Store, log: Path, profile: Profile, fault: str, write) -> st
     columns["heading"] = np.angle(np.exp(1j * columns["heading"]))
     name = f"{voyage.name}+{fault}"
     table = voyage.table.with_columns(pl.Series(n, v) for n, v in columns.items())
-    contents = replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{fault}")
-    store.add(replace(voyage, name=name, table=table, contents=contents))
+    store.add(
+        replace(
+            voyage, name=name, table=table, report=replace(voyage.report, name=name),
+            contents=replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{fault}"),
+        )
+    )  # fmt: skip
     return name
 
 
