@@ -709,6 +709,32 @@ def test_no_voyage_is_held_out_to_a_network_that_has_seen_them_all(sea, evidence
     assert not Said(held.cut, held.before, sea.done.trial).refuted(decision)[0].named
 
 
+@pytest.mark.parametrize(
+    ("counts", "low", "left"),
+    [(1.0, 0.01, 1), (1.0, -0.01, 0), (0.1, 0.03, 1), (0.1, 0.01, 0)],
+)
+def test_little_evidence_beside_another_fit_is_named_where_the_gain_is_sure(sea, counts, low, left):
+    """What a model fitted again gains alone is taken off first. To a network that has seen these
+    windows 1 % is no gain."""
+    one = replace(sea.done.decision.named[0], evidence=12.0)
+    decision = replace(sea.done.decision, named=(one,))
+
+    class Said(HeldOut):
+        def gain(self, decided):
+            return Gain(500.0, 400.0 - 50.0 * decided.adapted, 0.1, 0.4, 18, {})
+
+        def worth(self, rest, decided):
+            assert decided.adapted
+            return Gain(400.0, 350.0, low, 0.2, 18, {})
+
+    held = sea.done.held
+    learned = Trial(replace(sea.usual, adapts=True, counts=counts), sea.done.trial.record)
+    learned._first = sea.done.trial._first
+    rest, _, dropped = Said(held.cut, held.before, learned).refuted(decision)
+    assert len(rest.named) == left
+    assert left or "none that is sure" in dropped["current"]
+
+
 # --- what is hidden, and what is not
 
 

@@ -110,13 +110,15 @@ class HeldOut(Rollouts):
         from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
         steps of a second hide a lag of a third of one. A model that has learned of it, and gains
         by being fitted again beside it, is so without each cause, too. To a network no voyage that
-        it has seen is held out: it is the better without what it has taken in a part of, and what
-        is beyond doubt is named.
+        it has seen is held out: it is the better without what it has taken in a part of, so that
+        what is beyond doubt is named; and a gain must be worth something to be sure.
         """
         dropped: dict[str, str] = {}
         if not decision.named:
             return decision, None, dropped
         found = self.gain(decision)
+        learned = self.trial.reference.counts < 1.0
+        worthy = WORTH if learned else 0.0
         if self.trial.reference.adapts:
             beside = replace(decision, adapted=True)
             again = self.gain(beside)
@@ -126,7 +128,7 @@ class HeldOut(Rollouts):
             harm = found.after > HARM * found.before
             asked = [n for n in decision.named if harm or not n.cause.only_read]
             alone = len(decision.named) == 1
-            if not asked or (found.real and alone and not decision.adapted):
+            if not asked or (found.low > worthy and alone and not decision.adapted):
                 break
             tried = []
             for one in asked:
@@ -134,10 +136,10 @@ class HeldOut(Rollouts):
                 tried.append((self.worth(rest, decision), rest, one))
             worth, rest, one = min(tried, key=lambda t: t[0].before)
             gains = worth.reduction >= (0.0 if alone else WORTH)
-            if gains and not (alone and one.evidence < diagnose.MORE):
+            if gains and (worth.low > worthy or not alone or one.evidence >= diagnose.MORE):
                 break
-            open_ = worth.high > (0.0 if alone else WORTH) or self.trial.reference.counts < 1.0
-            if not harm and open_ and self._sure(one, alone):
+            undecided = worth.high > (0.0 if alone else WORTH) or learned
+            if not harm and undecided and self._sure(one, alone):
                 break
             why = f"{worth.reduction:+.1%}"
             if gains:
