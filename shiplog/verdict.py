@@ -17,6 +17,7 @@ from shiplog.gain import Gain
 from shiplog.unseen import Dependence
 
 SHARE_SAID = 0.01  # of a ranking
+SURELY = 0.9  # probability from which on a sentence is said without it
 HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
 NINETY = 1.645  # standard deviations to either end of a 90 % interval
 
@@ -233,7 +234,7 @@ def sentence(
 ) -> str:
     """The verdict in a sentence."""
     if verdict == "named":
-        said = " ".join(_or(cause) for cause in causes)
+        said = " ".join(_likely(cause) for cause in causes)
         if gain is None:
             return said
         if not gain.real:
@@ -293,6 +294,14 @@ def remains(decision: Decision, verdict: str) -> list[str]:
         f"Something else remains: it depends on {strongest.name} "
         f"({strongest.evidence:.0f} nats beyond what is named) and has no name here."
     ]
+
+
+def _likely(cause: dict) -> str:
+    """A cause's sentence, and how sure it is where it is not."""
+    if cause["probability"] >= SURELY:
+        return _or(cause)
+    how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
+    return f"{how}, and not surely ({cause['probability']:.0%}): {_or(cause)}"
 
 
 def _or(cause: dict) -> str:

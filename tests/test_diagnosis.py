@@ -374,7 +374,10 @@ def test_a_second_cause_that_is_refuted_takes_along_what_it_beat(sea, evidence, 
 
 def test_what_it_may_be_instead_is_in_the_sentence():
     """A name alone would say more than is known; and a gain below nothing is a loss."""
-    lag = {"sentence": "The rudders lag.", "indistinguishable_from": ["rudder_delay"]}
+    lag = {
+        "sentence": "The rudders lag.", "indistinguishable_from": ["rudder_delay"],
+        "probability": 0.9,
+    }  # fmt: skip
     said = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
     assert said == (
         "The rudders lag; or it is rudder_delay: these data cannot tell. "
@@ -386,6 +389,9 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         "The rudders lag. With it in the model, the error on 18 held-out windows falls by 20% "
         "(10% to 30%)."
     )
+    for probability, begins in ((0.53, "Likely, and not surely (53%): "), (0.4, "Perhaps, and ")):
+        said = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
+        assert said.startswith(begins) and "The rudders lag. With it" in said
 
 
 def test_the_manoeuvre_that_separates_is_the_seamans(sea):
