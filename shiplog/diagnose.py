@@ -33,6 +33,8 @@ PULSED = 40.0  # nats that pulses must bring beyond louder unrest
 TEMPERATURE = 2.0  # nats: at 3, 176 of 177 blind cases said with 0.9 and more were right
 ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
+EXCHANGE = 2.0  # nats that a cause must bring in another one's place
+MOVED = "motion"  # what a thruster that nobody records changes itself
 SETTLED = 3  # contenders that are linearised again
 SHARE = 0.3  # of the best one's evidence that makes a contender
 
@@ -86,6 +88,7 @@ class _Search:
         self.remains: list[Found] = []
         self.start = (point, self.base)
         self.rival: Found | None = None  # the best structure before the first cause was named
+        self.first = ""  # the cause whose probability is of the ranking
 
     @property
     def stochastic(self) -> float:
@@ -102,7 +105,7 @@ class _Search:
 
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
-        self.remains = self.structures.found(self.point, self.base, self.included)
+        self.remains = self._unexplained()
         if self._pulses():
             return True
         if self._poses():
@@ -122,6 +125,13 @@ class _Search:
             return False
         self._take(settled, gain)
         return True
+
+    def _unexplained(self) -> list[Found]:
+        """What unknown structures explain beside all that was found. Beside a thruster that nobody
+        records none of motion is asked: it moves the ship as no model knows, and what is left of
+        that goes with her motion."""
+        found = self.structures.found(self.point, self.base, self.included)
+        return found if self.pulses is None else [f for f in found if f.name != MOVED]
 
     def _pulses(self) -> bool:
         """Whether a force that comes and goes explains the unrest better than all else. What a
@@ -224,6 +234,8 @@ class _Search:
             self.rival = max(self.remains, key=lambda f: f.evidence, default=None)
         self.point, self.base = settled[0]
         label = _last(self.base)
+        if self.pulses is None:
+            self.first = self.first or label
         less = {_last(one): self.base.evidence - one.evidence for _, one in settled[1:]}
         self.steps[label] = (gain, less)
         for other, nats in less.items():
@@ -260,26 +272,52 @@ class _Search:
         first one that is not had of evidence and probability is the next one's."""
         fixed = len(self.trial.fixed)
         while len(self.included) - fixed > 1:
-            losses = {}
+            losses, instead = {}, []
             for label in self.included[fixed:]:
                 rest = tuple(n for n in self.included if n != label)
                 numbers = {n: self.base.numbers[n] for n in rest}
                 point, base = self.trial.settle(rest, numbers, self.point.path)
                 losses[label] = (self.base.evidence - base.evidence, point, base, rest)
+                others = [c for c in self._left(rest) if c.label != label]
+                _, found = self.trial.scan(point, others, rest)
+                instead += [(f.evidence - losses[label][0], label, f) for f in found[:1]]
             label = min(losses, key=lambda n: losses[n][0])
             loss, point, base, rest = losses[label]
             if loss >= LEAST:
+                if self._exchanged(max(instead, key=lambda one: one[0]), losses):
+                    continue
                 break
             less = max(loss, 0.0)
             self.rejected[label] = f"without it the others explain all but {less:.0f} nats"
-            first = label == self.included[fixed]
-            gone = self.steps.pop(label, None)
+            gone, _ = self.steps.pop(label)
             self.included, self.point, self.base = rest, point, base
-            if first and gone is not None:
-                heir = rest[fixed]
-                gain, beaten = self.steps[heir]
-                self.steps[heir] = (gone[0] + gain - loss, beaten)
-                self._inherits(heir, label)
+            if label == self.first:
+                self.first = rest[fixed]
+                gain, beaten = self.steps[self.first]
+                self.steps[self.first] = (gone + gain - loss, beaten)
+                self._inherits(self.first, label)
+
+    def _exchanged(self, best: tuple[float, str, Found], losses: dict) -> bool:
+        """Whether another cause explains more in the place of one that is named: the first was
+        chosen while it had to explain the others' part, too."""
+        lead, label, other = best
+        if lead < -CONTENDS:
+            return False
+        loss, point, base, rest = losses[label]
+        numbers = {**base.numbers, **other.numbers}
+        at, fitted = self.trial.settle((*rest, other.name), numbers, point.path)
+        more = fitted.evidence - self.base.evidence
+        if not more > EXCHANGE:
+            return False
+        self.rejected[label] = f"beside the others {other.name} explains {more:.0f} nats more"
+        self.rejected.pop(other.name, None)
+        self.steps.pop(label)
+        self.steps[other.name] = (loss + more, {label: more})
+        if label == self.first:
+            self.first = other.name
+            self._inherits(other.name, label)
+        self.included, self.point, self.base = tuple(fitted.numbers), at, fitted
+        return True
 
     def named(self) -> tuple[Named, ...]:
         by = {c.label: c for c in self.trial.reference.model.causes}
@@ -296,7 +334,7 @@ class _Search:
             alike = tuple(other for other, nats in less.items() if nats < ALIKE)
             found.append(
                 Named(
-                    cause, gain, sure if found else self.ranking.get(label, sure),
+                    cause, gain, self.ranking.get(label, sure) if label == self.first else sure,
                     np.asarray(self.base.numbers[label]), self.base.covariance[part, part], alike,
                     less, self.trial.reference.freedom,
                 )

@@ -98,7 +98,8 @@ class Reference:
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
     counts       for how much of itself a trial counts: what a network gets wrong lasts as long as
-                 the ship does the same, and each voyage has its own of that
+                 the ship does the same, and each voyage has its own of that; what is hidden, too,
+                 makes voyages unlike, so that it is no less than of a careful κ
     """
 
     model: Extended
@@ -391,5 +392,5 @@ def assume(
     information[causes, causes] = np.eye(len(unit) - base) * HELD
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
-        adapts=not given, counts=1.0 / whole.kappa if learned else 1.0,
+        adapts=not given, counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if learned else 1.0,
     )  # fmt: skip

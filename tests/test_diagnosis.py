@@ -552,7 +552,7 @@ def test_what_is_not_missed_leaves_evidence_and_probability_to_what_explains_it(
     search = diagnose._Search(trial, decision.first, ())
     search.included = ("current", "heading_offset")
     search.steps = {"current": (90.0, {}), "heading_offset": (40.0, {})}
-    search.ranking = {"current": 0.9, "heading_offset": 0.1}
+    search.first, search.ranking = "current", {"current": 0.9, "heading_offset": 0.1}
     both = dict.fromkeys(search.included, np.zeros(1))
     search.base = replace(search.base, evidence=1000.0, numbers=both)
     missed = {"current": 130.0, "heading_offset": loss}  # of what is left alone
@@ -566,7 +566,52 @@ def test_what_is_not_missed_leaves_evidence_and_probability_to_what_explains_it(
         return
     assert search.included == ("heading_offset",) and list(search.rejected) == ["current"]
     assert search.steps == {"heading_offset": (126.0, {})}
+    assert search.first == "heading_offset"
     assert search.ranking == {"heading_offset": pytest.approx(1.0)}
+
+
+@pytest.mark.parametrize(
+    ("more", "linear", "taken"), [(3.0, 9.0, True), (1.0, 9.0, False), (3.0, 7.0, False)]
+)
+def test_a_cause_that_explains_more_beside_the_others_takes_the_place_of_one(
+    compass, monkeypatch, more, linear, taken
+):
+    """A first cause of 90 nats had to explain the second one's part, too. Beside that, linearised
+    once, the other one explains 9 nats where the first would be missed by 10: worth a look."""
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    search.included = ("current", "heading_offset")
+    search.steps = {"current": (90.0, {}), "heading_offset": (40.0, {})}
+    search.first, search.ranking = "current", {"current": 0.9, "heading_offset": 0.1}
+    search.rejected = {"fouling": "current explains 5 nats more"}
+    none = {n: np.zeros(1) for n in ("current", "heading_offset", "fouling")}
+    search.base = replace(
+        search.base, evidence=1000.0, numbers={n: none[n] for n in search.included}
+    )
+    worth = {
+        ("heading_offset",): 990.0, ("current",): 870.0, ("fouling",): 869.0,
+        ("heading_offset", "fouling"): 1000.0 + more,
+    }  # fmt: skip
+
+    def settle(labels, *_):
+        numbers = {n: none[n] for n in labels}
+        return decision.first, Found("+".join(labels), worth[labels], 1.0, numbers)
+
+    def scan(point, causes, included):
+        assert included[0] not in [c.label for c in causes]
+        nats = {"heading_offset": linear, "current": 20.0}.get(included[0], 0.0)
+        return search.base, [Found("fouling", nats, 1.0, {"fouling": none["fouling"]})]
+
+    monkeypatch.setattr(trial, "settle", settle)
+    monkeypatch.setattr(trial, "scan", scan)
+    search.backwards()
+    if not taken:
+        assert search.included == ("current", "heading_offset") and search.first == "current"
+        return
+    assert search.included == ("heading_offset", "fouling") and search.first == "fouling"
+    assert search.ranking == {"fouling": pytest.approx(0.9), "heading_offset": 0.1}
+    assert search.steps["fouling"] == (13.0, {"current": 3.0})
+    assert list(search.rejected) == ["current"]
 
 
 @pytest.mark.parametrize("rough", (False, True))
@@ -600,6 +645,25 @@ def test_a_thruster_beside_a_cause_is_asked_before_a_structure_takes_the_place_o
     assert search.one_more() == found
     assert (search.pulses is not None, search.structure is not None) == (found, not found)
     assert search.included == (("heading_offset",) if found else ())
+    assert search.first == "heading_offset"
+
+
+def test_beside_a_thruster_none_of_its_own_motion_is_asked_and_a_cause_has_its_own_odds(
+    compass, monkeypatch
+):
+    """The first step was the thruster's: what it left to causes is none of their probability."""
+    trial, decision = compass
+    monkeypatch.setattr(
+        unnamed.Structures, "found",
+        lambda *_: [Found("motion", 9000.0, 1.0), Found("time", -1.0, 1.0)],
+    )  # fmt: skip
+    search = diagnose._Search(trial, decision.first, ())
+    search.pulses = unnamed.Pulses(0.0, 900.0, 0.0, 1.0, np.array([0.0, 0.01, 0.0]))
+    assert search.one_more()
+    assert [f.name for f in search.remains] == ["time"]
+    (one,) = search.named()
+    assert one.cause.label == "heading_offset" and one.probability > 0.99
+    assert search.ranking["heading_offset"] < 0.01
 
 
 def test_what_a_rough_form_leaves(sea):
@@ -669,7 +733,7 @@ def test_what_a_network_learned_from_counts_for_what_its_voyages_predict_of_each
 
     def learn(model, setting, start, record, at=None, kappa=None):
         asked.append(kappa)
-        return replace(sea.usual, kappa=kappa or 16.0)
+        return replace(sea.usual, kappa=kappa or 8.0)
 
     monkeypatch.setattr(reference, "learn", learn)
     monkeypatch.setattr(reference, "settled", lambda *_, **__: None)
@@ -679,7 +743,7 @@ def test_what_a_network_learned_from_counts_for_what_its_voyages_predict_of_each
         reference.assume(model, sea.usual.setting, start, sea.done.trial.record, given).counts
         for model, given in ((network, False), (sea.usual.model, False), (sea.usual.model, True))
     ]
-    assert counts == [1.0 / 16.0, 1.0, 1.0]
+    assert counts == [1.0 / 8.0, 1.0, 1.0]
     assert asked == [None, reference.CAREFUL_KAPPA, reference.CAREFUL_KAPPA]
 
     point = sea.done.decision.first
