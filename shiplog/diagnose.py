@@ -141,7 +141,7 @@ class _Search:
         tried = unnamed.pulses(self.trial, self.point, self.base)
         rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]
         if self.rival is not None:  # it may do without cause and thruster
-            rivals.append(self.rival.evidence + SURE - self._first_gain)
+            rivals.append(self.rival.evidence + SURE - self.steps[self.first][0])
         if tried.gain <= max(PULSED, *rivals):
             return False
         self.rival = None
@@ -151,11 +151,6 @@ class _Search:
             self.point, self._left(self.included), self.included
         )
         return True
-
-    @property
-    def _first_gain(self) -> float:
-        """Nats of what was named first."""
-        return next(iter(self.steps.values()))[0]
 
     def _structure(self, settled: Sequence[tuple[Point, Found]], gain: float) -> bool:
         """Whether an unknown structure explains far more than the best cause; or, where not much
@@ -284,7 +279,7 @@ class _Search:
             label = min(losses, key=lambda n: losses[n][0])
             loss, point, base, rest = losses[label]
             if loss >= LEAST:
-                if self._exchanged(max(instead, key=lambda one: one[0]), losses):
+                if instead and self._exchanged(max(instead, key=lambda one: one[0]), losses):
                     continue
                 break
             less = max(loss, 0.0)

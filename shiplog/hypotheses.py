@@ -230,7 +230,8 @@ class Trial:
         pull: np.ndarray,
     ) -> Level:
         """The base hypothesis of a trial's products `total` [1 + C, 1 + C] in units; `information`
-        [P, P] and `pull` [P] of the first P numbers are what is usual, the included ones join."""
+        [P, P] and `pull` [P] of the first P numbers are what is usual, the included ones join. The
+        trial counts for as much of itself as the reference says."""
         columns = self.reference.columns
         total, logdet = self.reference.counts * total, self.reference.counts * logdet
         extra = np.concatenate([columns.of[name] for name in included] or [np.zeros(0, int)])

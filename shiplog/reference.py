@@ -98,8 +98,7 @@ class Reference:
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
     counts       for how much of itself a trial counts: what a network gets wrong lasts as long as
-                 the ship does the same, and each voyage has its own of that; what is hidden, too,
-                 makes voyages unlike, so that it is no less than of a careful κ
+                 the ship does the same, and each voyage has its own of that
     """
 
     model: Extended
@@ -117,6 +116,11 @@ class Reference:
     freedom: float
     adapts: bool = False
     counts: float = 1.0
+
+    @property
+    def learned(self) -> bool:
+        """Whether the model is a network that has seen the very voyages in question."""
+        return self.adapts and not isinstance(self.model.base, MMG)
 
     @cached_property
     def mean(self) -> np.ndarray:

@@ -13,7 +13,6 @@ import numpy as np
 from shiplog import evidence, reference, structure
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
-from shiplog.models.mmg.model import MMG
 from shiplog.structure import Basis, Products
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
@@ -58,12 +57,11 @@ class Structures:
         if ref.nominal is not None:
             usual = structure.at_knots(ref.nominal.cut, trial.grid)
         both = [k for k in (usual, here) if k]
-        learned = ref.adapts and not isinstance(ref.model.base, MMG)
         bases: list[tuple[str, Basis | Products | None]] = [
             (name, structure.basis(name, trial.record, *both))
-            for name in (structure.UNSEEN if learned else structure.FAMILIES)
+            for name in (structure.UNSEEN if ref.learned else structure.FAMILIES)
         ]
-        if not learned:
+        if not ref.learned:
             bases.append(("controls", structure.products(trial.record, *both)))
         self.families: list[Family] = []
         for name, basis in bases:

@@ -773,7 +773,9 @@ def test_no_voyage_is_held_out_to_a_network_that_has_seen_them_all(sea, evidence
             return self.gain(decided)
 
     held = sea.done.held
-    learned = Trial(replace(sea.usual, counts=1.0 / 8.0), sea.done.trial.record)
+    network = replace(sea.usual.model, base="no MMG")
+    seen = replace(sea.usual, adapts=True, counts=1.0 / 8.0, model=network)
+    learned = Trial(seen, sea.done.trial.record)
     learned._first = sea.done.trial._first
     assert len(Said(held.cut, held.before, learned).refuted(decision)[0].named) == left
     assert not Said(held.cut, held.before, sea.done.trial).refuted(decision)[0].named
@@ -798,7 +800,9 @@ def test_little_evidence_beside_another_fit_is_named_where_the_gain_is_sure(sea,
             return Gain(400.0, 350.0, low, 0.2, 18, {})
 
     held = sea.done.held
-    learned = Trial(replace(sea.usual, adapts=True, counts=counts), sea.done.trial.record)
+    model = sea.usual.model if counts == 1.0 else replace(sea.usual.model, base="no MMG")
+    seen = replace(sea.usual, adapts=True, counts=counts, model=model)
+    learned = Trial(seen, sea.done.trial.record)
     learned._first = sea.done.trial._first
     rest, _, dropped = Said(held.cut, held.before, learned).refuted(decision)
     assert len(rest.named) == left

@@ -117,8 +117,8 @@ class HeldOut(Rollouts):
         if not decision.named:
             return decision, None, dropped
         found = self.gain(decision)
-        learned = self.trial.reference.counts < 1.0
-        worthy = WORTH if learned else 0.0
+        learned = self.trial.reference.learned
+        surely = WORTH if learned else 0.0
         if self.trial.reference.adapts:
             beside = replace(decision, adapted=True)
             again = self.gain(beside)
@@ -128,7 +128,7 @@ class HeldOut(Rollouts):
             harm = found.after > HARM * found.before
             asked = [n for n in decision.named if harm or not n.cause.only_read]
             alone = len(decision.named) == 1
-            if not asked or (found.low > worthy and alone and not decision.adapted):
+            if not asked or (found.low > surely and alone and not decision.adapted):
                 break
             tried = []
             for one in asked:
@@ -136,7 +136,7 @@ class HeldOut(Rollouts):
                 tried.append((self.worth(rest, decision), rest, one))
             worth, rest, one = min(tried, key=lambda t: t[0].before)
             gains = worth.reduction >= (0.0 if alone else WORTH)
-            if gains and (worth.low > worthy or not alone or one.evidence >= diagnose.MORE):
+            if gains and (worth.low > surely or not alone or one.evidence >= diagnose.MORE):
                 break
             undecided = worth.high > (0.0 if alone else WORTH) or learned
             if not harm and undecided and self._sure(one, alone):
@@ -165,7 +165,7 @@ class HeldOut(Rollouts):
         learned."""
         ref = self.trial.reference
         wanted = diagnose.SURE * (1.0 if alone else BESIDE)
-        return (ref.nominal is not None or ref.counts < 1.0) and one.evidence > wanted
+        return (ref.nominal is not None or ref.learned) and one.evidence > wanted
 
     def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
         """Beside a model that nobody fitted: instruments by evidence, and of the causes of the

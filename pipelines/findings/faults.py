@@ -18,6 +18,7 @@ import polars as pl
 from pipelines.diagnose import diagnose_run
 from pipelines.esso_osaka import trials_store
 from pipelines.extrapolation import physics
+from pipelines.findings.said import parameters, unit
 from pipelines.prepare import expand, ingest_logs
 from shiplog import report
 from shiplog.config import Split
@@ -27,11 +28,10 @@ from shiplog.store import Store
 
 Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become
 
-NONE = "none"
 DEGREE = np.pi / 180.0
 # Of a size that a yard would find: (what is written, in the contract's words, and how)
 FAULTS: dict[str, tuple[str, Callable[[Columns, np.ndarray], None]]] = {
-    NONE: ("", lambda c, t: None),
+    "none": ("", lambda c, t: None),
     "heading_offset": ("angle 3 deg", lambda c, t: _add(c, "heading", 3.0 * DEGREE)),
     "yaw_rate_bias": ("value 0.3 deg/s", lambda c, t: _add(c, "yaw_rate", 0.3 * DEGREE)),
     "yaw_rate_scale": ("value 1.06", lambda c, t: _scale(c, "yaw_rate", 1.06)),
@@ -81,16 +81,14 @@ def _table(
             diagnose_run(run, store, names, folder)
         said = json.loads((folder / "verdict.json").read_text("utf-8"))
         rows.append((fault, size, *_said(said, fault)))
-    return report.table(("written", "", "said", "least that would be seen"), rows)
+    return report.table(("written", "size", "said", "least that would be seen"), rows)
 
 
 def _written(store: Store, log: Path, profile: Profile, fault: str, write) -> str:
     """The voyage with that fault in the store, under a name of its own."""
     voyage = ingest(log, profile)
     seconds = voyage.table["time"].dt.epoch("ns").to_numpy() / 1e9
-    columns = {
-        c.name: c.to_numpy().copy() for c in voyage.table if c.dtype == pl.Float64
-    }  # fmt: skip
+    columns = {c.name: c.to_numpy().copy() for c in voyage.table if c.dtype == pl.Float64}
     write(columns, seconds - seconds[0])
     columns["heading"] = np.angle(np.exp(1j * columns["heading"]))
     name = f"{voyage.name}+{fault}"
@@ -106,16 +104,12 @@ def _written(store: Store, log: Path, profile: Profile, fault: str, write) -> st
 
 def _said(said: dict, fault: str) -> tuple[str, str]:
     causes = [
-        f"{c['name']} ({c['probability']:.2f}): " + ", ".join(
-            f"{k} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g})"
-            if isinstance(p["value"], float) else f"{p['value']}"
-            for k, p in c["parameters"].items()
-        )
+        f"{c['name']} ({c['probability']:.2f}): {parameters(c['parameters'])}"
         for c in said["causes"]
-    ]  # fmt: skip
+    ]
     name, _, channel = fault.partition(", ")
     least = [
-        ", ".join(f"{k} {p['value']:.2g} {p['unit']}".strip() for k, p in one["parameters"].items())
+        ", ".join(f"{k} {p['value']:.2g} {unit(p)}".strip() for k, p in one["parameters"].items())
         for one in said["limits"]
         if one["name"] == name and one.get("channel", channel) == channel
     ]

@@ -33,7 +33,7 @@ def diagnosed(
     said = json.loads((out / "verdict.json").read_text("utf-8"))
     lines = [f"## {run.name}, {what}", "", f"{said['verdict']}: {said['sentence']}", ""]
     for cause in said["causes"]:
-        lines.append(f"- {cause['name']}: {_parameters(cause['parameters'])}")
+        lines.append(f"- {cause['name']}: {parameters(cause['parameters'])}")
     gain = said.get("gain")
     if gain:
         lines.append(
@@ -57,13 +57,19 @@ def diagnosed(
     return "\n".join(lines)
 
 
-def _parameters(parameters: dict) -> str:
+def parameters(said: dict) -> str:
+    """A cause's numbers with their 90 % intervals and units, in a line."""
     return ", ".join(
-        f"{name} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g}) {p['unit']}".strip()
+        f"{name} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g}) {unit(p)}".strip()
         if not isinstance(p["value"], str)
         else f"{name} {p['value']}"
-        for name, p in parameters.items()
+        for name, p in said.items()
     )
+
+
+def unit(parameter: dict) -> str:
+    """As it is written after a number; of a bare one nothing."""
+    return "" if parameter["unit"] == "1" else parameter["unit"]
 
 
 def variant(profile: str, path: Path, edit: Callable[[dict], None]) -> Path:
