@@ -122,8 +122,10 @@ def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | N
     grid = segments.grid(recorded)
     path = segments.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
     linear = segments.linear(ref.model, whole, cut, grid, path, moved, shown)
-    grams = evidence.gram(evidence.weighed(linear, ref.unrest), ref.unrest)
-    each = grams.scaled(ref.columns.unit).each
+    modes = evidence.modes(evidence.weighed(linear, ref.unrest), ref.unrest)
+    if ref.misfit is not None:
+        modes = modes.beside(ref.misfit.pushed(cut, grid))
+    each = modes.gram().scaled(ref.columns.unit).each
     found: list[np.ndarray | None] = []
     for i in range(len(MANOEUVRES)):
         own = each[cut.voyage == i]

@@ -67,6 +67,7 @@ class Decision:
     told       label → what these data would tell of each cause, were it there
     apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
     adapted    whether the model's own coefficients are fitted again beside what is named
+    least      nats that the first cause had to bring
     """
 
     verdict: str
@@ -85,13 +86,14 @@ class Decision:
     told: Mapping[str, Told] = field(default_factory=dict)
     apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     adapted: bool = False
+    least: float = LEAST
 
     @property
     def hidden(self) -> dict[str, float]:
         """Label → share of its plausible sizes at which these data would not show it."""
         low, high = (math.log(size) for size in SIZES)
         return {
-            label: min(max((math.log(told.together(LEAST)) - low) / (high - low), 0.0), 1.0)
+            label: min(max((math.log(told.together(self.least)) - low) / (high - low), 0.0), 1.0)
             for label, told in self.told.items()
         }
 

@@ -19,6 +19,7 @@ from shiplog.decision import LEAST, PULSES, Decision, Named, Structure
 from shiplog.hypotheses import Found, Point, Trial
 from shiplog.unnamed import Pulses
 
+LEARNED = 40.0  # that the first one must beside a network that has learned from these voyages
 CONTENDS = 2.0  # nats from which on a cause is linearised again
 MORE = 25.0  # that one must whose gain is not sure
 FURTHER = 30.0  # that each further one must: small evidence follows large ones about
@@ -64,6 +65,7 @@ def decide(trial: Trial, point: Point, banned: Collection[str] = ()) -> Decision
     return Decision(
         verdict, real, structure, search.pulses, traces, search.rejected, search.ranking,
         base.louder, search.point, base, point, nothing, tuple(search.remains), search.told,
+        least=search.least,
     )  # fmt: skip
 
 
@@ -72,6 +74,7 @@ class _Search:
 
     def __init__(self, trial: Trial, point: Point, banned: Collection[str]) -> None:
         self.trial, self.point = trial, point
+        self.least = LEARNED if trial.reference.learned else LEAST
         self.included: tuple[str, ...] = trial.fixed
         self.catalogue = [
             c for c in trial.reference.model.causes
@@ -112,8 +115,8 @@ class _Search:
             return False
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
         first = self.included == self.trial.fixed
-        further = SURE if self._rough else FURTHER
-        wanted = LEAST if first and self.pulses is None else further
+        further = max(SURE if self._rough else FURTHER, self.least)
+        wanted = self.least if first and self.pulses is None else further
         if not self.ranking:
             self.ranking = self._ranked(settled, wanted)
         best = settled[0][1] if settled else None
@@ -165,7 +168,7 @@ class _Search:
             if not self.steps:
                 self._inherits(_last(settled[0][1]), f"unknown:{strongest.name}")
             return False
-        faint = LEAST <= gain < FAINT and strongest.evidence >= gain - TEMPERATURE
+        faint = self.least <= gain < FAINT and strongest.evidence >= gain - TEMPERATURE
         if not (far or faint):
             return False
         if far or gain >= MORE:
@@ -278,7 +281,7 @@ class _Search:
                 instead += [(f.evidence - losses[label][0], label, f) for f in found[:1]]
             label = min(losses, key=lambda n: losses[n][0])
             loss, point, base, rest = losses[label]
-            if loss >= LEAST:
+            if loss >= self.least:
                 if instead and self._exchanged(max(instead, key=lambda one: one[0]), losses):
                     continue
                 break

@@ -150,6 +150,8 @@ class Modes:
     felt    [S, 3J]            what the data say of each mode, in units of what was known
     axes    [S, 3J, 3J]        from accelerations at the knots to modes
     logdet  of noise and start
+    pushed  [S, 3J, W]         modes of columns more, each of which bends the observations as an
+                               acceleration at the knots does
     """
 
     dd: np.ndarray
@@ -157,31 +159,36 @@ class Modes:
     felt: np.ndarray
     axes: np.ndarray
     logdet: float
+    pushed: np.ndarray
 
     def beside(self, pushed: np.ndarray) -> Modes:
-        """With W columns more, of which each bends the observations as the acceleration `pushed`
-        [S, 3J, W] at the knots does."""
-        mode = self.axes @ pushed
-        bent = self.felt[..., None] * mode
-        across = np.swapaxes(self.md, 1, 2) @ mode
-        count, more = self.dd.shape[-1], pushed.shape[-1]
-        dd = np.empty((len(mode), count + more, count + more))
-        dd[:, :count, :count] = self.dd
-        dd[:, :count, count:] = across
-        dd[:, count:, :count] = np.swapaxes(across, 1, 2)
-        dd[:, count:, count:] = np.swapaxes(mode, 1, 2) @ bent
-        return replace(self, dd=dd, md=np.concatenate((self.md, bent), -1))
+        """With W columns more, of accelerations [S, 3J, W] at the knots."""
+        return replace(self, pushed=np.concatenate((self.pushed, self.axes @ pushed), -1))
 
     def total(self, weight: np.ndarray, louder: float = 1.0) -> np.ndarray:
-        """[1 + C, 1 + C] sum of `gram`'s matrices, weighted [S], without making each of them."""
+        """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
+        them."""
         part = np.sqrt(weight[:, None] / (self.felt + louder**-2.0))[..., None]
         flat = (self.md * part).reshape(-1, self.md.shape[-1])
-        return np.tensordot(weight, self.dd, 1) - flat.T @ flat
+        total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
+        if not self.pushed.shape[-1]:
+            return total
+        # what such a column bends, less what the unrest explains of it
+        more = (self.pushed * part).reshape(-1, self.pushed.shape[-1])
+        across = louder**-2.0 * (more.T @ flat)
+        more *= np.sqrt(self.felt).reshape(-1, 1) / louder
+        return np.block([[total, across.T], [across, more.T @ more]])
 
     def gram(self, louder: float = 1.0) -> Gram:
-        part = self.md / (self.felt + louder**-2.0)[..., None]
-        each = self.dd - np.swapaxes(self.md, 1, 2) @ part
-        return Gram(each, self.log_volume(louder))
+        bent = self.felt[..., None] * self.pushed
+        across = np.swapaxes(self.md, 1, 2) @ self.pushed
+        dd = np.block([
+            [self.dd, across],
+            [np.swapaxes(across, 1, 2), np.swapaxes(self.pushed, 1, 2) @ bent],
+        ])  # fmt: skip
+        md = np.concatenate((self.md, bent), -1)
+        part = md / (self.felt + louder**-2.0)[..., None]
+        return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(louder))
 
     def log_volume(self, louder: float = 1.0) -> float:
         """log |C| of all segments, by itself."""
@@ -214,6 +221,7 @@ def modes(weighed: Weighed, unrest: Unrest) -> Modes:
         np.maximum(felt, 0.0),
         across @ np.linalg.inv(root),
         weighed.logdet + _of_start(weighed, known),
+        np.zeros((*felt.shape, 0)),
     )
 
 

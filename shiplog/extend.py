@@ -15,6 +15,7 @@ import torch
 from shiplog.causes import CATALOGUE, Cause
 from shiplog.exceptions import RunError
 from shiplog.models.extended import Extended
+from shiplog.models.network import Network
 from shiplog.profile import Profile
 from shiplog.record import Record
 from shiplog.sensitivity import Series, rollout, series, state_losses
@@ -82,15 +83,20 @@ class ExtendedSimulator:
         coefficients: np.ndarray | None = None,
     ) -> ExtendedSimulator:
         """The same model with more causes in it, and its base's `coefficients` [P] as they were
-        fitted beside them."""
+        fitted beside them; of a network its bends [F, 3]. Raises ValueError where they are not
+        of this base."""
+        base, own = self.model.base, coefficients
+        if own is not None and isinstance(base, Network):
+            base, own = base.bend(own), None
         model = replace(
             self.model,
+            base=base,
             causes=(*self.model.causes, *causes),
             constants={**self.model.constants, **(constants or {})},
         )
         theta = np.concatenate((self.theta, *(numbers[c.label] for c in causes)))
-        if coefficients is not None:
-            theta[: len(coefficients)] = coefficients
+        if own is not None:
+            theta[: len(own)] = own
         whole = np.zeros((len(theta), len(theta)))
         at = len(self.theta)
         whole[:at, :at] = self.covariance
@@ -124,7 +130,7 @@ class Extension:
 
     numbers, covariance   label → of each cause
     constants             what their forces need and nobody fits
-    coefficients          [P] of the base beside them
+    coefficients          [P] of the base beside them; of a network its bends [F, 3]
     """
 
     causes: tuple[Cause, ...]
@@ -151,7 +157,8 @@ class Extension:
         }  # fmt: skip
         arrays = {f"constant.{k}": np.atleast_1d(v) for k, v in simulator.model.constants.items()}
         arrays |= {"covariance": simulator.covariance[base:, base:]}
-        return told, arrays | {"coefficients": simulator.theta[:base]}
+        bent = getattr(simulator.model.base, "bent", None)
+        return told, arrays | {"coefficients": simulator.theta[:base] if bent is None else bent}
 
     @staticmethod
     def of(told: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()) -> Extension:

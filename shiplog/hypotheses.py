@@ -23,6 +23,8 @@ QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
+AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
+SHORTER = 3  # times that a step is halved where the fit runs away
 REST = 0.02  # of a number's size: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
 
@@ -180,9 +182,11 @@ class Trial:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
         ref = self.reference
         level = self.level(point, self.quietest(point), ())
-        modes, louder = self.modes(point, level.louder)
-        gram = modes.gram(louder).scaled(ref.columns.unit)
-        d = np.concatenate(([-1.0], level.solution[: len(ref.columns.unit)]))
+        unit = ref.columns.unit
+        left, d = self.left(point.linear, level.solution[: len(unit)] * unit)
+        modes = evidence.modes(evidence.weighed(left, self.unrest), self.unrest)
+        gram = modes.gram(level.louder).scaled(unit[: len(d)])
+        d = np.concatenate(([-1.0], d / unit[: len(d)]))
         chi2 = np.einsum("i,sij,j->s", d, gram.each, d)
         self.weight = np.minimum(1.0, ROBUST * np.median(chi2) / np.maximum(chi2, 1e-9))
 
@@ -192,14 +196,29 @@ class Trial:
         """The point's, and how much louder they are wanted: one pass serves every λ, but that of a
         pulse beside the unrest, whose axes turn with it."""
         if self.unrest.pulse is not None:
-            return evidence.modes(point.weighed, self.unrest.louder(louder)), 1.0
+            found = evidence.modes(point.weighed, self.unrest.louder(louder))
+            return self._misfitting(found, point), 1.0
         for of, found in self._modes:
             if of is point.weighed:
                 return found, louder
-        found = evidence.modes(point.weighed, self.unrest)
+        found = self._misfitting(evidence.modes(point.weighed, self.unrest), point)
         # the first point's, for `volume`, and the last two
         self._modes = [*self._modes[:1], *self._modes[1:][-1:], (point.weighed, found)]
         return found, louder
+
+    def _misfitting(self, modes: Modes, point: Point) -> Modes:
+        misfit = self.reference.misfit
+        if misfit is None:
+            return modes
+        return modes.beside(misfit.pushed(point.linear.cut, self.grid))
+
+    def left(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
+        """A pass of the trial without what the misfit's weights among the numbers d [C] do, and
+        the numbers of its own columns."""
+        misfit, count = self.reference.misfit, self.reference.columns.linearised
+        if misfit is not None:
+            linear = linear.less(misfit.pushed(linear.cut, self.grid) @ d[count:])
+        return linear, d[:count]
 
     def volume(self, louder: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
@@ -369,14 +388,25 @@ class Trial:
         that their evidence will not `beat` what another has."""
         by = {cause.label: cause for cause in self.reference.model.causes}
         point, louder, near, before = None, 1.0, None, np.inf
+        stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
+        shorter = 0
         for _ in range(ROUNDS):
             try:
                 point = self.at(numbers, path, louder)
-                path = point.path
+                if np.abs(point.linear.e).max() > AWAY:
+                    raise np.linalg.LinAlgError("a path that ran away")
                 base, _ = self.scan(point, (), included, near)
             except np.linalg.LinAlgError:  # the fit ran away, and its path with it
-                assert self._first is not None
-                return point or self._first, Found("+".join(included), -np.inf, louder, numbers)
+                if shorter == SHORTER:
+                    assert self._first is not None
+                    return self._first, Found("+".join(included), -np.inf, louder, numbers)
+                shorter += 1
+                if stood is None:
+                    numbers = {**numbers, included[-1]: 0.5 * numbers[included[-1]]}
+                else:
+                    numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
+                continue
+            path, stood = point.path, numbers
             louder = near = base.louder
             moved = {}
             for name in included:
@@ -408,11 +438,14 @@ class Trial:
         return self._numbers(level, point, included)[0], self._coefficients(level)
 
     def coefficients(self, point: Point, base: Found) -> np.ndarray:
-        """[P] of the base, beside a hypothesis of that point."""
+        """[P] of the base, beside a hypothesis of that point; of a network its bends [F, 3]."""
         return self._coefficients(self.level(point, base.louder, tuple(base.numbers)))
 
     def _coefficients(self, level: Level) -> np.ndarray:
         ref, count = self.reference, self.reference.columns.base
+        if ref.misfit is not None:
+            columns = ref.columns
+            return ref.misfit.bends(level.solution[columns.linearised : len(columns.unit)])
         return ref.theta + level.solution[:count] * ref.columns.unit[:count]
 
     def solved(self, point: Point, base: Found) -> np.ndarray:

@@ -14,11 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog import evidence, segments
+from shiplog import evidence, misfit, segments
 from shiplog.causes import Cause, Setting
 from shiplog.evidence import Modes, Unrest
+from shiplog.misfit import Misfit
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
+from shiplog.models.network import Network
 from shiplog.record import Record
 from shiplog.segments import Cut, Linear, Path, Wide
 
@@ -28,7 +30,9 @@ NEAR = 0.35  # plausible spreads that need no further round
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
 SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
-KAPPAS = (4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # voyages are more alike than campaigns: not less
+KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
+CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
+VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
 CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
@@ -51,14 +55,25 @@ class Start:
 
 @dataclass(frozen=True)
 class Columns:
-    """What the numbers stand for: the base's P coefficients, then each cause's own.
+    """What the numbers stand for: the base's P coefficients, then each cause's own, then weights of
+    a network's misfit.
 
-    unit [C]   plausible spread of a coefficient, realistic size of a cause's number
+    unit [C]   plausible spread of a coefficient, realistic size of a cause's number; 1 of a weight
+    misfit     number of weights
     """
 
     base: int
     causes: tuple[Cause, ...]
     unit: np.ndarray
+    misfit: int = 0
+
+    def with_misfit(self, count: int) -> Columns:
+        return replace(self, unit=np.concatenate((self.unit, np.ones(count))), misfit=count)
+
+    @property
+    def linearised(self) -> int:
+        """All but the misfit's."""
+        return len(self.unit) - self.misfit
 
     @cached_property
     def of(self) -> dict[str, np.ndarray]:
@@ -80,8 +95,8 @@ class Columns:
         return whole
 
     def numbers(self, given: dict[str, np.ndarray]) -> np.ndarray:
-        """[C - P] with those of some causes, zero for the others."""
-        whole = np.zeros(len(self.unit))
+        """Of all causes, with those of some, zero for the others."""
+        whole = np.zeros(self.linearised)
         for label, values in given.items():
             whole[self.of[label]] = values
         return whole[self.base :]
@@ -97,8 +112,9 @@ class Reference:
                  made on the very data that are diagnosed
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
-    counts       for how much of itself a trial counts: what a network gets wrong lasts as long as
-                 the ship does the same, and each voyage has its own of that
+    misfit       what a network gets wrong of its own inputs
+    counts       for how much of itself a trial counts: what a network gets wrong each voyage has
+                 its own of, where it learned from that
     """
 
     model: Extended
@@ -115,6 +131,7 @@ class Reference:
     modes: Modes | None
     freedom: float
     adapts: bool = False
+    misfit: Misfit | None = None
     counts: float = 1.0
 
     @property
@@ -236,23 +253,40 @@ def learn(
     record: Record,
     at: Settled | None = None,
     kappa: float | None = None,
+    recorded: Record | None = None,
+    least: float = CAMPAIGN,
 ) -> Reference:
     """From the nominal campaign, linearised `at` where it settles. κ is chosen on its own voyages
-    unless given."""
+    unless given, and not below `least`. `recorded`: voyages whose inputs a network's misfit is to
+    cover, too."""
     at = at or settled(model, setting, start, record)
     columns = columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
-    unit = columns.unit
-    whole = np.concatenate((at.theta, np.zeros(len(unit) - columns.base)))
-    linear = segments.linear(model, whole, cut, segments.grid(record), at.path, moved, shown)
+    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
+    g = segments.grid(record)
+    linear = segments.linear(model, whole, cut, g, at.path, moved, shown)
     modes = evidence.modes(evidence.weighed(linear, at.unrest), at.unrest)
-    grams = modes.gram().scaled(unit)
     held = _anchor(start, at.theta, columns)
-    chosen = kappa or inflation(grams.each, linear.cut.voyage, columns.known, held)
-    information, pull = usual(grams.each.sum(0), chosen, columns.known, held)
+    wrong = None
+    if isinstance(model.base, Network):
+        cuts = [linear.cut]
+        if recorded is not None:
+            cuts.append(segments.cut(recorded, segments.begins(recorded)))
+        wrong = misfit.of(
+            model.base, cuts, g, modes, columns.known, columns.unit, at.unrest.push
+        )  # fmt: skip
+        modes = modes.beside(wrong.pushed(linear.cut, g))
+        columns = columns.with_misfit(wrong.count)
+        held = np.concatenate((held, np.zeros(wrong.count)))
+    voyage = linear.cut.voyage
+    names = np.unique(voyage)
+    by = np.concatenate(([1.0], columns.unit))
+    each = np.stack([modes.total((voyage == v).astype(float)) for v in names]) * np.outer(by, by)
+    chosen = kappa or inflation(each, columns.known, held, least)
+    information, pull = usual(each.sum(0), chosen, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
-        chosen, linear, modes, freedom(len(np.unique(linear.cut.voyage))),
+        chosen, linear, modes, freedom(len(names)), misfit=wrong,
     )  # fmt: skip
 
 
@@ -274,25 +308,25 @@ def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
     return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
 
 
-def inflation(each: np.ndarray, voyage: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
-    """κ that predicts each voyage best from the others; never less than is usual, and careful with
-    fewer than three.
+def inflation(
+    each: np.ndarray, known: np.ndarray, held: np.ndarray, least: float = CAMPAIGN
+) -> float:
+    """κ that predicts each voyage best from the others; not below `least`, and careful with fewer
+    than three.
 
-    each [S, 1 + C, 1 + C], voyage [S]; what is known before any data, information and pull, `known`
-    and `held` [C]: all in units
+    each [V, 1 + C, 1 + C] products of a voyage; what is known before any data, information and
+    pull, `known` and `held` [C]: all in units
     """
-    names = np.unique(voyage)
-    if len(names) < 3:
+    if len(each) < 3:
         return CAREFUL_KAPPA
-    of = {v: each[voyage == v].sum(0) for v in names}
     total = each.sum(0)
-    said = []
-    for kappa in KAPPAS:
+    said, tried = [], [kappa for kappa in KAPPAS if kappa >= least]
+    for kappa in tried:
         score = 0.0
-        for left in of.values():
+        for left in each:
             score += marginal(left, *usual(total - left, kappa, known, held))
         said.append(score)
-    return KAPPAS[int(np.argmax(said))]
+    return tried[int(np.argmax(said))]
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
@@ -387,13 +421,14 @@ def assume(
         start = replace(start, spread=GIVEN * start.spread)
     at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
     learned = not (given or isinstance(model.base, MMG))
-    whole = learn(model, setting, start, record, at, kappa=None if learned else CAREFUL_KAPPA)
-    unit = whole.columns.unit
-    information = np.diag(whole.columns.known.copy())
-    base = whole.columns.base
-    causes = slice(base, len(unit))
+    kappa = None if learned else CAREFUL_KAPPA
+    least = VOYAGES if isinstance(model.base, Network) else CAMPAIGN
+    whole = learn(model, setting, start, record, at, kappa, least=least)
+    columns = whole.columns
+    information = np.diag(columns.known.copy())
+    causes = slice(columns.base, columns.linearised)
     # no cause has a usual size where nothing was usual
-    information[causes, causes] = np.eye(len(unit) - base) * HELD
+    information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
         adapts=not given, counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if learned else 1.0,

@@ -52,8 +52,6 @@ from shiplog.report import finite
 from shiplog.sensitivity import Simulator
 from shiplog.train import HISTORY, Progress
 
-BEND = 0.3  # standard deviations of ν̇ that a network's smooth bends may be off
-
 
 @dataclass(frozen=True)
 class Run:
@@ -146,7 +144,9 @@ class Run:
         held = self.extension
         if held is None:
             return base, start, stand_in, values
-        own = values if not self.config.physical else held.coefficients[: len(values)]
+        if not self.config.physical:
+            return base.bend(held.coefficients), start, stand_in, values
+        own = held.coefficients[: len(values)]
         return base, replace(start, values=held.coefficients), stand_in, own
 
     def _plain(self) -> tuple[Any, Start, MMG, np.ndarray]:
@@ -157,11 +157,9 @@ class Run:
         usual = usual or mmg.estimated(ship, main)
         seed = self.config.seeds[0]
         if not self.config.physical:
-            net = network.compiled(self.model(seed))
-            count = len(net.names)
-            wide = np.full(count, BEND)
-            start = Start(np.zeros(count), wide, -10.0 * wide, 10.0 * wide)
-            return net, start, mmg.MMG(ship), usual.values
+            none = np.zeros(0)
+            start = Start(none, none, none, none)
+            return network.compiled(self.model(seed)), start, mmg.MMG(ship), usual.values
         simulator = self.simulator(seed)
         known = self.identified(seed)
         count, more = len(usual.names), len(simulator.theta) - len(usual.names)

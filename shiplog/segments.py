@@ -230,6 +230,10 @@ class Linear:
         path = Path(self.path.start[keep], self.path.push[keep])
         return Linear(chosen, path, self.e[keep], self.z[keep], self.j[keep])
 
+    def less(self, pushed: np.ndarray) -> Linear:
+        """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
+        return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
+
     def beside(self, other: Linear) -> Linear:
         """These segments and others of the same record."""
         cut = replace(self.cut, **{n: _both(self.cut, other.cut, n) for n in PER_SEGMENT})

@@ -151,8 +151,8 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
     accelerations go together as those of no other unrest do. Judged on what is left."""
     ref = trial.reference
-    d = trial.solved(point, base)
-    left = point.weighed
+    linear, d = trial.left(point.linear, trial.solved(point, base))
+    left = evidence.weighed(linear, trial.unrest)
     r = np.concatenate(([1.0], -d))
     alone = replace(
         left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
@@ -184,18 +184,18 @@ def pulse_force(
     trial: Trial, point: Point, base: Found, pulses: Pulses
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
-    d = trial.solved(point, base)
     unrest = trial.unrest.louder(base.louder)
-    z, covariance = evidence.starts_and_knots(point.linear, d, unrest)
+    left = trial.left(point.linear, trial.solved(point, base))
+    z, covariance = evidence.starts_and_knots(*left, unrest)
     knots = trial.grid.knots
     kernel = unrest.kernel(knots)
     pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
     share = pulse @ np.linalg.inv(kernel)
     pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
     sway = slice(knots, 2 * knots)
-    left = (pulse - share @ pulse)[sway, sway]
+    beyond = (pulse - share @ pulse)[sway, sway]
     known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
-    variance = np.diagonal(known + left, axis1=1, axis2=2)
+    variance = np.diagonal(known + beyond, axis1=1, axis2=2)
     return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from shiplog.advise import Advice
 from shiplog.causes import Cause, Setting, si
 from shiplog.channels import VELOCITY
-from shiplog.decision import LEAST, PULSES, Decision, Named
+from shiplog.decision import PULSES, Decision, Named
 from shiplog.diagnose import UNKNOWN
 from shiplog.exceptions import listed
 from shiplog.findings import CONTRACT
@@ -211,7 +211,7 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     by = {c.label: c for c in causes}
     found = []
     for label, told in decision.told.items():
-        cause, least = by[label], told.least(LEAST)
+        cause, least = by[label], told.least(decision.least)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
@@ -219,7 +219,9 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
         else:  # as many as the ship has rudders, or the map places
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
-        found.append({"name": cause.name, "share": told.together(LEAST), "parameters": numbers})
+        found.append(
+            {"name": cause.name, "share": told.together(decision.least), "parameters": numbers}
+        )
         if label != cause.name:
             found[-1]["channel"] = label.partition(":")[2]
     return tuple(sorted(found, key=lambda one: one["share"]))

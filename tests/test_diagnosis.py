@@ -731,7 +731,7 @@ def test_what_a_network_learned_from_counts_for_what_its_voyages_predict_of_each
     """κ of those voyages and not a careful one; evidence is that of so much less data."""
     asked = []
 
-    def learn(model, setting, start, record, at=None, kappa=None):
+    def learn(model, setting, start, record, at=None, kappa=None, **_):
         asked.append(kappa)
         return replace(sea.usual, kappa=kappa or 8.0)
 

@@ -136,6 +136,19 @@ def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
     direct = evidence.gram(evidence.weighed(written_out, UNREST), UNREST)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
+    modes, weight = evidence.modes(evidence.weighed(given, UNREST), UNREST), np.array([1, 0, 0.4])
+    for louder in (0.5, 2.0):
+        each = evidence.gram(evidence.weighed(written_out, UNREST), UNREST.louder(louder)).each
+        whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, louder)
+        wanted = np.einsum("s,sij->ij", weight, each)
+        assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+
+
+def test_less_an_acceleration_is_less_what_it_does():
+    given = linear(3)
+    pushed = np.random.default_rng(9).standard_normal((3, 9))
+    moved = replace(given, e=given.e + np.einsum("sbcz,sz->sbc", given.z[..., 6:], pushed))
+    assert moved.less(pushed).e == pytest.approx(given.e, abs=1e-12)
 
 
 def test_the_total_is_the_weighted_sum():
@@ -269,10 +282,11 @@ def test_one_campaign_is_believed_less_where_voyages_disagree():
             each[s] = block.T @ block
         return each
 
-    voyage = np.arange(count)
-    assert inflation(grams(0.0), voyage, known, held) == 4.0  # at least
-    assert inflation(grams(0.4), voyage, known, held) == 32.0
-    assert inflation(grams(0.4)[:2], voyage[:2], known, held) == 11.0  # too few to tell
+    alike = grams(0.0)
+    assert inflation(alike, known, held) == 4.0  # at least
+    assert inflation(alike, known, held, 2.0) == 2.0
+    assert inflation(grams(0.4), known, held) == 32.0
+    assert inflation(grams(0.4)[:2], known, held) == 11.0  # too few to tell
 
 
 def test_a_campaign_counts_for_a_part_of_itself():

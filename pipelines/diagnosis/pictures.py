@@ -72,7 +72,7 @@ def _residual(
     """Unexplained and named force at the knots, and what the latter is of."""
     ref, record = trial.reference, trial.record
     usual, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
-    found = unexplained.posterior(whole, usual, unrest, record)
+    found = unexplained.posterior(*trial.left(whole, usual), unrest, record)
     keep = unexplained.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
@@ -103,8 +103,8 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     ref = trial.reference
     fixed = dict(decision.first.numbers)
     named = {n.cause.label: n.numbers for n in decision.named if n.cause.kind != "sensor"}
-    usual = np.concatenate((ref.theta, np.zeros(len(ref.columns.unit) - ref.columns.base)))
-    usual += ref.mean * ref.columns.unit
+    usual = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
+    usual += (ref.mean * ref.columns.unit)[: len(usual)]
 
     def acceleration(numbers: dict[str, np.ndarray]) -> np.ndarray:
         theta = usual.copy()

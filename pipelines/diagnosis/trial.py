@@ -67,8 +67,11 @@ def trial_of(
             continue
         missing = one.missing(setting)
         cause = one if missing else one.on(setting)
-        if missing is None and nominal is None and not run.given and cause.absorbed:
-            missing = "a model fitted to these voyages absorbs it"
+        if missing is None and nominal is None and not run.given:
+            if cause.absorbed:
+                missing = "a model fitted to these voyages absorbs it"
+            elif cause.renames and not run.config.physical:
+                missing = "a network fitted to these voyages takes it in"
         if missing is None:
             chosen.append(cause)
         else:
@@ -81,7 +84,7 @@ def trial_of(
     before = setting_of(run, nominal, nominal)
     testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
     at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
-    known = reference.learn(model, setting, start, nominal, at)
+    known = reference.learn(model, setting, start, nominal, at, recorded=recorded)
     return Trial(known, recorded, tuple(held)), untested
 
 

@@ -34,7 +34,8 @@ def pushed(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
     ref = trial.reference
     base, _ = trial.scan(point, (), trial.fixed)
     found = external.find(
-        whole, trial.solved(point, base), trial.unrest.louder(base.louder), trial.record,
+        *trial.left(whole, trial.solved(point, base)), trial.unrest.louder(base.louder),
+        trial.record,
         ref.model.stand_in, np.array(list(ref.coefficients.values())),
     )  # fmt: skip
     out = np.zeros(len(trial.rows), dtype=bool)
@@ -60,7 +61,7 @@ def by_channel(held: HeldOut) -> list[dict]:
 def depends_on(trial: Trial, decision: Decision, whole: Linear) -> list[dict]:
     """What the model cannot see and the residual depends on."""
     found = unexplained.posterior(
-        whole, trial.solved(decision.first, decision.nothing),
+        *trial.left(whole, trial.solved(decision.first, decision.nothing)),
         trial.unrest.louder(decision.nothing.louder), trial.record,
     )  # fmt: skip
     knots = unexplained.table(found, trial.record)

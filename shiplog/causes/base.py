@@ -109,6 +109,12 @@ class Cause:
         return False
 
     @property
+    def renames(self) -> bool:
+        """Whether it only says otherwise what drives the ship or where she is measured: a network
+        that is fitted to the affected data, without symmetry or origin, takes that in, too."""
+        return False
+
+    @property
     def usual(self) -> bool:
         """Whether a ship may have some of it always: false where coefficients, or another cause,
         already stand for that."""

@@ -147,6 +147,10 @@ class AntennaOffset(Cause):
     )
     separated_by = {"clock_offset": "spin on the spot against straight acceleration"}
 
+    @property
+    def renames(self) -> bool:
+        return True
+
     def read(self, record: Record, p: np.ndarray) -> Record:
         return reduced(record, record.sighted, (float(p[0]), float(p[1])))
 
@@ -173,6 +177,10 @@ class WindDirectionOffset(Cause):
     equation = "γ_measured = γ_A {angle:+.1f} deg"
     parameters = (Parameter("angle", "deg", np.radians(15.0), np.radians(1.5)),)
     separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
+
+    @property
+    def renames(self) -> bool:
+        return True
 
     def missing(self, setting: Setting) -> str | None:
         return unfelt_wind(setting)

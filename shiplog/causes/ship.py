@@ -224,6 +224,10 @@ class RudderOffset(_OnRudders):
     }
 
     @property
+    def renames(self) -> bool:
+        return True
+
+    @property
     def count(self) -> int:
         return len(self.groups)
 

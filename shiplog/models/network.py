@@ -1,13 +1,13 @@
 """The paper's network compiled beside the physics, with what a diagnosis may bend it by.
 
-ν̇ = f_NN(ν, u, ω) + Σ w_k φ_k(ν, u, ω): smooth functions of the network's own inputs stand for all
-that another training of it could have learned.
+ν̇ = f_NN(ν, u, ω) + Σ w_k φ_k(ν, u, ω): smooth functions of the network's own inputs, random
+Fourier features (Rahimi & Recht 2007), stand for all that another training could have learned.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -18,20 +18,22 @@ from jax import Array
 from shiplog.models.feedforward import FeedForward
 from shiplog.models.mmg.wind import apparent
 
-BENDS = 24  # features, each in three channels
+FEATURES = 300
+WIDE = 2.0  # of many inputs no voyage has seen all corners: as wide as data of few serve best
 
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase"],
+    data_fields=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase", "bent"],
     meta_fields=["wind", "components", "input_tanh"],
 )
 @dataclass(frozen=True)
 class Network:
-    """θ is w [3K], zero for the network as it was trained.
+    """It has no coefficients: θ is empty.
 
     weights     (W₁, b₁, W₂, b₂, ...), each W [out, in], in the precision it was trained in
-    frequency   [inputs, K] and phase [K] of φ on the standardised inputs
+    frequency   [inputs, F] and phase [F] of φ on the standardised inputs
+    bent        [F, 3] weights w of φ in m/s² and rad/s²; None for the network as it was trained
     """
 
     weights: tuple
@@ -44,10 +46,19 @@ class Network:
     wind: bool
     components: bool
     input_tanh: bool
+    bent: np.ndarray | Array | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(f"bend.{i}" for i in range(3 * self.phase.shape[0]))
+        return ()
+
+    def bend(self, weights: np.ndarray) -> Network:
+        """With weights [F, 3] more, if any. Raises ValueError for those of other features."""
+        if not len(weights):
+            return self
+        if weights.shape != (len(self.phase), 3):
+            raise ValueError(f"weights {weights.shape} are not of {len(self.phase)} features")
+        return replace(self, bent=weights if self.bent is None else self.bent + weights)
 
     @property
     def substeps(self) -> int:
@@ -59,19 +70,8 @@ class Network:
 
     def acceleration(self, theta: Array, state: Array, actuator: Array, true_wind: Array) -> Array:
         """ν̇ [..., 3]; arguments as for MMG.acceleration."""
-        u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
-        parts = [u[..., None], v[..., None], r[..., None], actuator]
-        smooth = list(parts)
-        if self.wind:
-            ahead, starboard = apparent(true_wind, heading, u, v)
-            plain = [ahead[..., None], starboard[..., None]]
-            smooth += plain
-            if not self.components:
-                speed = jnp.sqrt(ahead**2 + starboard**2 + 1e-12)
-                angle = jnp.mod(jnp.arctan2(starboard, ahead), 2.0 * math.pi)
-                plain = [speed[..., None], angle[..., None]]
-            parts += plain
-        z = (jnp.concatenate(parts, -1) - self.mean) / self.std
+        plain = self._inputs(state, actuator, true_wind, self.components)
+        z = (plain - self.mean) / self.std
         hidden = jnp.tanh(z) if self.input_tanh else z
         pairs = list(zip(self.weights[::2], self.weights[1::2], strict=True))
         hidden = hidden.astype(pairs[0][0].dtype)
@@ -79,12 +79,28 @@ class Network:
             hidden = jnp.tanh(hidden @ w.T + b)
         w, b = pairs[-1]
         said = (hidden @ w.T + b) * self.out_std + self.out_mean
-        # the bends go with the wind's components always: an angle jumps
-        s = jnp.concatenate(smooth, -1)
-        waves = jnp.cos(((s - self.smooth_mean) / self.smooth_std) @ self.frequency + self.phase)
-        count = self.phase.shape[0]
-        bent = waves @ theta.reshape(3, count).T * math.sqrt(2.0 / count)
-        return said + bent * self.out_std
+        if self.bent is None:
+            return said
+        return said + self.features(state, actuator, true_wind) @ self.bent
+
+    def features(self, state: Array, actuator: Array, true_wind: Array) -> Array:
+        """φ [..., F], of unit size together; of the wind's components always: an angle jumps."""
+        smooth = self._inputs(state, actuator, true_wind, True)
+        z = (smooth - self.smooth_mean) / self.smooth_std
+        return math.sqrt(2.0 / len(self.phase)) * jnp.cos(z @ self.frequency + self.phase)
+
+    def _inputs(self, state, actuator, true_wind, components: bool) -> Array:
+        u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
+        parts = [u[..., None], v[..., None], r[..., None], actuator]
+        if self.wind:
+            ahead, starboard = apparent(true_wind, heading, u, v)
+            if components:
+                parts += [ahead[..., None], starboard[..., None]]
+            else:
+                speed = jnp.sqrt(ahead**2 + starboard**2 + 1e-12)
+                angle = jnp.mod(jnp.arctan2(starboard, ahead), 2.0 * math.pi)
+                parts += [speed[..., None], angle[..., None]]
+        return jnp.concatenate(parts, -1)
 
     @property
     def smooth_mean(self) -> Array | np.ndarray:
@@ -112,8 +128,8 @@ def compiled(model: FeedForward, seed: int = 0) -> Network:
         std=scale.input_std.double().numpy(),
         out_mean=scale.output_mean.double().numpy(),
         out_std=scale.output_std.double().numpy(),
-        frequency=rng.standard_normal((inputs, BENDS)) / math.sqrt(0.5 * inputs),
-        phase=rng.uniform(0.0, 2.0 * math.pi, BENDS),
+        frequency=rng.standard_normal((inputs, FEATURES)) / (WIDE * math.sqrt(0.5 * inputs)),
+        phase=rng.uniform(0.0, 2.0 * math.pi, FEATURES),
         wind=shape.wind,
         components=shape.wind_input == "components",
         input_tanh=shape.input_tanh,

@@ -1,0 +1,135 @@
+"""What a network gets wrong of its own inputs, against effects hidden in drawn segments."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shiplog import evidence, misfit
+from shiplog.evidence import Unrest
+from shiplog.models.network import Network
+from shiplog.reference import marginal
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, Linear, Path
+from shiplog.structure import at_knots
+
+KNOTS, BINS, STEP = 6, 5, 0.2
+GRID = Grid(STEP, round((KNOTS - 1) * KNOT / STEP), round((KNOTS - 1) * KNOT / STEP) // NODE_ROWS
+            + 1, BINS, KNOTS)  # fmt: skip
+NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
+UNREST = Unrest(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
+
+
+def network(features: int = 300) -> Network:
+    """Two actuators and the wind; what it says itself is not asked."""
+    rng = np.random.default_rng(0)
+    return Network(
+        weights=(rng.standard_normal((3, 7)), rng.standard_normal(3)),
+        mean=np.zeros(7), std=np.ones(7), out_mean=np.zeros(3), out_std=np.ones(3),
+        frequency=rng.standard_normal((7, features)) / 3.7,
+        phase=rng.uniform(0.0, 6.0, features),
+        wind=True, components=True, input_tanh=False,
+    )  # fmt: skip
+
+
+def segments(count: int, seed: int = 0) -> Cut:
+    """Ships that do something else in each segment, in wind that goes with the heading's sine."""
+    rng = np.random.default_rng(seed)
+    y = np.repeat(rng.standard_normal((count, 1, 6)), BINS, axis=1)
+    driven = np.repeat(rng.standard_normal((count, 1, 5)), GRID.nodes, axis=1)
+    used = np.ones((count, BINS, 6), dtype=bool)
+    return Cut(np.arange(count), y, used, driven, np.zeros(count, dtype=int), STEP)
+
+
+def pushes(cut: Cut, of) -> np.ndarray:
+    """[S, 3J] of an acceleration `of` (state, driven) in sway."""
+    knots = at_knots(cut, GRID)
+    whole = np.zeros((len(cut), 3, KNOTS))
+    whole[:, 1] = 0.2 * of(knots.state, knots.driven)
+    return whole.reshape(len(cut), -1)
+
+
+def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) -> Linear:
+    """Observations that a hidden acceleration bends, and one column of another."""
+    rng = np.random.default_rng(seed)
+    z = rng.standard_normal((*cut.y.shape, 6 + 3 * KNOTS)) * NOISE[:, None] * 20.0
+    e = np.einsum("sbcz,sz->sbc", z[..., 6:], hidden) + NOISE * rng.standard_normal(cut.y.shape)
+    j = np.einsum("sbcz,sz->sbc", z[..., 6:], looks_like)[..., None]
+    return Linear(cut, Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, KNOTS))), e, z, j)
+
+
+def nats(linear: Linear, own: misfit.Misfit | None) -> float:
+    """Of the column, above nothing; of usual unrest."""
+    modes = evidence.modes(evidence.weighed(linear, UNREST), UNREST)
+    if own is not None:
+        modes = modes.beside(own.pushed(linear.cut, GRID))
+    total = modes.total(np.ones(len(linear.cut)))
+    known = np.eye(len(total) - 1)
+    without = np.delete(np.delete(total, 1, 0), 1, 1)
+    return marginal(total, known, np.zeros(len(known))) - marginal(
+        without, known[1:, 1:], np.zeros(len(known) - 1)
+    )
+
+
+def learned(linear: Linear, others: tuple[Cut, ...] = ()) -> misfit.Misfit:
+    modes = evidence.modes(evidence.weighed(linear, UNREST), UNREST)
+    one = np.ones(1)
+    cuts = [linear.cut, *others]
+    return misfit.of(network(), cuts, GRID, modes, one, one, UNREST.push)
+
+
+def test_what_it_bends_the_network_by_is_what_it_pushes():
+    cut = segments(40)
+    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1]))
+    own = learned(bent(cut, hidden, hidden))
+    weights = np.random.default_rng(3).standard_normal(own.count)
+    knots, plain = at_knots(cut, GRID), network()
+    given = (knots.state, knots.driven[..., :2], knots.driven[..., -2:])
+    none = np.zeros(0)
+    apart = plain.bend(own.bends(weights)).acceleration(none, *given) - plain.acceleration(
+        none, *given
+    )
+    pushed = (own.pushed(cut, GRID) @ weights).reshape(len(cut), 3, KNOTS)
+    assert np.moveaxis(pushed, 1, -1) == pytest.approx(np.asarray(apart), abs=1e-9)
+    twice = plain.bend(own.bends(weights)).bend(own.bends(weights))
+    assert twice.bent == pytest.approx(2.0 * own.bends(weights))
+    assert plain.bend(np.zeros((0, 3))) is plain
+    with pytest.raises(ValueError, match="72"):
+        plain.bend(np.zeros((72, 3)))
+
+
+def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():
+    """Hidden: a force of the speed. A column that goes with the rudder and a little with that
+    speed gets hundreds of nats from it, of an unrest of seconds; beside the misfit a few."""
+    cut = segments(150)
+    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1]))
+    column = pushes(cut, lambda s, d: d[..., 0] + 0.5 * s[..., 1])
+    given = bent(cut, hidden, column)
+    assert nats(given, None) > 200.0
+    assert nats(given, learned(given)) < 20.0
+
+
+def test_what_the_network_cannot_see_is_still_named_beside_it():
+    """Hidden: the force of the speed, and one of the place."""
+    cut = segments(150)
+    place = pushes(cut, lambda s, d: np.tanh(s[..., 0]))
+    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1])) + 0.5 * place
+    given = bent(cut, hidden, place)
+    own = learned(given)
+    assert nats(given, own) > 50.0
+    still = bent(cut, pushes(cut, lambda s, d: np.sin(s[..., 1])), place)
+    assert nats(still, learned(still)) < 5.0
+
+
+def test_it_keeps_what_other_voyages_may_say_of_it():
+    """Sums of features that the campaign says nothing of are left out, but not those that
+    other voyages would."""
+    near = segments(60)
+    slow = replace(near, y=0.02 * near.y, driven=0.02 * near.driven)
+    given = bent(slow, pushes(slow, lambda s, d: s[..., 1]), pushes(slow, lambda s, d: d[..., 0]))
+    alone, both = learned(given), learned(given, (near,))
+    assert alone.count < both.count
+
+    def prior(own: misfit.Misfit) -> float:
+        return float((own.pushed(near, GRID) ** 2).sum())
+
+    assert prior(both) > 1.5 * prior(alone)
