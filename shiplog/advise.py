@@ -15,8 +15,8 @@ import numpy as np
 from shiplog import evidence, segments
 from shiplog.decision import Named
 from shiplog.hypotheses import Trial
+from shiplog.reading import read
 from shiplog.record import Record
-from shiplog.reference import read
 from shiplog.sensitivity import Series, rollout
 
 SECONDS = 300.0

@@ -13,9 +13,11 @@ import numpy as np
 
 from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
+from shiplog.columns import HELD
 from shiplog.evidence import Modes, Weighed
+from shiplog.reading import read
 from shiplog.record import Record
-from shiplog.reference import HELD, Reference, read
+from shiplog.reference import Reference
 from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
@@ -29,7 +31,7 @@ REST = 0.02  # of a number's size: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
-Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `reference.read`
+Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `reading.read`
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ class Trial:
         return point
 
     def _read(self, numbers: Mapping[str, np.ndarray]) -> Read:
-        """As `reference.read`. How a cause changes what is read depends on what is put right
+        """As `reading.read`. How a cause changes what is read depends on what is put right
         before: beside a clock that is late by a second an antenna's columns are a second old, and
         two clocks would seem to disagree. Nor do columns from a little beside serve: those of
         several clocks then differ by their noise, and a sum of them explains that of the data."""

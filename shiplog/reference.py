@@ -8,35 +8,33 @@ it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from shiplog import evidence, misfit, segments
-from shiplog.causes import Cause, Setting
+from shiplog.causes import Setting
+from shiplog.columns import HELD, Columns
 from shiplog.evidence import Modes, Unrest
 from shiplog.misfit import Misfit
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
 from shiplog.models.network import Network
+from shiplog.reading import read
 from shiplog.record import Record
-from shiplog.segments import Cut, Linear, Path, Wide
+from shiplog.segments import Linear, Path, Wide
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 0.35  # plausible spreads that need no further round
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
-SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
-STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
 VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
 CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
-HELD = 1e8  # information that leaves a number where it is
 
 
 @dataclass(frozen=True)
@@ -51,55 +49,6 @@ class Start:
     spread: np.ndarray
     low: np.ndarray
     high: np.ndarray
-
-
-@dataclass(frozen=True)
-class Columns:
-    """What the numbers stand for: the base's P coefficients, then each cause's own, then weights of
-    a network's misfit.
-
-    unit [C]   plausible spread of a coefficient, realistic size of a cause's number; 1 of a weight
-    misfit     number of weights
-    """
-
-    base: int
-    causes: tuple[Cause, ...]
-    unit: np.ndarray
-    misfit: int = 0
-
-    def with_misfit(self, count: int) -> Columns:
-        return replace(self, unit=np.concatenate((self.unit, np.ones(count))), misfit=count)
-
-    @property
-    def linearised(self) -> int:
-        """All but the misfit's."""
-        return len(self.unit) - self.misfit
-
-    @cached_property
-    def of(self) -> dict[str, np.ndarray]:
-        """Cause's label → its columns."""
-        found, at = {}, self.base
-        for cause in self.causes:
-            found[cause.label] = np.arange(at, at + cause.count)
-            at += cause.count
-        return found
-
-    @cached_property
-    def known(self) -> np.ndarray:
-        """[C] how surely each is as it stands, before any data, in units: a cause that
-        coefficients or another one stand for has no usual size of its own."""
-        whole = np.ones(len(self.unit))
-        for cause in self.causes:
-            if not cause.usual:
-                whole[self.of[cause.label]] = HELD
-        return whole
-
-    def numbers(self, given: dict[str, np.ndarray]) -> np.ndarray:
-        """Of all causes, with those of some, zero for the others."""
-        whole = np.zeros(self.linearised)
-        for label, values in given.items():
-            whole[self.of[label]] = values
-        return whole[self.base :]
 
 
 @dataclass(frozen=True)
@@ -336,77 +285,6 @@ def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> flo
     square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
     square -= towards @ np.linalg.solve(both, towards)
     return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])
-
-
-# --- what causes read otherwise -------------------------------------------------------------------
-
-
-def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
-    """The record as those causes' numbers have it, in the catalogue's order."""
-    for cause in causes:
-        values = numbers.get(cause.label)
-        if values is not None and np.any(values != 0.0):
-            record = cause.read(record, values)
-    return record
-
-
-def read(
-    model: Extended,
-    setting: Setting,
-    record: Record,
-    rows: np.ndarray,
-    numbers: Mapping[str, np.ndarray] | None = None,
-) -> tuple[Cut, np.ndarray, np.ndarray]:
-    """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
-    by the motion averaged over seconds, as its noise tells nothing of a clock."""
-    given = dict(numbers or {})
-    sizes = {c.label: c.sizes(setting) for c in model.causes}
-    columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
-    base = segments.cut(corrected(model.causes, record, given), rows)
-    moved = np.zeros((*base.driven.shape, len(columns.unit)))
-    shown = np.zeros((*base.y.shape, len(columns.unit)))
-    before = record  # as the causes before this one have it
-    for place, cause in enumerate(model.causes):
-        if not cause.reads:
-            continue
-        here = given.get(cause.label, np.zeros(cause.count))
-        low, high = cause.bounds(setting)
-        moving = before.smoothed(SMOOTH) if cause.shifts else before
-        for i, column in enumerate(columns.of[cause.label]):
-            step = np.zeros(cause.count)
-            step[i] = STEP * sizes[cause.label][i]
-            # not beyond what it may be: a lag that is negative sharpens steps and noise
-            ends = np.minimum(here + step, high), np.maximum(here - step, low)
-            apart = ends[0][i] - ends[1][i]
-            more, less = (
-                corrected(model.causes[place + 1 :], cause.read(moving, end), given) for end in ends
-            )
-            # of what both share nothing changes
-            if more.actuator is not less.actuator:
-                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
-                moved[..., : change.shape[-1], column] = change / apart
-            if more.wind is not less.wind or more.state is not less.state:
-                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
-                moved[..., -2:, column] = change / apart
-            if more.state is not less.state:
-                between = replace(more, state=more.state - less.state)
-                shown[..., column] = segments.measured(between, rows)[0] / apart
-        before = corrected((cause,), before, given)
-    return base, moved, shown
-
-
-def places(record: Record, count: int) -> tuple[np.ndarray, float]:
-    """Points [K, 2] that cover where the ship was, and the spacing between them [m]: each the
-    farthest from those before it (Gonzalez 1985)."""
-    every = record.state[:: max(1, len(record) // 4000)][:, [0, 2]]
-    chosen = [every.mean(0)]
-    nearest = np.linalg.norm(every - chosen[0], axis=1)
-    while len(chosen) < count:
-        chosen.append(every[int(nearest.argmax())])
-        nearest = np.minimum(nearest, np.linalg.norm(every - chosen[-1], axis=1))
-    points = np.array(chosen)
-    apart = np.linalg.norm(points[:, None] - points, axis=-1) + np.diag(np.full(count, np.inf))
-    return points, max(float(np.median(apart.min(0))), 1e-3)
 
 
 def assume(

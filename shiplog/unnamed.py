@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from shiplog import evidence, reference, structure
+from shiplog.columns import HELD
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import body
 from shiplog.structure import Basis, Products
@@ -138,7 +139,7 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
     ref = trial.reference
     if before is None:
         held = _beside(ref.information, more)
-        held[len(ref.pull) :, len(ref.pull) :] *= reference.HELD
+        held[len(ref.pull) :, len(ref.pull) :] *= HELD
         return held, np.concatenate((ref.pull, np.zeros(more)))
     ones, zeros = np.ones(more), np.zeros(more)
     return reference.usual(

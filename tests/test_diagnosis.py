@@ -25,6 +25,7 @@ from shiplog import (
     advise,
     conventions,
     diagnose,
+    reading,
     record,
     reference,
     runs,
@@ -1017,7 +1018,7 @@ def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     numbers = {"clock_offset:gnss": np.array([1.4])}
     late = trial.at(numbers)
     ref = sea.usual
-    cut, moved, shown = reference.read(ref.model, ref.setting, trial.record, trial.rows, numbers)
+    cut, moved, shown = reading.read(ref.model, ref.setting, trial.record, trial.rows, numbers)
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
     fresh = segments.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
     columns = ref.columns.of["antenna_offset"]
@@ -1032,9 +1033,9 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     column -= ref.columns.base
     noise = np.zeros_like(seen.state)
     noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(seen))
-    quiet = reference.read(ref.model, ref.setting, seen, rows)[2][..., 1, column]
+    quiet = reading.read(ref.model, ref.setting, seen, rows)[2][..., 1, column]
     noisy = replace(seen, state=seen.state + noise)
-    loud = reference.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
+    loud = reading.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
     assert (loud - quiet).std() < 0.4 * quiet.std()
     change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / segments.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
@@ -1045,14 +1046,14 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     """(y_T - y_0) / T of a step by h: -h exp(-t/T) / T from the step on. With a lead's difference
     in it, a step would be a spike, and a rudder recorded in steps would tell of no lag."""
     seen, ref = sea.done.trial.record, sea.usual
-    time = reference.STEP * 2.0
+    time = reading.STEP * 2.0
     (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
     assert lag.sizes(ref.setting)[0] == 2.0
     column = ref.columns.of["rudder_lag"][0] - ref.columns.base
     step = np.zeros_like(seen.actuator)
     step[1000:, 0] = 0.2
     stepped = replace(seen, actuator=step)
-    moved = reference.read(ref.model, ref.setting, stepped, np.array([900]))[1][0, :, 0, column]
+    moved = reading.read(ref.model, ref.setting, stepped, np.array([900]))[1][0, :, 0, column]
     # straight from row to row: the step is half a row before
     t = (900 - 1000 + 0.5 + segments.NODE_ROWS * np.arange(len(moved))) * seen.step
     assert np.abs(moved[t < -0.15]).max() == 0.0

@@ -19,7 +19,7 @@ from jax.typing import ArrayLike
 from pipelines.hidden_effects import plan, rivals, run, score, suites, tables
 from pipelines.hidden_effects.plan import Planned
 from pipelines.hidden_effects.score import Answer, Sealed
-from shiplog.reference import Columns
+from shiplog.columns import Columns
 from shiplog.segments import BIN, Cut, Linear
 from shiplog.segments import Path as Along
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shiplog import profile as profiles
-from shiplog import reference, segments
+from shiplog import reading, segments
 from shiplog.causes import Cause, Setting
 from shiplog.causes.sensors import AntennaOffset, HeadingOffset
 from shiplog.causes.ship import RudderDelay, RudderLag
@@ -161,8 +161,8 @@ def linearised():
         "rudder_lag": np.array([1.5]),
     }  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:  # a wider step than a derivative's averages noise
-        patch.setattr(reference, "STEP", 0.02)
-        cut, moved, shown = reference.read(model, SETTING, SEEN, ROWS, numbers)
+        patch.setattr(reading, "STEP", 0.02)
+        cut, moved, shown = reading.read(model, SETTING, SEEN, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()
     return model, numbers, theta, at, segments.linear(model, theta, cut, GRID, at, moved, shown)
@@ -170,7 +170,7 @@ def linearised():
 
 def gap(model, theta, at: Path, numbers) -> np.ndarray:
     """Measured less simulated [S, B, 6], from the nodes: the trapezium of each two seconds."""
-    record = reference.corrected(model.causes, SEEN, numbers)
+    record = reading.corrected(model.causes, SEEN, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
         segments._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
@@ -325,7 +325,7 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     """Holding the recorded rudder over a step would show as 0.05 s here."""
     record = weaving(late)
     model = Toy((RudderDelay(),))
-    cut, moved, shown = reference.read(model, SETTING, record, ROWS)
+    cut, moved, shown = reading.read(model, SETTING, record, ROWS)
     theta = np.concatenate((THETA, [0.0]))
     at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
     found = segments.linear(model, theta, cut, GRID, at, moved, shown)

@@ -18,8 +18,8 @@ from shiplog.exceptions import listed
 from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.hypotheses import Trial
 from shiplog.models.mmg import body
+from shiplog.reading import corrected
 from shiplog.record import Record
-from shiplog.reference import corrected
 from shiplog.segments import KNOT, Linear
 from shiplog.unexplained import around
 from shiplog.windows import Windows

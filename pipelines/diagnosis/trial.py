@@ -101,7 +101,7 @@ def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     """Ship and place of a diagnosis; her speed is that of the `usual` voyages."""
     speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
-    places, spacing = reference.places(recorded, PLACES)
+    places, spacing = _places(recorded, PLACES)
     scale = {
         "speed": max(speed, 1e-3), "length": main.length, "mass": main.mass,
         "moment": main.mass * main.length,
@@ -109,3 +109,17 @@ def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     windless = run.profile.has_wind and not ship.wind
     lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
     return Setting(run.profile, scale, places, spacing, lacking)
+
+
+def _places(record: Record, count: int) -> tuple[np.ndarray, float]:
+    """Points [K, 2] that cover where the ship was, and the spacing between them [m]: each the
+    farthest from those before it (Gonzalez 1985)."""
+    every = record.state[:: max(1, len(record) // 4000)][:, [0, 2]]
+    chosen = [every.mean(0)]
+    nearest = np.linalg.norm(every - chosen[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(every[int(nearest.argmax())])
+        nearest = np.minimum(nearest, np.linalg.norm(every - chosen[-1], axis=1))
+    points = np.array(chosen)
+    apart = np.linalg.norm(points[:, None] - points, axis=-1) + np.diag(np.full(count, np.inf))
+    return points, max(float(np.median(apart.min(0))), 1e-3)

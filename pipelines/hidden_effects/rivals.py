@@ -27,12 +27,12 @@ import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
 from pipelines.diagnosis.trial import trial_of
-from shiplog import diagnose, evidence, record, reference, runs, segments
+from shiplog import diagnose, evidence, reading, record, runs, segments
+from shiplog.columns import Columns
 from shiplog.evidence import Unrest
 from shiplog.exceptions import RunError, ShiplogError
 from shiplog.hypotheses import Point, Trial
 from shiplog.record import Record
-from shiplog.reference import Columns
 from shiplog.segments import BIN, Cut, Linear
 from shiplog.store import Store
 
@@ -99,7 +99,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Said:
     before = segments.cut(usual, segments.begins(usual))
     rest = beyond(model, theta, before.y, of_bins(before.driven, before.y.shape[1]))
     sd = np.sqrt((rest[_used(before)] ** 2).mean(0))
-    cut, moved, shown = reference.read(model, ref.setting, trial.record, trial.rows)
+    cut, moved, shown = reading.read(model, ref.setting, trial.record, trial.rows)
     bins = cut.y.shape[1]
     y, driven, moved = cut.y, of_bins(cut.driven, bins), of_bins(moved, bins)
     used = _used(cut)
@@ -109,7 +109,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Said:
             continue
         own = []
         for i in columns.of[cause.label]:
-            q, step = i - columns.base, float(reference.STEP * columns.unit[i])
+            q, step = i - columns.base, float(reading.STEP * columns.unit[i])
             low, high = (
                 beyond(model, _with(theta, i, d), y + d * shown[..., q], driven + d * moved[..., q])
                 for d in (-step, step)
