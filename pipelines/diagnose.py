@@ -75,6 +75,7 @@ def diagnose_run(
     before = run.extended(run.config.seeds[0], recorded)
     held = None if cut is None else HeldOut(cut, before, tried)
     decision, found, dropped, lost = _decided(run, tried, point, held)
+    alone: float | None = None
     if held and decision.named and tried.reference.adapts:
         note = (
             f"{run.name} was made on these very voyages and may have learned of what is wrong: "
@@ -82,11 +83,7 @@ def diagnose_run(
         )
         if decision.adapted:
             alone = held.adapted(decision).reduction
-            does = "takes off" if alone > 0.0 else "adds"
-            note += (
-                " Its own coefficients are fitted again beside what is named; without a name that "
-                f"{does} {abs(alone):.0%} of the error."
-            )
+            note += " Its own coefficients are fitted again beside what is named."
         notes.append(note)
     context = Context(
         run,
@@ -99,6 +96,7 @@ def diagnose_run(
         where.uncovered(run, store, names, profile, held.cut) if held else (),
         where.by_channel(held) if held else (),
         where.depends_on(tried, decision, whole),
+        alone,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)

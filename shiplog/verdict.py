@@ -233,21 +233,27 @@ def sentence(
     structure: dict | None,
     gain: Gain | None,
     louder: float,
+    alone: float | None = None,
 ) -> str:
-    """The verdict in a sentence."""
+    """The verdict in a sentence. `alone`: share of the error that the model takes off when it is
+    fitted again with nothing named; None where it is not fitted again."""
     if verdict == "named":
         said = " ".join(_likely(cause) for cause in causes)
         if gain is None:
             return said
-        if not gain.real:
-            return (
+        if gain.real:
+            said = (
+                f"{said} With it in the model, the error on {gain.windows} held-out windows falls "
+                f"by {gain.reduction:.0%} ({gain.low:.0%} to {gain.high:.0%})."
+            )
+        else:
+            said = (
                 f"{said} On {gain.windows} held-out windows no gain is sure: the error is "
                 f"{_less(gain.reduction)} ({_less(gain.low)} to {_less(gain.high)})."
             )
-        return (
-            f"{said} With it in the model, the error on {gain.windows} held-out windows falls by "
-            f"{gain.reduction:.0%} ({gain.low:.0%} to {gain.high:.0%})."
-        )
+        if alone is None:
+            return said
+        return f"{said} Fitted again with nothing named, the model has an error {_less(alone)}."
     if verdict == "unknown":
         assert structure is not None
         if structure["family"] == "stochastic":

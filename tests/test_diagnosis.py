@@ -395,6 +395,16 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         assert said.startswith(begins) and "The rudders lag. With it" in said
 
 
+def test_what_another_fit_brings_alone_is_in_the_sentence():
+    sure = {"sentence": "The wind is late.", "indistinguishable_from": [], "probability": 1.0}
+    gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
+    assert sentence("named", [sure], None, gained, 1.0, 0.32).endswith(
+        "falls by 40% (30% to 50%). Fitted again with nothing named, the model has an error "
+        "32.0% less."
+    )
+    assert sentence("named", [sure], None, gained, 1.0, -0.1).endswith("has an error 10.0% more.")
+
+
 def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     """Rudders must move to tell a lag from a delay, screws turn to tell lost thrust from a rough
     hull, and the ship swing both ways to tell a gyro's scale from its bias."""

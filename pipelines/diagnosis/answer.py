@@ -55,6 +55,8 @@ class Context:
     untested        label → why it could not be tested
     dropped         label → why held-out voyages refute it
     lost            why no name would be believed; empty where one would
+    alone           what the model takes off fitted again with nothing named, where it is fitted
+                    again beside what is named
     """
 
     run: Run
@@ -67,6 +69,7 @@ class Context:
     uncovered: Sequence[Interval] = ()
     wrong: Sequence[dict] = ()
     unseen: Sequence[dict] = ()
+    alone: float | None = None
 
 
 def verdict(
@@ -97,7 +100,9 @@ def verdict(
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     sentence = f"{context.lost}: no cause can be told."
     if not context.lost:
-        sentence = verdicts.sentence(said, causes, structure, found, decision.louder)
+        sentence = verdicts.sentence(
+            said, causes, structure, found, decision.louder, context.alone
+        )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
         verdict=said,
