@@ -128,14 +128,21 @@ class Run:
 
     @property
     def extension(self) -> Extension | None:
-        """The causes that a diagnosis named and put into this run; None for a plain one."""
+        """The causes that a diagnosis named and put into this run; None for a plain one. Raises
+        RunError for one of an earlier program."""
         path = self.path / "extension.json"
         if not path.is_file():
             return None
         told = json.loads(path.read_text("utf-8"))
         arrays = _arrays(self.path / "extension.safetensors")
         own = user_causes.load(sorted(self.path.glob("extension-*.py")))
-        return Extension.of(told, arrays, own)
+        found = Extension.of(told, arrays, own)
+        if not self.config.physical and found.coefficients.any() and found.coefficients.ndim != 2:
+            raise RunError(
+                f"{self.name} was extended by an earlier shiplog, which bent networks otherwise.",
+                hint="extend its base again with `shiplog diagnose --extend`.",
+            )
+        return found
 
     def base(self) -> tuple[Any, Start, MMG, np.ndarray]:
         """What a diagnosis bends: the plain model, its coefficients, and an MMG of the ship whose

@@ -1133,6 +1133,28 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
     assert found.evidence == -np.inf
 
 
+def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
+    """Three halvings at most; then it has no evidence. A path of kilometres ran away, too."""
+    trial, decision = still
+    at, path = trial.at, decision.first.path
+    away = []
+
+    def bounded(numbers, *given):
+        point = at({n: np.minimum(v, 0.2) for n, v in numbers.items()}, *given)
+        if abs(numbers["heading_offset"][0]) > 0.2:
+            away.append(float(numbers["heading_offset"][0]))
+            return replace(point, linear=replace(point.linear, e=point.linear.e + 1e5))
+        return point
+
+    monkeypatch.setattr(trial, "at", bounded)
+    _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([0.8])}, path)
+    assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
+    assert -15.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
+    away.clear()
+    _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([8.0])}, path)
+    assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
+
+
 def test_recorded_actuators_are_no_delay(still):
     """No late rudder, no late clock on an ordinary day: evidence about zero or below."""
     trial, decision = still

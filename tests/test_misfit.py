@@ -94,7 +94,7 @@ def test_what_it_bends_the_network_by_is_what_it_pushes():
     assert twice.bent == pytest.approx(2.0 * own.bends(weights))
     assert plain.bend(np.zeros((0, 3))) is plain
     with pytest.raises(ValueError, match="72"):
-        plain.bend(np.zeros((72, 3)))
+        plain.bend(np.ones((72, 3)))
 
 
 def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():

@@ -53,8 +53,9 @@ class Network:
         return ()
 
     def bend(self, weights: np.ndarray) -> Network:
-        """With weights [F, 3] more, if any. Raises ValueError for those of other features."""
-        if not len(weights):
+        """With weights [F, 3] more; zeros change nothing. Raises ValueError for those of other
+        features."""
+        if not np.any(weights):
             return self
         if weights.shape != (len(self.phase), 3):
             raise ValueError(f"weights {weights.shape} are not of {len(self.phase)} features")
