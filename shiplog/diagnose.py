@@ -16,7 +16,7 @@ import numpy as np
 from shiplog import unnamed
 from shiplog.causes import Cause
 from shiplog.decision import LEAST, PULSES, Decision, Named, Structure
-from shiplog.hypotheses import Found, Point, Trial
+from shiplog.hypotheses import FALLS, Found, Point, Trial
 from shiplog.unnamed import Pulses
 
 LEARNED = 40.0  # that the first one must beside a network that has learned from these voyages
@@ -356,7 +356,9 @@ def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     for one in contenders:
         numbers = dict(base.numbers) | dict(one.numbers)
         beat = max((f.evidence for _, f in settled), default=-math.inf) - ALIKE
-        at, fitted = trial.settle((*included, one.name), numbers, point.path, beat)
+        at, fitted = trial.settle(
+            (*included, one.name), numbers, point.path, beat, base.evidence - FALLS
+        )  # fmt: skip
         if np.isfinite(fitted.evidence):
             settled.append((at, fitted))
     return sorted(settled, key=lambda pair: -pair[1].evidence)

@@ -26,6 +26,7 @@ FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
 ROUNDS = 6  # of linearising again, at most
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
+FALLS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
 SHORTER = 3  # times that a step is halved where the fit runs away
 REST = 0.02  # of a number's size: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
@@ -385,9 +386,11 @@ class Trial:
         numbers: Mapping[str, np.ndarray],
         path: Path | None,
         beat: float = -np.inf,
+        lowest: float = -np.inf,
     ) -> tuple[Point, Found]:
         """These causes together, linearised where they are until they rest; or until it is plain
-        that their evidence will not `beat` what another has."""
+        that their evidence will not `beat` what another has. A step after which it is below the
+        `lowest` that it can be at rest, or falls far, went too far."""
         by = {cause.label: cause for cause in self.reference.model.causes}
         point, louder, near, before = None, 1.0, None, np.inf
         stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
@@ -398,6 +401,8 @@ class Trial:
                 if np.abs(point.linear.e).max() > AWAY:
                     raise np.linalg.LinAlgError("a path that ran away")
                 base, _ = self.scan(point, (), included, near)
+                if base.evidence < lowest:
+                    raise np.linalg.LinAlgError("a step too far")
             except np.linalg.LinAlgError:  # the fit ran away, and its path with it
                 if shorter == SHORTER:
                     assert self._first is not None
@@ -409,6 +414,7 @@ class Trial:
                     numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
                 continue
             path, stood = point.path, numbers
+            lowest = max(lowest, base.evidence - FALLS)
             louder = near = base.louder
             moved = {}
             for name in included:

@@ -1153,6 +1153,10 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     away.clear()
     _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
+    low = decision.nothing.evidence + 900.0  # nothing at rest is so high: each step went too far
+    begin = {"heading_offset": np.array([0.01])}
+    _, found = trial.settle(("heading_offset",), begin, path, -np.inf, low)
+    assert found.evidence == -np.inf
 
 
 def test_recorded_actuators_are_no_delay(still):
