@@ -138,6 +138,11 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
         learned(CURRENT, named("current")), learned(CURRENT, NONE), learned(lost, NONE),
         learned(lost, named("thrust_loss")), learned(lost, named("current")),
     ])  # fmt: skip
+    sure = [{"name": "none", "probability": 0.6}]
+    silent = learned(lost, NONE | {"ranking": sure})
+    assert silent.right and silent.belief == (0.6, True)
+    assert not learned(CURRENT, NONE | {"ranking": sure}).right
+    assert not answer(lost, NONE).right and not learned(lost, named("current")).right
     of = "network on affected data: "
     assert rows[f"{of}what it cannot take in"][1] == "1/2"
     assert rows[f"{of}what it has taken in, named"][1] == "1/3"

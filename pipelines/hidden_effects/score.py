@@ -110,17 +110,21 @@ class Answer:
         return min((cause["size"] for cause in self.key["causes"]), default=math.nan)
 
     @property
+    def sought(self) -> tuple[str, ...]:
+        """Of what is hidden, what may be found: of what a network has taken in nothing is."""
+        taken = parameters.ABSORBED if self.planned.model == "feedforward" else ()
+        return tuple(name for name in self.hidden if name not in taken)
+
+    @property
     def family(self) -> str | None:
         return (self.verdict.get("structure") or {}).get("family")
 
     @property
     def right(self) -> bool:
         """All of it and nothing else; of what no cause has a name for, its family."""
-        if self.kind == "none":
-            return self.word == "none"
         if self.kind == "outside":
             return self.word == "unknown" and self.family == self.key["structure"]["family"]
-        return set(self.named) == set(self.hidden)
+        return set(self.named) == set(self.sought) if self.sought else self.word == "none"
 
     @property
     def misnamed(self) -> bool:
@@ -150,7 +154,7 @@ class Answer:
         if first.get("probability") is None:
             return None
         name = _name(first["name"])
-        truths = {"none": ("none",), "outside": ("unknown",)}.get(self.kind, self.hidden)
+        truths = ("unknown",) if self.kind == "outside" else self.sought or ("none",)
         return float(first["probability"]), name in truths
 
     @property
