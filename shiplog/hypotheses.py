@@ -186,8 +186,8 @@ class Trial:
         ref = self.reference
         level = self.level(point, self.quietest(point), ())
         unit = ref.columns.unit
-        left, d = self.left(point.linear, level.solution[: len(unit)] * unit)
-        modes = evidence.modes(evidence.weighed(left, self.unrest), self.unrest)
+        weighed, d = self.left_of(point, level.solution[: len(unit)] * unit)
+        modes = evidence.modes(weighed, self.unrest)
         gram = modes.gram(level.louder).scaled(unit[: len(d)])
         d = np.concatenate(([-1.0], d / unit[: len(d)]))
         chi2 = np.einsum("i,sij,j->s", d, gram.each, d)
@@ -222,6 +222,13 @@ class Trial:
         if misfit is not None:
             linear = linear.less(misfit.pushed(linear.cut, self.grid) @ d[count:])
         return linear, d[:count]
+
+    def left_of(self, point: Point, d: np.ndarray) -> tuple[Weighed, np.ndarray]:
+        """The same of a point, as its products."""
+        linear, own = self.left(point.linear, d)
+        if linear is point.linear:
+            return point.weighed, own
+        return evidence.weighed(linear, self.unrest), own
 
     def volume(self, louder: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a

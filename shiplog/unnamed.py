@@ -152,8 +152,7 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
     accelerations go together as those of no other unrest do. Judged on what is left."""
     ref = trial.reference
-    linear, d = trial.left(point.linear, trial.solved(point, base))
-    left = evidence.weighed(linear, trial.unrest)
+    left, d = trial.left_of(point, trial.solved(point, base))
     r = np.concatenate(([1.0], -d))
     alone = replace(
         left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
