@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipelines.diagnosis import answer, pictures, trial, where
+from pipelines.diagnosis import answer, own, pictures, trial, where
 from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
@@ -72,19 +72,31 @@ def diagnose_run(
     whole = tried.covering(point)
     pushed = where.pushed(tried, point, whole)
     cut = trial.windows_of(run, store, names, profile)
-    before = run.extended(run.config.seeds[0], recorded)
-    held = None if cut is None else HeldOut(cut, before, tried)
-    decision, found, dropped, lost = _decided(run, tried, point, held)
-    alone: float | None = None
+    judge = None if cut is None else HeldOut(cut, own.simulator(run, tried), tried)
+    decision, found, dropped = _decided(run, tried, point, judge)
+    held, seen, alone = judge, (tried, decision), None
+    if not run.config.physical:
+        notes += answer.of_physics(run, found)
+        network = own.Own(run, tried)
+        if cut is not None:
+            before = run.extended(run.config.seeds[0], recorded)
+            held = HeldOut(cut, before, tried, network)
+            decision, found = held.simulated_with(decision)
+        seen = network.beside(decision)
+        whole = seen[0].covering(seen[1].first)
+    lost = held.lost(found) if held else ""
+    if lost:
+        dropped |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
+        decision, found = decisions.untold(decision), None
     if held and decision.named and tried.reference.adapts:
-        note = (
-            f"{run.name} was made on these very voyages and may have learned of what is wrong: "
-            "numbers are then of what is left, and smaller than the cause's."
-        )
+        if run.config.physical:
+            notes.append(
+                f"{run.name} was made on these very voyages and may have learned of what is "
+                "wrong: numbers are then of what is left, and smaller than the cause's."
+            )
         if decision.adapted:
             alone = held.adapted(decision).reduction
-            note += " Its own coefficients are fitted again beside what is named."
-        notes.append(note)
+            notes.append("Its own coefficients are fitted again beside what is named.")
     context = Context(
         run,
         before_effect and nominal is not None,
@@ -95,12 +107,12 @@ def diagnose_run(
         pushed,
         where.uncovered(run, store, names, profile, held.cut) if held else (),
         where.by_channel(held) if held else (),
-        where.depends_on(tried, decision, whole),
+        where.depends_on(*seen, whole),
         alone,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    done = Diagnosis(verdict, out, decision, tried, whole, held, after)
+    done = Diagnosis(verdict, out, decision, tried, seen, whole, held, after)
     _save(done, run, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
@@ -119,12 +131,12 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
 
 def _decided(
     run: Run, tried: Trial, point: Point, held: HeldOut | None
-) -> tuple[Decision, Gain | None, dict[str, str], str]:
-    """Decision, gain, label → why held-out voyages refute it, and why nothing can be told if so."""
+) -> tuple[Decision, Gain | None, dict[str, str]]:
+    """Decision, gain, label → why held-out voyages refute it."""
     dropped: dict[str, str] = {}
     decision = diagnose.decide(tried, point)
     if held is None:
-        return decision, None, dropped, ""
+        return decision, None, dropped
     decision, found, refuted = held.refuted(decision)
     for _ in range(REFUTED - 1):  # what held-out voyages refute may have hidden what they do not
         if not refuted:
@@ -137,11 +149,7 @@ def _decided(
         dropped |= refused
         if chosen is not None:
             decision, found = chosen, held.gain(chosen)
-    lost = held.lost(found)
-    if lost:
-        dropped |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
-        decision, found = decisions.untold(decision), None
-    return decision, found, dropped, lost
+    return decision, found, dropped
 
 
 def _write(done: Diagnosis) -> None:

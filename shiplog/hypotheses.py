@@ -15,6 +15,7 @@ from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
 from shiplog.columns import HELD
 from shiplog.evidence import Modes, Weighed
+from shiplog.models.network import Network
 from shiplog.reading import read
 from shiplog.record import Record
 from shiplog.reference import Reference
@@ -458,7 +459,8 @@ class Trial:
 
     def _coefficients(self, level: Level) -> np.ndarray:
         ref, count = self.reference, self.reference.columns.base
-        if ref.misfit is not None:
+        if isinstance(ref.model.base, Network):
+            assert ref.misfit is not None
             columns = ref.columns
             return ref.misfit.bends(level.solution[columns.linearised : len(columns.unit)])
         return ref.theta + level.solution[:count] * ref.columns.unit[:count]

@@ -49,33 +49,27 @@ class Misfit:
 
 
 def of(
-    network: Network, cuts: list[Cut], g: Grid, modes: Modes, known: np.ndarray,
+    network: Network, cut: Cut, g: Grid, modes: Modes, known: np.ndarray,
     unit: np.ndarray, push: np.ndarray,
 ) -> Misfit:  # fmt: skip
     """Of the size that is likeliest beside numbers [C] in `unit`s [C], of which so much is `known`
     before any data.
 
-    cuts   of the campaign that `modes` are of, and of others whose inputs matter
+    cut    of the voyages that `modes` are of
     push   [3] unit of size
     """
-    waves = [_features(network, structure.at_knots(cut, g)) for cut in cuts]
-    spread = [np.tensordot(one, one, ((0, 1), (0, 1))) for one in waves]
-    sums = np.linalg.eigh(sum(spread))[1][:, -SUMS:]
+    waves = _features(network, structure.at_knots(cut, g))
+    sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
     count = sums.shape[1]
     axes = np.zeros((3, len(sums), 3 * count))
     for channel, size in enumerate(push):
         axes[channel][:, channel * count : (channel + 1) * count] = size * sums
     whole = Misfit(network, axes)
     by = np.concatenate(([1.0], unit, np.ones(3 * count)))
-    total = modes.beside(whole.pushed(cuts[0], g)).total(np.ones(len(cuts[0])))
+    total = modes.beside(whole.pushed(cut, g)).total(np.ones(len(cut)))
     total = total * np.outer(by, by)
     size = max(SIZES, key=lambda one: _likelihood(total, known, one))
     told = total[1 + len(known) :, 1 + len(known) :]
-    if len(cuts) > 1:  # the others would say of the same as much for each knot
-        seen = [np.trace(sums.T @ one @ sums) for one in spread]
-        for part in (slice(c * count, (c + 1) * count) for c in range(3)):
-            each = np.trace(told[part, part]) / seen[0]
-            told[part, part] += each * sums.T @ sum(spread[1:]) @ sums
     felt, turned = np.linalg.eigh(size**2 * told)
     return Misfit(network, axes @ (size * turned[:, felt > FELT]))
 

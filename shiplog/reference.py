@@ -8,13 +8,14 @@ it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from shiplog import evidence, misfit, segments
-from shiplog.causes import Setting
+from shiplog.causes import Cause, Setting, constants_of
 from shiplog.columns import HELD, Columns
 from shiplog.evidence import Modes, Unrest
 from shiplog.misfit import Misfit
@@ -61,9 +62,10 @@ class Reference:
                  made on the very data that are diagnosed
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
     adapts       whether it has learned of what is wrong there, so that a cause takes another fit
-    misfit       what a network gets wrong of its own inputs
-    counts       for how much of itself a trial counts: what a network gets wrong each voyage has
-                 its own of, where it learned from that
+    learned      whether it stands for a network that has, and that no voyage is held out to
+    misfit       what is wrong of such a network's inputs
+    counts       for how much of itself a trial counts: what is wrong there each voyage has its own
+                 of
     """
 
     model: Extended
@@ -80,13 +82,9 @@ class Reference:
     modes: Modes | None
     freedom: float
     adapts: bool = False
+    learned: bool = False
     misfit: Misfit | None = None
     counts: float = 1.0
-
-    @property
-    def learned(self) -> bool:
-        """Whether the model is a network that has seen the very voyages in question."""
-        return self.adapts and not isinstance(self.model.base, MMG)
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -202,12 +200,12 @@ def learn(
     record: Record,
     at: Settled | None = None,
     kappa: float | None = None,
-    recorded: Record | None = None,
     least: float = CAMPAIGN,
+    inputs: Network | None = None,
 ) -> Reference:
     """From the nominal campaign, linearised `at` where it settles. κ is chosen on its own voyages
-    unless given, and not below `least`. `recorded`: voyages whose inputs a network's misfit is to
-    cover, too."""
+    unless given, and not below `least`. `inputs`: a network, of whose inputs the model gets
+    something wrong."""
     at = at or settled(model, setting, start, record)
     columns = columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
@@ -217,12 +215,9 @@ def learn(
     modes = evidence.modes(evidence.weighed(linear, at.unrest), at.unrest)
     held = _anchor(start, at.theta, columns)
     wrong = None
-    if isinstance(model.base, Network):
-        cuts = [linear.cut]
-        if recorded is not None:
-            cuts.append(segments.cut(recorded, segments.begins(recorded)))
+    if inputs is not None:
         wrong = misfit.of(
-            model.base, cuts, g, modes, columns.known, columns.unit, at.unrest.push
+            inputs, linear.cut, g, modes, columns.known, columns.unit, at.unrest.push
         )  # fmt: skip
         modes = modes.beside(wrong.pushed(linear.cut, g))
         columns = columns.with_misfit(wrong.count)
@@ -288,20 +283,20 @@ def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> flo
 
 
 def assume(
-    model: Extended, setting: Setting, start: Start, record: Record, given: bool
-) -> Reference:
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool,
+    inputs: Network | None = None,
+) -> Reference:  # fmt: skip
     """Where no campaign shows what is usual: the unrest is as large as it is on these voyages.
 
-    given   coefficients as somebody gave them, held to a tenth of their plausible spread; else a
-            fit to these voyages made them, and they are as free as they plausibly are
+    given    coefficients as somebody gave them, held to a tenth of their plausible spread; else a
+             fit to these voyages made them, and they are as free as they plausibly are
+    inputs   a network that learned from these voyages
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
     at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
-    learned = not (given or isinstance(model.base, MMG))
-    kappa = None if learned else CAREFUL_KAPPA
-    least = VOYAGES if isinstance(model.base, Network) else CAMPAIGN
-    whole = learn(model, setting, start, record, at, kappa, least=least)
+    kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
+    whole = learn(model, setting, start, record, at, kappa, least, inputs)
     columns = whole.columns
     information = np.diag(columns.known.copy())
     causes = slice(columns.base, columns.linearised)
@@ -309,5 +304,30 @@ def assume(
     information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
-        adapts=not given, counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if learned else 1.0,
+        adapts=not given, learned=inputs is not None,
+        counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if inputs is not None else 1.0,
+    )  # fmt: skip
+
+
+def beside(reference: Reference, causes: Sequence[Cause]) -> Reference:
+    """One that `assume` made, with these causes in its model and no others."""
+    setting, columns = reference.setting, reference.columns
+    sizes = [cause.sizes(setting) for cause in causes]
+    first, last = columns.base, columns.linearised
+    more = sum(len(size) for size in sizes)
+
+    def widened(values: np.ndarray, own: float) -> np.ndarray:
+        return np.concatenate((values[:first], np.full(more, own), values[last:]))
+
+    constants = {**constants_of(causes, setting), **reference.model.constants}
+    return replace(
+        reference,
+        model=replace(reference.model, causes=tuple(causes), constants=constants),
+        columns=Columns(
+            first, tuple(causes),
+            np.concatenate((columns.unit[:first], *sizes, columns.unit[last:])), columns.misfit,
+        ),
+        information=np.diag(widened(np.diag(reference.information), HELD)),
+        pull=widened(reference.pull, 0.0),
+        anchor=widened(reference.anchor, 0.0),
     )  # fmt: skip

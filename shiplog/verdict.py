@@ -249,11 +249,11 @@ def sentence(
         else:
             said = (
                 f"{said} On {gain.windows} held-out windows no gain is sure: the error is "
-                f"{_less(gain.reduction)} ({_less(gain.low)} to {_less(gain.high)})."
+                f"{less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
             )
         if alone is None:
             return said
-        return f"{said} Fitted again with nothing named, the model has an error {_less(alone)}."
+        return f"{said} Fitted again with nothing named, the model has an error {less(alone)}."
     if verdict == "unknown":
         assert structure is not None
         if structure["family"] == "stochastic":
@@ -322,7 +322,7 @@ def _or(cause: dict) -> str:
     )
 
 
-def _less(share: float) -> str:
+def less(share: float) -> str:
     return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"
 
 
@@ -359,8 +359,8 @@ def markdown(verdict: Verdict) -> str:
         g = verdict.gain
         lines += [
             "## Gain on held-out windows", "",
-            f"L {g.before:.0f} before, {g.after:.0f} after: {_less(g.reduction)} "
-            f"({_less(g.low)} to {_less(g.high)}, {g.windows} windows, each predicted with numbers "
+            f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
+            f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
             "fitted without its voyage).", "",
             "By channel: " + ", ".join(
                 f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items()

@@ -28,7 +28,8 @@ LEAST_S = 240.0  # of unbroken record, below which nothing can be said
 class Diagnosis:
     """The verdict and what it rests on.
 
-    whole   as the model stood, on overlapping segments
+    seen    trial and decision of the model that is simulated: for a network, not those that judge
+    whole   as that stood, on overlapping segments
     held    the windows; None where no stretch was long enough for one
     after   the extended model; None where nothing was named
     """
@@ -37,6 +38,7 @@ class Diagnosis:
     folder: Path
     decision: Decision | None = None
     trial: Trial | None = None
+    seen: tuple[Trial, Decision] | None = None
     whole: Linear | None = None
     held: HeldOut | None = None
     after: ExtendedSimulator | None = None
@@ -124,6 +126,21 @@ def verdict(
         else (),
         notes=(*notes, *verdicts.remains(decision, said)),
     )
+
+
+def of_physics(run: Run, found: Gain | None) -> list[str]:
+    """Whom the causes of a network were asked of, and what they are worth there."""
+    said = [
+        f"{run.name} is a network: the causes are those that the ship's MMG lacks, fitted to the "
+        "voyages that the network was made on."
+    ]
+    if found is not None:
+        said.append(
+            f"That MMG, to which these windows are new, has an error "
+            f"{verdicts.less(found.reduction)} with them ({verdicts.less(found.low)} to "
+            f"{verdicts.less(found.high)})."
+        )
+    return said
 
 
 def _word(decision: Decision, named: bool, held: HeldOut | None, context: Context) -> str:

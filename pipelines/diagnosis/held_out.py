@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from pipelines.diagnosis.own import Own
 from shiplog import conventions, diagnose, direct
 from shiplog import decision as decisions
 from shiplog.causes import constants_of
@@ -65,9 +66,11 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class HeldOut(Rollouts):
-    """The same with the trial whose causes are judged on them."""
+    """The same with the trial whose causes are judged on them; `own` of a network, whose causes
+    another model found."""
 
     trial: Trial
+    own: Own | None = None
 
     def states_after(self, decision: Decision) -> np.ndarray:
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
@@ -95,11 +98,16 @@ class HeldOut(Rollouts):
         """The model with what is named in it, with numbers from all voyages."""
         named, beside = decision.named, None
         if decision.adapted:
-            beside = self.trial.coefficients(decision.point, decision.base)
+            trial, seen = self.simulated(decision)
+            beside = trial.coefficients(seen.point, seen.base)
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
             {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
         )  # fmt: skip
+
+    def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
+        """The model that is simulated on the trial's segments, with what is named in it."""
+        return (self.trial, decision) if self.own is None else self.own.beside(decision)
 
     def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
         """What is left of a decision, its gain, and label → why not of what is not.
@@ -109,26 +117,19 @@ class HeldOut(Rollouts):
         fault though it is worth nothing, but not where it makes the error more; so is what differs
         from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
         steps of a second hide a lag of a third of one. A model that has learned of it, and gains
-        by being fitted again beside it, is so without each cause, too. To a network no voyage that
-        it has seen is held out: it is the better without what it has taken in a part of, so that
-        what is beyond doubt is named; and a gain must be worth something to be sure.
+        by being fitted again beside it, is so without each cause, too.
         """
         dropped: dict[str, str] = {}
         if not decision.named:
             return decision, None, dropped
         found = self.gain(decision)
-        learned = self.trial.reference.learned
-        surely = WORTH if learned else 0.0
         if self.trial.reference.adapts:
-            beside = replace(decision, adapted=True)
-            again = self.gain(beside)
-            if again.after < found.after:
-                decision, found = beside, again
+            decision, found = self.better(decision, found)
         while decision.named:
             harm = found.after > HARM * found.before
             asked = [n for n in decision.named if harm or not n.cause.only_read]
             alone = len(decision.named) == 1
-            if not asked or (found.low > surely and alone and not decision.adapted):
+            if not asked or (found.low > 0.0 and alone and not decision.adapted):
                 break
             tried = []
             for one in asked:
@@ -136,9 +137,9 @@ class HeldOut(Rollouts):
                 tried.append((self.worth(rest, decision), rest, one))
             worth, rest, one = min(tried, key=lambda t: t[0].before)
             gains = worth.reduction >= (0.0 if alone else WORTH)
-            if gains and (worth.low > surely or not alone or one.evidence >= diagnose.MORE):
+            if gains and (worth.low > 0.0 or not alone or one.evidence >= diagnose.MORE):
                 break
-            undecided = worth.high > (0.0 if alone else WORTH) or learned
+            undecided = worth.high > (0.0 if alone else WORTH)
             if not harm and undecided and self._sure(one, alone):
                 break
             why = f"{worth.reduction:+.1%}"
@@ -153,6 +154,21 @@ class HeldOut(Rollouts):
             decision, found = rest, self.gain(rest)
         return decision, found if decision.named else None, dropped
 
+    def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
+        """The same with the model's own coefficients fitted again beside what is named, where that
+        makes the error less."""
+        beside = replace(decision, adapted=True)
+        again = self.gain(beside)
+        return (beside, again) if again.after < found.after else (decision, found)
+
+    def simulated_with(self, decision: Decision) -> tuple[Decision, Gain | None]:
+        """What others named in this model, and what it is worth there."""
+        plain = replace(decision, adapted=False)
+        if not decision.named:
+            return plain, None
+        found = self.gain(plain)
+        return self.better(plain, found) if self.trial.reference.adapts else (plain, found)
+
     def worth(self, rest: Decision, decision: Decision) -> Gain:
         """What a decision takes off beside one with a cause less."""
         return gain(
@@ -161,8 +177,8 @@ class HeldOut(Rollouts):
         )  # fmt: skip
 
     def _sure(self, one: Named, alone: bool) -> bool:
-        """Whether it differs from her nominal campaign beyond doubt, or from what a network has
-        learned."""
+        """Whether it differs from her nominal campaign beyond doubt, or from all that a smooth
+        function of a network's inputs says."""
         ref = self.trial.reference
         wanted = diagnose.SURE * (1.0 if alone else BESIDE)
         return (ref.nominal is not None or ref.learned) and one.evidence > wanted
@@ -205,7 +221,7 @@ class HeldOut(Rollouts):
         all that was named, or they are worse than a ship that keeps her velocities, with what was
         named in them too. Empty where neither holds."""
         own = float(self.losses_before.sum(1).mean())
-        after = own if found is None else found.after
+        after = own if found is None else min(own, found.after)
         hold = float(self.parts(self.measured[:, :1]).sum(1).mean())
         other, turned = conventions.best(self.before, self.cut)
         if turned < min(TURNED * after, hold):
@@ -251,5 +267,8 @@ class HeldOut(Rollouts):
         if included or decision.adapted:
             fitted, beside = self.trial.without(decision.point, included, decision.louder, out)
             numbers = {**fitted, **numbers}
+            if self.own is not None and decision.adapted:
+                trial, seen = self.own.beside(decision)
+                _, beside = trial.without(seen.point, tuple(seen.base.numbers), seen.louder, out)
             coefficients = beside if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

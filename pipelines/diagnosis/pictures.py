@@ -20,7 +20,7 @@ from shiplog.hypotheses import Trial
 from shiplog.models.mmg import body
 from shiplog.reading import corrected
 from shiplog.record import Record
-from shiplog.segments import KNOT, Linear
+from shiplog.segments import KNOT
 from shiplog.unexplained import around
 from shiplog.windows import Windows
 
@@ -34,10 +34,10 @@ def save(done: Diagnosis, path: Path) -> None:
 
 def exhibit(done: Diagnosis) -> Exhibit:
     """Of a diagnosis that came to a decision."""
-    trial, decision, whole = done.trial, done.decision, done.whole
-    assert trial is not None and decision is not None and whole is not None
+    trial, decision = done.trial, done.decision
+    assert trial is not None and decision is not None
     profile = trial.record.profile
-    residual, named = _residual(trial, decision, whole)
+    residual, named = _residual(done)
     tracks, errors = _before_and_after(done)
     return Exhibit(
         title=f"{profile.ship.name}: {listed(trial.record.names, most=3)}",
@@ -66,10 +66,10 @@ def _measured(record: Record) -> pl.DataFrame:
 # --- forces ---------------------------------------------------------------------------------------
 
 
-def _residual(
-    trial: Trial, decision: Decision, whole: Linear
-) -> tuple[pl.DataFrame, tuple[str, ...]]:
+def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
+    assert done.seen is not None and done.whole is not None
+    (trial, decision), whole = done.seen, done.whole
     ref, record = trial.reference, trial.record
     usual, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
     found = unexplained.posterior(*trial.left(whole, usual), unrest, record)
@@ -84,7 +84,8 @@ def _residual(
     force = _caused(trial, decision, rows) @ mass.T
     if decision.pulses is not None:
         names.append(PULSES)
-        force = force + _pulses(trial, decision)[rows]
+        assert done.trial is not None and done.decision is not None
+        force = force + _pulses(done.trial, done.decision)[rows]
     if not names:
         force = np.full_like(force, np.nan)
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}

@@ -56,7 +56,8 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
 def trial_of(
     run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path]
 ) -> tuple[Trial, dict[str, str]]:
-    """Reference and trial; which causes cannot be tested, and why."""
+    """Reference and trial; which causes cannot be tested, and why. Of a network the ship's MMG is
+    asked, fitted to the voyages that the network was made on."""
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
     extension = run.extension
     held = {} if extension is None else {c.label: c for c in extension.causes}
@@ -78,23 +79,33 @@ def trial_of(
             untested[cause.label] = missing
     model, start = _model(run, chosen, setting)
     if nominal is None:
-        known = reference.assume(model, setting, start, recorded, given=run.given)
+        inputs = None if run.config.physical else run.base()[0]
+        known = reference.assume(model, setting, start, recorded, run.given, inputs)
         return Trial(known, recorded, tuple(held)), untested
     # where the nominal voyages settle depends on them alone, so that it can be kept
     before = setting_of(run, nominal, nominal)
     testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
     at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
-    known = reference.learn(model, setting, start, nominal, at, recorded=recorded)
+    known = reference.learn(model, setting, start, nominal, at)
     return Trial(known, recorded, tuple(held)), untested
 
 
 def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
-    """The run's model with room for these causes, and where its coefficients stand."""
-    base, start, stand_in, values = run.base()
-    needed = constants_of(causes, setting)
-    if run.extension is not None:
-        needed |= run.extension.constants
-    return Extended(base, tuple(causes), stand_in, values, needed), start
+    """The run's physics with room for these causes, and where its coefficients stand."""
+    if run.config.physical:
+        base, start, stand_in, values = run.base()
+    else:
+        base, start = run.ship()
+        stand_in, values = base, start.values
+    return Extended(
+        base, tuple(causes), stand_in, values, constants_for(run, causes, setting)
+    ), start
+
+
+def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[str, np.ndarray]:
+    """What these causes' forces need, as the run has it or as her setting says."""
+    held = {} if run.extension is None else run.extension.constants
+    return constants_of(causes, setting) | dict(held)
 
 
 def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:

@@ -143,6 +143,7 @@ class ShallowWater(Cause):
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         near = _bumps(state, at["shallow.places"], at["shallow.spacing"])
         depth = (near * jnp.stack(p)).sum(-1)
+        depth = jnp.where(depth >= 0.0, depth, 0.0)  # no water is deeper than deep
         grow = {
             "hull.x_0f": 0.3, "hull.x_0a": 0.3, "hull.y_v": 0.8, "hull.n_r": 0.8,
             "hull.c_d": 1.2, "body.m_y": 0.7, "body.i_j": 0.2,
