@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
+from pipelines.diagnosis import own
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.diagnosis.trial import record_of, trial_of, windows_of
 from pipelines.known_ship import cases, sensors
@@ -25,7 +26,7 @@ def afloat(tmp_path_factory):
     """Voyages in a current, and a small network of them that is trained for seconds."""
     work = tmp_path_factory.mktemp("network")
     (work / "logs").mkdir()
-    case = cases.draw(SEED, cause="current", size=1.0, seconds=500)
+    case = cases.draw(SEED, cause="current", size=1.0, seconds=3000)
     paths = []
     for leg in case.trial:
         paths.append(work / "logs" / f"{leg.name}.mcap")
@@ -41,9 +42,15 @@ def afloat(tmp_path_factory):
     run = train_run(config, store, work / "run")
     recorded = record_of(store, names, run.profile)
     trial, untested = trial_of(run, None, recorded, ())
+    point = trial.begin({})
+    decision = diagnose.decide(trial, point)
+    network = own.Own(run, trial)
+    cut = windows_of(run, store, names, run.profile)
+    before = run.extended(run.config.seeds[0], recorded)
     return SimpleNamespace(
-        work=work, run=run, store=store, names=names, trial=trial, untested=untested,
-        recorded=recorded, point=trial.begin({}),
+        work=work, run=run, store=store, names=names, trial=trial, untested=untested, case=case,
+        recorded=recorded, point=point, decision=decision, network=network,
+        held=HeldOut(cut, before, trial, network),
     )  # fmt: skip
 
 
@@ -61,32 +68,102 @@ def test_what_only_renames_its_inputs_is_not_testable_beside_a_network(afloat):
     assert not tested & set(afloat.untested)
 
 
-def test_its_misfit_and_no_coefficients_stand_beside_every_hypothesis(afloat):
-    """The level's last numbers are the misfit's, and what they push is what is taken off."""
+def test_the_whole_current_is_found_though_the_network_learned_in_it(afloat):
+    """By the ship's MMG, fitted to the same voyages: it has no heading in its forces."""
+    (one,) = afloat.decision.named
+    (hidden,) = afloat.case.causes
+    assert one.cause.label == hidden.name == "current"
+    for name, truth in hidden.parameters.items():
+        shown = one.shown[name]
+        assert shown.low <= truth["value"] <= shown.high
+    assert one.evidence > diagnose.LEARNED
+
+
+def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat):
+    """The level's last numbers are its, and what they push is what is taken off."""
     trial, ref = afloat.trial, afloat.trial.reference
-    assert ref.learned and ref.columns.base == 0
+    assert ref.learned and ref.columns.base == len(ref.theta) > 0
     count = ref.columns.linearised
     assert ref.misfit.count == ref.columns.misfit == len(ref.columns.unit) - count > 0
     base, _ = trial.scan(afloat.point, ())
     d = trial.solved(afloat.point, base)
-    left, own = trial.left(afloat.point.linear, d)
+    left, own_numbers = trial.left(afloat.point.linear, d)
     weights = d[count:]
     pushed = ref.misfit.pushed(afloat.point.linear.cut, trial.grid) @ weights
     wanted = afloat.point.linear.e - np.einsum(
         "sbcz,sz->sbc", afloat.point.linear.z[..., 6:], pushed
     )
-    assert left.e == pytest.approx(wanted) and own == pytest.approx(d[:count])
+    assert left.e == pytest.approx(wanted) and own_numbers == pytest.approx(d[:count])
     assert np.abs(pushed).max() > 0.0
-    assert trial.coefficients(afloat.point, base) == pytest.approx(ref.misfit.bends(weights))
+    moved = trial.coefficients(afloat.point, base)
+    assert moved == pytest.approx(ref.theta + d[: ref.columns.base])
+
+
+def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
+    """And stays: what is fitted again beside it is the network's bends, on the judge's segments."""
+    trial, seen = afloat.network.beside(afloat.decision)
+    assert seen.named == afloat.decision.named
+    (one,) = seen.named
+    assert seen.point.numbers["current"] == pytest.approx(one.numbers)
+    assert seen.base.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
+    assert seen.first.numbers == {} and seen.nothing.numbers == {}
+    ref, base = trial.reference, trial.reference.model.base
+    d = trial.level(seen.point, seen.louder, ("current",)).solution
+    weights = d[ref.columns.linearised : len(ref.columns.unit)]
+    assert trial.coefficients(seen.point, seen.base) == pytest.approx(ref.misfit.bends(weights))
+    assert np.abs(weights).max() > 0.0 and base.bent is None
+    assert (trial.rows == afloat.trial.rows).all()
+    assert afloat.network.beside(afloat.decision)[0] is trial
+    kept, left_out = afloat.trial.weight, afloat.trial.weight.copy()
+    left_out[3] = 0.0
+    try:
+        afloat.trial.weight = left_out
+        again, _ = own.Own(afloat.run, afloat.trial).beside(afloat.decision)
+    finally:
+        afloat.trial.weight = kept
+    assert (again.weight == 0.0).nonzero()[0].tolist() == [3]
+
+
+def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
+    decision = replace(afloat.decision, adapted=True)
+    names = afloat.names
+    (numbers, bends), (others, bent) = (
+        afloat.held._without(decision, name, None) for name in names[:2]
+    )
+    whole = afloat.held.extended(decision).model.base.bent
+    assert bends.shape == bent.shape == whole.shape
+    for one in (bends, bent):
+        assert np.abs(one - whole).max() > 1e-3 * np.abs(whole).max()
+    assert np.abs(bends - bent).max() > 1e-3 * np.abs(whole).max()
+    assert not np.allclose(numbers["current"], others["current"], rtol=1e-6)
+    alone, _ = afloat.trial.without(
+        decision.point, ("current",), decision.louder, decision.point.linear.cut.voyage == 0
+    )
+    assert numbers["current"] == pytest.approx(alone["current"])
+
+
+def test_what_refutes_a_cause_is_the_mmg_to_which_voyages_are_new(afloat):
+    """It simulates as it was fitted, with what the run has of causes; of a physical run that is
+    the run."""
+    judge = own.simulator(afloat.run, afloat.trial)
+    ref = afloat.trial.reference
+    assert judge.theta == pytest.approx(ref.theta) and judge.model.causes == ()
+    assert type(judge.model.base).__name__ == "MMG"
+    extended = runs.extend(
+        afloat.run, afloat.work / "current", afloat.held.extended(afloat.decision)
+    )
+    trial, _ = trial_of(extended, None, afloat.recorded, ())
+    again = own.simulator(extended, trial)
+    assert [c.label for c in again.model.causes] == ["current"]
+    numbers = afloat.decision.named[0].numbers
+    assert again.theta[-len(numbers) :] == pytest.approx(numbers)
+    assert again.shares.keys() == set(afloat.names)
 
 
 def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     """Extended, saved, loaded: the same rollouts; diagnosed again it is what is bent further."""
-    trial = afloat.trial
-    cut = windows_of(afloat.run, afloat.store, afloat.names, afloat.run.profile)
-    before = afloat.run.extended(afloat.run.config.seeds[0], afloat.recorded)
-    held = HeldOut(cut, before, trial)
-    decision = diagnose.decide(trial, afloat.point)
+    held, cut, before = afloat.held, afloat.held.cut, afloat.held.before
+    decision = afloat.decision
     alone = replace(
         decision, named=(), point=decision.first, base=decision.nothing, apart={}, adapted=True
     )

@@ -97,9 +97,8 @@ def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extende
     else:
         base, start = run.ship()
         stand_in, values = base, start.values
-    return Extended(
-        base, tuple(causes), stand_in, values, constants_for(run, causes, setting)
-    ), start
+    constants = constants_for(run, causes, setting)
+    return Extended(base, tuple(causes), stand_in, values, constants), start
 
 
 def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[str, np.ndarray]:
