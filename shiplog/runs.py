@@ -156,17 +156,6 @@ class Run:
         own = held.coefficients[: len(values)]
         return base, replace(start, values=held.coefficients), stand_in, own
 
-    def ship(self) -> tuple[MMG, Start]:
-        """Her MMG as somebody published it, or as her particulars suggest: fitted to nothing."""
-        geometry, usual = self._published()
-        return mmg.MMG(geometry), Start(usual.values, usual.spread, usual.low, usual.high)
-
-    def _published(self) -> tuple[mmg.Geometry, mmg.Parameters]:
-        ship, main, _ = mmg.geometry_of(self.profile, self.config.physics.without)
-        path = mmg.beside(self.profile.source)
-        usual = mmg.load(path, ship, self.config.physics.without) if path else None
-        return ship, usual or mmg.estimated(ship, main)
-
     def _plain(self) -> tuple[Any, Start, MMG, np.ndarray]:
         """The same, without what an extension did to the coefficients."""
         ship, usual = self._published()
@@ -187,6 +176,17 @@ class Run:
         )
         stand_in = mmg.MMG(ship, self.config.physics.substeps)
         return simulator.model, start, stand_in, simulator.theta[:count]
+
+    def ship(self) -> tuple[MMG, Start]:
+        """Her MMG as somebody published it, or as her particulars suggest: fitted to nothing."""
+        geometry, usual = self._published()
+        return mmg.MMG(geometry), Start(usual.values, usual.spread, usual.low, usual.high)
+
+    def _published(self) -> tuple[mmg.Geometry, mmg.Parameters]:
+        ship, main, _ = mmg.geometry_of(self.profile, self.config.physics.without)
+        path = mmg.beside(self.profile.source)
+        usual = mmg.load(path, ship, self.config.physics.without) if path else None
+        return ship, usual or mmg.estimated(ship, main)
 
     def extended(
         self,
