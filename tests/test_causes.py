@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import closed
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -518,6 +519,27 @@ def test_shallow_water_acts_where_it_is_shallow():
     heavier = (g.mass + 1.35 * added) / (g.mass + added)
     assert away == pytest.approx(1.0, abs=1e-9)
     assert near == pytest.approx(1.6 / heavier, rel=0.02)
+
+
+def test_no_water_is_deeper_than_deep():
+    """A map may be less than none where bumps overlap: the forces there are deep water's, and
+    what a first look asks of a flat map is the slope that a shoal has."""
+    model, values = extended([BY["shallow_water"]])
+    abeam = np.array([[PLACES[4][0], 0.3, PLACES[4][1], 0.2, 0.0, 0.0]])
+    still = (np.zeros((1, 4)), CALM)
+
+    def at(strength):
+        return acceleration(model, values, np.eye(12)[4] * strength, abeam, *still)
+
+    assert at(-0.3) == pytest.approx(at(0.0), abs=1e-12)
+    slope = jax.jacfwd(
+        lambda s: model.acceleration(
+            jnp.concatenate((jnp.asarray(values), jnp.eye(12)[4] * s)),
+            abeam, *still,
+        )
+    )(0.0)  # fmt: skip
+    assert np.asarray(slope) == pytest.approx((at(1e-6) - at(0.0)) / 1e-6, rel=1e-3)
+    assert np.abs(slope).max() > 1e-3
 
 
 def test_around_a_network_a_cause_adds_what_it_changes_in_the_mmg():

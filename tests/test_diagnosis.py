@@ -277,6 +277,8 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
     """Worse than keeping all velocities, with what was named in it too."""
     held = sea.done.held
     assert held.lost(sea.done.verdict.gain) == ""
+    away = replace(sea.done.verdict.gain, after=1e8)  # with what is named in it, it runs away
+    assert held.lost(away) == ""
     theta = held.before.theta.copy()
     theta[
         list(held.before.model.names).index("hull.x_0f")

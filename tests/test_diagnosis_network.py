@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 
+from pipelines.diagnose import diagnose_run
 from pipelines.diagnosis import own
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.diagnosis.trial import record_of, trial_of, windows_of
@@ -14,6 +15,7 @@ from pipelines.known_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
 from shiplog import diagnose, runs
+from shiplog import verdict as verdicts
 from shiplog.config import Config, Fast, Network, Split
 from shiplog.exceptions import RunError
 from shiplog.store import Store
@@ -158,6 +160,32 @@ def test_what_refutes_a_cause_is_the_mmg_to_which_voyages_are_new(afloat):
     numbers = afloat.decision.named[0].numbers
     assert again.theta[-len(numbers) :] == pytest.approx(numbers)
     assert again.shares.keys() == set(afloat.names)
+
+
+def test_the_network_is_fitted_again_where_that_makes_its_error_less(afloat):
+    """Whatever the judge did; and with nothing named there is nothing to gain."""
+    plain, beside = (replace(afloat.decision, adapted=a) for a in (False, True))
+    losses = [afloat.held.gain(one).after for one in (plain, beside)]
+    for given in (plain, beside):
+        decision, found = afloat.held.simulated_with(given)
+        assert found.after == pytest.approx(min(losses))
+        assert decision.adapted == (losses[1] < losses[0])
+    nothing, none = afloat.held.simulated_with(replace(beside, named=()))
+    assert none is None and not nothing.adapted
+
+
+def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
+    done = diagnose_run(afloat.run.path, afloat.store, afloat.names, afloat.work / "out")
+    judge = HeldOut(afloat.held.cut, own.simulator(afloat.run, afloat.trial), afloat.trial)
+    _, found, _ = judge.refuted(afloat.decision)
+    assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
+    assert [c["name"] for c in done.verdict.causes] == ["current"]
+    said = [n for n in done.verdict.notes if "MMG" in n]
+    assert "run is a network" in said[0] and verdicts.less(found.reduction) in said[1]
+    trial, decision = done.seen
+    assert trial.reference.model.base.weights and done.whole.j.shape[-1] == 2  # the current's
+    assert done.trial.reference.model.base is not trial.reference.model.base
+    assert (done.folder / "diagnosis.rrd").is_file() and decision.named
 
 
 def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
