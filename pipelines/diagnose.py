@@ -74,7 +74,7 @@ def diagnose_run(
     cut = trial.windows_of(run, store, names, profile)
     judge = None if cut is None else HeldOut(cut, own.simulator(run, tried), tried)
     decision, found, dropped = _decided(run, tried, point, judge)
-    held, seen, alone = judge, (tried, decision), None
+    held, network, alone = judge, None, None
     if not run.config.physical:
         notes += answer.of_physics(run, found)
         network = own.Own(run, tried)
@@ -82,12 +82,14 @@ def diagnose_run(
             before = run.extended(run.config.seeds[0], recorded)
             held = HeldOut(cut, before, tried, network)
             decision, found = held.simulated_with(decision)
-        seen = network.beside(decision)
-        whole = seen[0].covering(seen[1].first)
     lost = held.lost(found) if held else ""
     if lost:
         dropped |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
         decision, found = decisions.untold(decision), None
+    seen = (tried, decision)
+    if network is not None:
+        seen = network.beside(decision)
+        whole = seen[0].covering(seen[1].first)
     if held and decision.named and tried.reference.adapts:
         if run.config.physical:
             notes.append(
@@ -96,7 +98,7 @@ def diagnose_run(
             )
         if decision.adapted:
             alone = held.adapted(decision).reduction
-            notes.append("Its own coefficients are fitted again beside what is named.")
+            notes.append(f"{run.name} is fitted again beside what is named.")
     context = Context(
         run,
         before_effect and nominal is not None,

@@ -1,9 +1,10 @@
-"""What a network gets wrong of its own inputs: a smooth function of them, the same on all voyages.
+"""What a ship's MMG gets wrong of a network's inputs: a smooth function of them, the same on all
+voyages.
 
 It lasts as long as the ship does the same, so that no unrest of seconds stands for it: left out, a
 few hundred nats of it go to the cause that looks most like it. It stands beside every hypothesis
 (Kennedy & O'Hagan 2001: the discrepancy as a function of the inputs); what depends on heading,
-place or time it cannot explain.
+place or time it cannot explain. And it is what the network is bent by where it is fitted again.
 """
 
 from __future__ import annotations
