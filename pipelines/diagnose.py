@@ -76,7 +76,7 @@ def diagnose_run(
     decision, found, dropped = _decided(run, tried, point, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:
-        notes += answer.of_physics(run, found)
+        notes += answer.of_physics(run, tried, found)
         network = own.Own(run, tried)
         if cut is not None:
             before = run.extended(run.config.seeds[0], recorded)

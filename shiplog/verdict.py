@@ -323,6 +323,7 @@ def _or(cause: dict) -> str:
 
 
 def less(share: float) -> str:
+    """A share of the error that is taken off, in words; negative where it grows."""
     return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"
 
 

@@ -144,7 +144,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
     assert numbers["current"] == pytest.approx(alone["current"])
 
 
-def test_what_refutes_a_cause_is_the_mmg_to_which_voyages_are_new(afloat):
+def test_what_refutes_a_cause_of_a_network_is_her_mmg(afloat):
     """It simulates as it was fitted, with what the run has of causes; of a physical run that is
     the run."""
     judge = own.simulator(afloat.run, afloat.trial)

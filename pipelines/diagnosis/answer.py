@@ -128,15 +128,16 @@ def verdict(
     )
 
 
-def of_physics(run: Run, found: Gain | None) -> list[str]:
+def of_physics(run: Run, trial: Trial, found: Gain | None) -> list[str]:
     """Whom the causes of a network were asked of, and what they are worth there."""
+    where = "these voyages" if trial.reference.adapts else "the voyages that it was made on"
     said = [
-        f"{run.name} is a network: the causes are those that the ship's MMG lacks, fitted to the "
-        "voyages that the network was made on."
+        f"{run.name} is a network: the causes are those that the ship's MMG lacks, fitted to "
+        f"{where}."
     ]
     if found is not None:
         said.append(
-            f"That MMG, to which these windows are new, has an error "
+            f"On the same windows that MMG has an error "
             f"{verdicts.less(found.reduction)} with them ({verdicts.less(found.low)} to "
             f"{verdicts.less(found.high)})."
         )
