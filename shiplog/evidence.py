@@ -19,6 +19,7 @@ from shiplog.segments import BIN, KNOT, Linear
 
 SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
+LEAP = 16.0  # steps at once, at most
 ENOUGH = 8  # unbroken segments, fewer of which do not show it
 LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
 
@@ -195,12 +196,40 @@ class Modes:
         return self.logdet + float(np.log1p(louder**2 * self.felt).sum())
 
 
-def modes(weighed: Weighed, unrest: Unrest) -> Modes:
-    """Start eliminated, acceleration along its principal axes (Woodbury). Raises
-    np.linalg.LinAlgError where the path ran away."""
+@dataclass(frozen=True)
+class Startless:
+    """A pass without its starts, whatever is known of the acceleration at the knots.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J]
+    kd      [S, 3J, 1 + C]
+    kk      [S, 3J, 3J]
+    logdet  of noise and start
+    """
+
+    dd: np.ndarray
+    kd: np.ndarray
+    kk: np.ndarray
+    logdet: float
+
+    def square(self, unrest: Unrest) -> tuple[np.ndarray, float]:
+        """Of a pass of e alone eᵀ C⁻¹ e of every segment [S], and log |C| of all: a Cholesky root
+        ends with the one, and the rest of its diagonal is the other."""
+        knots = self.kk.shape[-1]
+        kernel = unrest.kernel(knots // 3)
+        bordered = np.empty((len(self.kk), knots + 1, knots + 1))
+        bordered[:, :knots, :knots] = self.kk + np.linalg.inv(kernel)
+        bordered[:, :knots, knots:], bordered[:, knots:, knots:] = self.kd, self.dd
+        bordered[:, knots, :knots] = self.kd[..., 0]
+        root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
+        of_kernel = len(self.kk) * np.linalg.slogdet(kernel)[1]
+        volume = of_kernel + 2.0 * float(np.log(root[:, :knots]).sum())
+        return root[:, knots] ** 2, self.logdet + volume
+
+
+def startless(weighed: Weighed, unrest: Unrest) -> Startless:
+    """Start eliminated. Raises np.linalg.LinAlgError where the path ran away."""
     if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
         raise np.linalg.LinAlgError("a path that ran away has no products")
-    kernel = unrest.kernel(weighed.knots)
     known = np.diag(unrest.start**-2.0)
     start = weighed.zz[:, :6, :6] + known
     # in units of each number of the start, or its columns are too unlike to invert
@@ -210,19 +239,25 @@ def modes(weighed: Weighed, unrest: Unrest) -> Modes:
     solved = np.linalg.solve(start, columns)
     count = weighed.zz.shape[-1] - 6
     by_knots, by_numbers = np.swapaxes(columns[..., :count], 1, 2), columns[..., count:]
-    root = np.linalg.cholesky(kernel)
-    felt, axes = np.linalg.eigh(
-        root.T @ (weighed.zz[:, 6:, 6:] - by_knots @ solved[..., :count]) @ root
+    return Startless(
+        weighed.dd - np.swapaxes(by_numbers, 1, 2) @ solved[..., count:],
+        weighed.zd[:, 6:] - by_knots @ solved[..., count:],
+        weighed.zz[:, 6:, 6:] - by_knots @ solved[..., :count],
+        weighed.logdet + _of_start(weighed, known),
     )
+
+
+def modes(weighed: Weighed, unrest: Unrest) -> Modes:
+    """Start eliminated, acceleration along its principal axes (Woodbury). Raises
+    np.linalg.LinAlgError where the path ran away."""
+    left = startless(weighed, unrest)
+    root = np.linalg.cholesky(unrest.kernel(weighed.knots))
+    felt, axes = np.linalg.eigh(root.T @ left.kk @ root)
     across = np.swapaxes(axes, 1, 2)
     return Modes(
-        weighed.dd - np.swapaxes(by_numbers, 1, 2) @ solved[..., count:],
-        across @ (root.T @ (weighed.zd[:, 6:] - by_knots @ solved[..., count:])),
-        np.maximum(felt, 0.0),
-        across @ np.linalg.inv(root),
-        weighed.logdet + _of_start(weighed, known),
-        np.zeros((*felt.shape, 0)),
-    )
+        left.dd, across @ (root.T @ left.kd), np.maximum(felt, 0.0),
+        across @ np.linalg.inv(root), left.logdet, np.zeros((*felt.shape, 0)),
+    )  # fmt: skip
 
 
 def _of_start(weighed: Weighed, known: np.ndarray) -> float:
@@ -238,34 +273,55 @@ def gram(weighed: Weighed, unrest: Unrest) -> Gram:
     return modes(weighed, unrest).gram()
 
 
-def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 12) -> Unrest:
-    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977). How
-    the noise is coloured is asked once, at the end.
+def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Unrest:
+    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977), each
+    round three steps of it of which the first two say how far the third may leap (SQUAREM,
+    Varadhan & Roland 2008). How the noise is coloured is asked once, at the end.
 
     d   [C] the numbers of the columns
     """
     left = (linear.e - linear.j @ d)[..., None]
-    count, size = len(left), linear.z.shape[-1]
-    knots = (size - 6) // 3
-    used = linear.cut.used
-    seen = np.maximum(used.sum((0, 1)), 1)
+    products = _by_channel(linear, left, unrest)
+    seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
+    knots = (linear.z.shape[-1] - 6) // 3
     inverse = np.linalg.inv(_decay(knots, unrest.time))
+    least = np.log(np.concatenate((LEAST, np.full(3, 1e-12))))
+
+    def at(sizes: np.ndarray) -> Unrest:
+        return replace(unrest, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
+
+    def step(sizes: np.ndarray) -> np.ndarray:
+        """Logarithms of noise and push [9] after one step."""
+        now = at(sizes)
+        whole = np.tensordot(now.noise**-2.0, products, 1)
+        covariance = np.linalg.inv(whole[:, 1:, 1:] + now.precision(knots))
+        gap = covariance @ whole[:, 1:, :1]
+        gap = np.concatenate((np.ones((len(gap), 1, 1)), -gap), 1)  # of [e | Z], what z leaves
+        second = gap @ np.swapaxes(gap, 1, 2)
+        second[:, 1:, 1:] += covariance
+        noise = products.reshape(6, -1) @ second.reshape(-1) / seen
+        pushed = second[:, 7:, 7:].mean(0).reshape(3, knots, 3, knots)
+        push = np.einsum("ij,cicj->c", inverse, pushed) / knots
+        return np.maximum(0.5 * np.log(np.concatenate((noise, push))), least)
+
+    sizes = np.log(np.concatenate((unrest.noise, unrest.push)))
     for _ in range(rounds):
-        white = _Whitening(used, unrest)
-        columns, error = white(linear.z), white(left)
-        z, covariance = _posterior(columns, error, unrest)
-        gap = (error - columns @ z)[..., 0].reshape(count, 6, -1)
-        spread = ((columns @ covariance) * columns).sum(-1).reshape(gap.shape)
-        noise = unrest.noise * np.sqrt((gap**2 + spread).sum((0, 2)) / seen)
-        push = np.empty(3)
-        for channel in range(3):
-            part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
-            own = z[:, part, 0]
-            second = np.einsum("si,ij,sj->", own, inverse, own)
-            second += np.einsum("ij,sji->", inverse, covariance[:, part, part])
-            push[channel] = np.sqrt(second / (count * knots))
-        unrest = replace(unrest, noise=np.maximum(noise, LEAST), push=push)
-    return _coloured(linear, left, unrest)
+        one = step(sizes)
+        two = step(one)
+        first, second = one - sizes, two - one
+        bend = float(np.linalg.norm(second - first))
+        leap = float(np.clip(np.linalg.norm(first) / max(bend, 1e-12), 1.0, LEAP))
+        sizes = step(sizes + 2.0 * leap * first + leap**2 * (second - first))
+    return _coloured(linear, left, at(sizes))
+
+
+def _by_channel(linear: Linear, left: np.ndarray, unrest: Unrest) -> np.ndarray:
+    """Products [6, S, 1 + Z, 1 + Z] of [error | Z] in each channel alone, were its noise of unit
+    size: what its size is changes but their weight."""
+    by = _Whitening(linear.cut.used, replace(unrest, noise=np.ones(6))).by
+    both = np.concatenate((left, linear.z), -1)
+    white = (each @ both[:, :, channel] for channel, each in enumerate(by))
+    return np.stack([np.swapaxes(values, 1, 2) @ values for values in white])
 
 
 def _posterior(z: np.ndarray, left: np.ndarray, unrest: Unrest) -> tuple[np.ndarray, np.ndarray]:

@@ -124,9 +124,7 @@ def balance(
     linear: Linear, d: np.ndarray, unrest: Unrest, record: Record, physics: MMG, values: np.ndarray
 ) -> Balance:
     """The forces behind `find`, for a plot of them."""
-    p = named(physics.names, jnp.asarray(values))
-    g = physics.geometry
-    weigh = np.asarray(body.forces_of(p, g, jnp.eye(3))).T  # [3, 3] of ν̇
+    weigh = masses(physics, values).T
     full = means(record, physics, values)
     reach = np.abs(np.linalg.solve(weigh, full))
     loose = replace(unrest, push=np.maximum(unrest.push, LOOSE * reach))
@@ -139,12 +137,27 @@ def balance(
     actuator = unexplained.around(record, record.actuator, rows)
     limit = np.abs(_forces(physics, values, state, actuator)["hull"]) + USUAL * misfit
     limit += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
-    if g.wind:
+    if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
-        worst = np.abs(np.asarray(air.wind(p, g, jnp.cos(angle), jnp.sin(angle)))).max(0)
+        worst = np.abs(np.asarray(_of_wind(physics, values, np.cos(angle), np.sin(angle)))).max(0)
         speed = np.linalg.norm(unexplained.around(record, record.wind, rows), axis=1)
         limit += (GUST * speed[:, None]) ** 2 * worst
     return Balance(rows, force, doubt, limit, full)
+
+
+def masses(physics: MMG, values: np.ndarray) -> np.ndarray:
+    """[3, 3] force X, Y, N that 1 m/s² of surge, of sway and 1 rad/s² take, one a row."""
+    return np.asarray(_masses(physics, values))
+
+
+@traced
+def _masses(physics, values):
+    return body.forces_of(named(physics.names, values), physics.geometry, jnp.eye(3))
+
+
+@traced
+def _of_wind(physics, values, ahead, starboard):
+    return air.wind(named(physics.names, values), physics.geometry, ahead, starboard)
 
 
 def means(record: Record, physics: MMG, values: np.ndarray) -> np.ndarray:

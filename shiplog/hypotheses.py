@@ -109,6 +109,7 @@ class Trial:
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self._first: Point | None = None
         self._modes: list[tuple[Weighed, Modes]] = []
+        self._volumes: dict[tuple[float, bytes | None], float] = {}
         self.weight = np.ones(len(self.rows))
 
     # --- linearisation ---
@@ -236,8 +237,12 @@ class Trial:
         model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
         own misfit it would count as such."""
         assert self._first is not None
-        modes, louder_by = self.modes(self._first, louder)
-        return modes.log_volume(louder_by)
+        pulse = self.unrest.pulse
+        key = (louder, None if pulse is None else pulse.tobytes())
+        if key not in self._volumes:
+            modes, louder_by = self.modes(self._first, louder)
+            self._volumes[key] = modes.log_volume(louder_by)
+        return self._volumes[key]
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: what is usual, and the included causes free."""

@@ -28,7 +28,7 @@ from shiplog.segments import Linear, Path, Wide
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
-NEAR = 0.35  # plausible spreads that need no further round
+NEAR = 5.0  # nats, for which they are not moved on
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
 KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
@@ -157,16 +157,15 @@ def settled(
         held = _anchor(start, theta, columns)
         path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
-        for _ in range(2):
-            unrest = evidence.learnt(
-                linear, _solved(linear, unrest, columns, held), unrest, rounds=8
-            )
+        found, _ = _solved(linear, unrest, columns, held)
+        unrest = evidence.learnt(linear, found * unit, unrest, rounds=2)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
-        found = _solved(linear, unrest, columns, held)[:base]
-        far = float(np.abs(found / unit[:base]).max(initial=0.0))
-        if round_ == rounds or far < NEAR:
+        found, gain = _solved(linear, unrest, columns, held)
+        far = float(np.abs(found[:base]).max(initial=0.0))
+        if round_ == rounds or (gain < NEAR and far < FARTHEST):
+            unrest = evidence.learnt(linear, found * unit, unrest, rounds=3)
             break
-        moved_to = theta + found * min(1.0, FARTHEST / far)
+        moved_to = theta + (found * unit)[:base] * min(1.0, FARTHEST / far)
         edge = 1e-6 * (start.high - start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         theta = np.clip(moved_to, start.low + edge, start.high - edge)
@@ -185,12 +184,17 @@ def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
     return pull
 
 
-def _solved(linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray) -> np.ndarray:
-    """[C] numbers that the campaign itself and what was known of them ask for."""
-    unit, by = columns.unit, np.concatenate(([1.0], columns.unit))
+def _solved(
+    linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """[C] numbers, in units, that the campaign itself and what was known of them ask for; nats
+    that it brings to move the base's there, were all linear (half a Newton decrement)."""
+    base, by = columns.base, np.concatenate(([1.0], columns.unit))
     modes = evidence.modes(evidence.weighed(linear, unrest), unrest)
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
-    return np.linalg.solve(total[1:, 1:] + np.diag(columns.known), total[1:, 0] + held) * unit
+    inverse = np.linalg.inv(total[1:, 1:] + np.diag(columns.known))
+    found = inverse @ (total[1:, 0] + held)
+    return found, 0.5 * float(found[:base] @ np.linalg.solve(inverse[:base, :base], found[:base]))
 
 
 def learn(

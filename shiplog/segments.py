@@ -266,13 +266,20 @@ def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path
     accelerated = resampled(at, change, knots)
     states = resampled(centre, y, knots)
     per = round(KNOT / (g.step * NODE_ROWS))
-    driven = segments.driven[:, ::per]
-    said = np.empty_like(accelerated)
-    for part, filled in _chunks(len(segments)):
-        found = _accelerations(model, theta, filled(states), filled(driven))
-        said[part] = np.asarray(found)[: len(said[part])]
+    said = accelerations(model, theta, states, segments.driven[:, ::per])
     start = y[:, 0] - 0.5 * BIN * (y[:, 1] - y[:, 0]) / BIN
     return Path(start, np.moveaxis(accelerated - said, -1, 1))
+
+
+def accelerations(
+    model: Smooth, theta: np.ndarray, states: np.ndarray, driven: np.ndarray
+) -> np.ndarray:
+    """ν̇ [S, n, 3] at states [S, n, 6]."""
+    said = np.empty((*states.shape[:2], 3))
+    for part, filled in _chunks(len(states)):
+        found = _accelerations(model, theta, filled(states), filled(driven))
+        said[part] = np.asarray(found)[: len(said[part])]
+    return said
 
 
 @traced

@@ -13,8 +13,9 @@ import numpy as np
 from shiplog import evidence, reference, structure
 from shiplog.columns import HELD
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
-from shiplog.models.mmg import body
+from shiplog.models.mmg import MMG, body
 from shiplog.structure import Basis, Products
+from shiplog.traced import traced
 
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 
@@ -157,18 +158,21 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     alone = replace(
         left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
     )
+    startless = evidence.startless(alone, trial.unrest)
 
     def value(unrest: evidence.Unrest) -> float:
-        found = evidence.gram(alone, unrest)
-        return -0.5 * ref.counts * (float(trial.weight @ found.each[:, 0, 0]) + found.logdet)
+        each, volume = startless.square(unrest)
+        return -0.5 * ref.counts * (float(trial.weight @ each) + volume)
 
     isotropic = max(value(trial.unrest.louder(v)) for v in LOUDER)
     best: Pulses | None = None
     ship = ref.model.stand_in
     coefficients = ref.coefficients
     length = ref.setting.scale["length"]
-    for lever in np.linspace(-0.45, 0.45, 7) * length:
-        unit = accelerations(coefficients, ship.geometry, np.array([0.0, 1.0, lever]))
+    levers = np.linspace(-0.45, 0.45, 7) * length
+    pushed = np.stack((np.zeros(7), np.ones(7), levers), -1)
+    units = accelerations(ship, coefficients, pushed)
+    for lever, unit in zip(levers, units, strict=True):
         # in newtons that matter: from the usual unrest upwards
         ordinary = trial.unrest.push[1] / abs(unit[1])
         for size in ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0]):
@@ -199,11 +203,15 @@ def pulse_force(
     return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
 
 
-def accelerations(coefficients: Mapping, geometry, force: np.ndarray) -> np.ndarray:
-    """ν̇ [3] that a force X, Y, N makes of a ship at rest."""
+def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:
+    """ν̇ [n, 3] that forces X, Y, N [n, 3] make of a ship at rest."""
+    return np.asarray(_accelerations(ship, dict(coefficients), force))
+
+
+@traced
+def _accelerations(ship, coefficients, force):
     zero = jnp.zeros(())
-    found = body.accelerations(coefficients, geometry, zero, zero, zero, jnp.asarray(force))
-    return np.asarray(found)
+    return body.accelerations(coefficients, ship.geometry, zero, zero, zero, force)
 
 
 def _twice(total: np.ndarray, more: int) -> np.ndarray:

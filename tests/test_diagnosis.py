@@ -708,6 +708,9 @@ def test_a_model_that_has_learned_is_fitted_again_where_that_gains(sea, tmp_path
             return Gain(500.0, 300.0 - 50.0 * decided.adapted + 200.0 * (not decided.named), 0.1,
                         0.5, 18, {})  # fmt: skip
 
+        def worth(self, rest, decided):
+            return self.gain(decided)
+
     chosen, found, _ = Better(held.cut, held.before, held.trial).refuted(alone)
     assert chosen.adapted and found.after == 250.0
     after = held.extended(chosen)

@@ -103,6 +103,19 @@ def test_gram_is_the_dense_gaussian(unrest):
     assert found.logdet == pytest.approx(logdet, rel=1e-5)
 
 
+@EACH
+def test_a_square_of_errors_alone_is_that_of_their_gram(unrest):
+    """Of one pass under each size of unrest, with a pulse and without."""
+    given = linear(3)
+    alone = replace(given, j=given.j[..., :0])
+    weighed = evidence.weighed(alone, unrest)
+    for other in (unrest, unrest.louder(3.0), replace(unrest, pulse=np.array([0.1, 2.0, 0.7]))):
+        each, volume = evidence.startless(weighed, unrest).square(other)
+        wanted = evidence.gram(weighed, other)
+        assert each == pytest.approx(wanted.each[:, 0, 0], rel=1e-9)
+        assert volume == pytest.approx(wanted.logdet, rel=1e-9)
+
+
 def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
     """With a start that is nearly known, log N(e; Jd, C) itself: louder against quieter."""
     given, d = linear(3), np.array([0.3, -0.7])
@@ -242,6 +255,33 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     assert found.push == pytest.approx(UNREST.push, rel=0.15)
     assert found.time == UNREST.time and (found.start == UNREST.start).all()
     assert (found.coloured <= 0.2).all()
+
+
+def test_sizes_learnt_are_the_likeliest():
+    """Within five rounds, from a beginning that is wrong by a factor of ten: at another size of any
+    of them, the dense likelihood is less. White noise, of which no colour is asked."""
+    rng = np.random.default_rng(13)
+    given = linear(20, bins=10, knots=5)
+    used = rng.random(given.e.shape[:2]) > 0.3  # hardly ever whole
+    given = replace(given, cut=replace(given.cut, used=np.repeat(used[..., None], 6, -1)))
+    kernel = covariance(UNREST, 5)
+    z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
+    noise = NOISE * rng.standard_normal(given.e.shape)
+    given = replace(given, e=np.einsum("sbcz,sz->sbc", given.z, z) + noise)
+    begin = replace(UNREST, noise=NOISE * 10.0, push=UNREST.push / 10.0)
+    found = evidence.learnt(given, np.zeros(2), begin, rounds=5)
+
+    def likelihood(sizes):
+        tried = replace(found, noise=sizes[:6], push=sizes[6:])
+        return sum(
+            multivariate_normal.logpdf(e, np.zeros(len(e)), c) for e, _, c in dense(given, tried)
+        )
+
+    at = np.concatenate((found.noise, found.push))
+    here = likelihood(at)
+    for i in range(9):
+        for by in (0.98, 1.02):
+            assert likelihood(np.where(np.arange(9) == i, by * at, at)) < here
 
 
 def test_colour_of_the_noise_is_learnt_from_draws_of_it():

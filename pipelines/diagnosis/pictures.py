@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
 from pipelines.diagnosis.answer import Diagnosis
-from shiplog import unexplained, unnamed, viewer
+from shiplog import external, segments, unexplained, unnamed, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
 from shiplog.decision import PULSES, Decision
 from shiplog.exceptions import listed
 from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.hypotheses import Trial
-from shiplog.models.mmg import body
 from shiplog.reading import corrected
 from shiplog.record import Record
 from shiplog.segments import KNOT
@@ -77,9 +74,8 @@ def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
     mean, sd = (np.moveaxis(v, 1, -1)[keep][order] for v in (found.mean, found.sd))
-    coefficients = {k: jnp.asarray(v) for k, v in ref.coefficients.items()}
     # columns: the force that one m/s² (rad/s²) takes
-    mass = np.asarray(body.forces_of(coefficients, ref.model.stand_in.geometry, jnp.eye(3))).T
+    mass = external.masses(ref.model.stand_in, np.array(list(ref.coefficients.values()))).T
     names = [n.cause.label for n in decision.named if n.cause.kind != "sensor"]
     force = _caused(trial, decision, rows) @ mass.T
     if decision.pulses is not None:
@@ -113,14 +109,16 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
         was = corrected(ref.model.causes, trial.record, numbers)
         driven = np.concatenate((was.actuator, was.share[:, None]), 1)
         state, driven, wind = (around(was, v, rows) for v in (was.state, driven, was.true_wind))
-        return np.asarray(_acceleration(ref.model, theta, state, driven, wind))
+        # by as many as a segment has knots: that shape is compiled already
+        blocks = -(-len(rows) // trial.grid.knots)
+        state, driven = (
+            np.resize(values, (blocks, trial.grid.knots, values.shape[1]))
+            for values in (state, np.concatenate((driven, wind), 1))
+        )
+        found = segments.accelerations(ref.model, theta, state, driven)
+        return found.reshape(-1, 3)[: len(rows)]
 
     return acceleration(fixed | named) - acceleration(fixed)
-
-
-@jax.jit
-def _acceleration(model, theta, state, driven, wind):
-    return model.acceleration(theta, state, driven, wind)
 
 
 def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
