@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
@@ -25,7 +26,7 @@ LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more un
 QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
-ROUNDS = 6  # of linearising again, at most
+ROUNDS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 FALLS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
 SHORTER = 3  # times that a step is halved where the fit runs away
@@ -109,8 +110,14 @@ class Trial:
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self._first: Point | None = None
         self._modes: list[tuple[Weighed, Modes]] = []
-        self._volumes: dict[tuple[float, bytes | None], float] = {}
+        self._volumes: dict[tuple[float, bytes], float] = {}
+        self._rested: dict[tuple[tuple[str, ...], bytes], tuple[dict, Path, float]] = {}
         self.weight = np.ones(len(self.rows))
+
+    @property
+    def _pulse(self) -> bytes:
+        """Tells one unrest of this trial from another."""
+        return b"" if self.unrest.pulse is None else self.unrest.pulse.tobytes()
 
     # --- linearisation ---
 
@@ -237,8 +244,7 @@ class Trial:
         model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
         own misfit it would count as such."""
         assert self._first is not None
-        pulse = self.unrest.pulse
-        key = (louder, None if pulse is None else pulse.tobytes())
+        key = (louder, self._pulse)
         if key not in self._volumes:
             modes, louder_by = self.modes(self._first, louder)
             self._volumes[key] = modes.log_volume(louder_by)
@@ -401,11 +407,15 @@ class Trial:
         beat: float = -np.inf,
         lowest: float = -np.inf,
     ) -> tuple[Point, Found]:
-        """These causes together, linearised where they are until they rest; or until it is plain
-        that their evidence will not `beat` what another has. A step after which it is below the
-        `lowest` that it can be at rest, or falls far, went too far."""
-        by = {cause.label: cause for cause in self.reference.model.causes}
+        """These causes together, linearised where they are until they rest (from where they did
+        before, if they have); or until it is plain that their evidence will not `beat` what
+        another has. A step after which it is below the `lowest` that it can be at rest, or falls
+        far, went too far."""
         point, louder, near, before = None, 1.0, None, np.inf
+        key = (tuple(included), self._pulse)
+        if key in self._rested:
+            numbers, path, louder = self._rested[key]
+            near = louder
         stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
         shorter = 0
         for _ in range(ROUNDS):
@@ -429,21 +439,35 @@ class Trial:
             path, stood = point.path, numbers
             lowest = max(lowest, base.evidence - FALLS)
             louder = near = base.louder
-            moved = {}
-            for name in included:
-                low, high = by[name].bounds(self.reference.setting)
-                moved[name] = np.clip(base.numbers[name], low, high)
-            if not all(np.isfinite(values).all() for values in moved.values()):
+            if not all(np.isfinite(values).all() for values in base.numbers.values()):
                 base = replace(base, evidence=-np.inf)  # the fit ran away
                 break
+            moved = self._within_bounds(base.numbers, base.covariance)
             far = self._apart(moved, numbers)
             numbers = moved
             lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
-            if far < REST or (lost and np.isfinite(before)):
+            if far < REST:
+                self._rested[key] = (numbers, path, louder)
+                break
+            if lost and np.isfinite(before):
                 break
             before = base.evidence
         assert point is not None
         return point, replace(base, name="+".join(included), numbers=numbers)
+
+    def _within_bounds(
+        self, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
+    ) -> dict[str, np.ndarray]:
+        """Numbers of a hypothesis as its causes allow them."""
+        by = {cause.label: cause for cause in self.reference.model.causes}
+        if not numbers:
+            return {}
+        assert covariance is not None
+        bounds = [by[name].bounds(self.reference.setting) for name in numbers]
+        low, high = (np.concatenate(of) for of in zip(*bounds, strict=True))
+        found = within(np.concatenate(list(numbers.values())), covariance, low, high)
+        ends = np.cumsum([len(values) for values in numbers.values()])[:-1]
+        return dict(zip(numbers, np.split(found, ends), strict=True))
 
     def without(
         self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
@@ -483,3 +507,15 @@ class Trial:
     def leave_out(self, segments_out: np.ndarray) -> None:
         """Segments [S] bool that no hypothesis is judged on."""
         self.weight = np.where(segments_out, 0.0, self.weight)
+
+
+def within(
+    mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """[Q] a Gaussian's likeliest numbers between bounds: what is held at one moves the others."""
+    if ((mean >= low) & (mean <= high)).all():
+        return mean
+    unit = np.sqrt(np.diagonal(covariance))
+    root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(unit, unit)))
+    found = lsq_linear(root, root @ (mean / unit), (low / unit, high / unit), method="bvls").x
+    return np.clip(found * unit, low, high)

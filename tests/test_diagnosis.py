@@ -38,7 +38,7 @@ from shiplog.causes.sensors import HeadingOffset
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
 from shiplog.gain import Gain
-from shiplog.hypotheses import Found, Told, Trial
+from shiplog.hypotheses import Found, Told, Trial, within
 from shiplog.ingest import ingest
 from shiplog.store import Store
 from shiplog.verdict import limits_json, ranking_json, sentence
@@ -686,6 +686,45 @@ def test_what_a_rough_form_leaves(sea):
     assert by["cross_flow_drag"].beside("current") and by["payload"].beside("shallow_water")
 
 
+def test_causes_settle_from_where_they_rested_before(compass):
+    """From far away a second time: one linearisation, and the same rest."""
+    trial, decision = compass
+    (label,) = labels(decision)
+    asked = []
+
+    class Counted(Trial):
+        def at(self, numbers, *given):
+            asked.append(numbers)
+            return super().at(numbers, *given)
+
+    again = Counted(trial.reference, trial.record)
+    point = again.begin({})
+    asked.clear()
+    rests = []
+    for begin in (0.5, -0.5):
+        _, found = again.settle((label,), {label: np.array([begin])}, point.path)
+        rests.append((len(asked), *found.numbers[label]))
+        asked.clear()
+    assert rests[0][0] > 2 and rests[1][0] == 1
+    assert rests[0][1] == pytest.approx(rests[1][1], rel=0.02)
+
+
+def test_a_number_held_at_a_bound_moves_the_others():
+    """Two that go together by 0.6, of sizes that differ by a thousand: E[x | y = 0] is
+    3 + 0.6 · 2 standard deviations. One that is within stays; a bound that another's move frees is
+    let go: projected one by one it would stay at 0."""
+    unit = np.array([1.0, 1e-3])
+    covariance = np.array([[1.0, 0.6], [0.6, 1.0]]) * np.outer(unit, unit)
+    low, high = np.zeros(2), np.full(2, np.inf)
+    found = within(np.array([3.0, -2e-3]), covariance, low, high)
+    assert found == pytest.approx([4.2, 0.0], abs=1e-9)
+    inside = np.array([3.0, 2e-3])
+    assert within(inside, covariance, low, high) is inside
+    apart = np.array([[1.0, 0.9], [0.9, 1.0]])
+    freed = within(np.array([-0.1, -2.0]), apart, low, high)
+    assert freed == pytest.approx([-0.1 + 0.9 * 2.0, 0.0], abs=1e-9)
+
+
 # --- a model that has learned of what is wrong
 
 
@@ -1149,10 +1188,12 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
         return point
 
     monkeypatch.setattr(trial, "at", bounded)
+    monkeypatch.setattr(trial, "_rested", {})
     _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
     assert -30.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
     away.clear()
+    trial._rested.clear()
     _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     low = decision.nothing.evidence + 900.0  # nothing at rest is so high: each step went too far
