@@ -101,10 +101,13 @@ class _Search:
         usual = self.trial.level(self.point, 1.0, self.included).value
         return self.base.evidence - usual
 
-    @property
-    def _rough(self) -> bool:
+    def _rough(self, included: Sequence[str]) -> bool:
         causes = self.trial.reference.model.causes
-        return any(c.rough for c in causes if c.label in self.included)
+        return any(c.rough for c in causes if c.label in included)
+
+    def _may_pulse(self, base: Found, included: Sequence[str]) -> bool:
+        """What a map leaves of a shoal comes and goes, too, as the ship passes it."""
+        return self.pulses is None and base.louder >= LOUD and not self._rough(included)
 
     def one_more(self) -> bool:
         """Whether something more was found: a cause, or a thruster that nobody records."""
@@ -115,7 +118,7 @@ class _Search:
             return False
         settled = _settle(self.trial, self.point, self.base, self.found, self.included)
         first = self.included == self.trial.fixed
-        further = max(SURE if self._rough else FURTHER, self.least)
+        further = max(SURE if self._rough(self.included) else FURTHER, self.least)
         wanted = self.least if first and self.pulses is None else further
         if not self.ranking:
             self.ranking = self._ranked(settled, wanted)
@@ -137,9 +140,8 @@ class _Search:
         return found if self.pulses is None else [f for f in found if f.name != MOVED]
 
     def _pulses(self) -> bool:
-        """Whether a force that comes and goes explains the unrest better than all else. What a
-        map leaves of a shoal comes and goes, too, as the ship passes it."""
-        if self.pulses is not None or self.base.louder < LOUD or self._rough:
+        """Whether a force that comes and goes explains the unrest better than all else."""
+        if not self._may_pulse(self.base, self.included):
             return False
         tried = unnamed.pulses(self.trial, self.point, self.base)
         rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]
@@ -185,11 +187,15 @@ class _Search:
         return True
 
     def _second(self, point: Point, best: Found) -> float:
-        """Nats that a further cause brings beside the best one, where it would be taken: a
-        structure may explain two causes at once."""
+        """Nats that a further cause brings beside the best one, or a thruster that nobody records,
+        where it would be taken: a structure may explain two causes at once."""
         included = tuple(best.numbers)
         _, found = self.trial.scan(point, self._left(included), included)
-        return max((f.evidence for f in found if f.evidence >= FURTHER), default=0.0)
+        told = [f.evidence for f in found if f.evidence >= FURTHER]
+        if self._may_pulse(best, included):
+            tried = unnamed.pulses(self.trial, point, best)
+            told += [tried.gain] if tried.gain > PULSED else []
+        return max(told, default=0.0)
 
     def _instead(self, label: str, structure: Found, sure: float) -> None:
         """Of the probability of a cause so much is the structure's that takes its place."""

@@ -480,6 +480,20 @@ def test_a_second_cause_counts_where_it_would_be_taken(compass, sea):
     assert diagnose._Search(both, point, ())._second(at, settled) > diagnose.FURTHER
 
 
+@pytest.mark.parametrize(
+    ("louder", "gain", "counts"), [(2.0, 41.0, 41.0), (2.0, 39.0, 0.0), (1.3, 41.0, 0.0)]
+)
+def test_an_unrecorded_thruster_is_a_second_cause(compass, monkeypatch, louder, gain, counts):
+    """Where there is unrest that it may explain, and it explains enough."""
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    found = unnamed.Pulses(0.0, gain, 0.0, 1.0, np.array([0.0, 0.01, 0.0]))
+    monkeypatch.setattr(unnamed, "pulses", lambda *_: found)
+    assert search._second(decision.point, replace(decision.base, louder=louder)) == counts
+    search.pulses = found  # there is one already
+    assert search._second(decision.point, replace(decision.base, louder=louder)) == 0.0
+
+
 @pytest.mark.parametrize(("second", "poses"), [(4.0, True), (6.0, False)])
 def test_what_a_second_cause_explains_is_no_sign_that_the_first_one_poses(
     compass, monkeypatch, second, poses
