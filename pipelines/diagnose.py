@@ -72,7 +72,7 @@ def diagnose_run(
     whole = tried.covering(point)
     pushed = where.pushed(tried, point, whole)
     cut = trial.windows_of(run, store, names, profile)
-    judge = None if cut is None else HeldOut(cut, own.simulator(run, tried), tried)
+    judge = None if cut is None else HeldOut(cut, trial.simulator(run, tried), tried)
     decision, found, dropped = _decided(run, tried, point, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:

@@ -10,6 +10,7 @@ import numpy as np
 
 from shiplog.causes import Cause, Shown
 from shiplog.hypotheses import Found, Point, Told, Trial
+from shiplog.settling import settle
 from shiplog.unnamed import Pulses
 
 PULSES = "side_thrust"
@@ -112,7 +113,7 @@ def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
     if labels:
         numbers = {n: decision.base.numbers[n] for n in labels}
-        point, base = trial.settle(labels, numbers, decision.point.path)
+        point, base = settle(trial, labels, numbers, decision.point.path)
     else:
         point, base = decision.first, decision.nothing
     again, at = [], 0

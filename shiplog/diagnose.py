@@ -16,7 +16,8 @@ import numpy as np
 from shiplog import unnamed
 from shiplog.causes import Cause
 from shiplog.decision import LEAST, PULSES, Decision, Named, Structure
-from shiplog.hypotheses import FALLS, Found, Point, Trial
+from shiplog.hypotheses import Found, Point, Trial
+from shiplog.settling import FALLS, settle
 from shiplog.unnamed import Pulses
 
 LEARNED = 40.0  # that the first one must beside a network that has learned from these voyages
@@ -280,7 +281,7 @@ class _Search:
             for label in self.included[fixed:]:
                 rest = tuple(n for n in self.included if n != label)
                 numbers = {n: self.base.numbers[n] for n in rest}
-                point, base = self.trial.settle(rest, numbers, self.point.path)
+                point, base = settle(self.trial, rest, numbers, self.point.path)
                 losses[label] = (self.base.evidence - base.evidence, point, base, rest)
                 others = [c for c in self._left(rest) if c.label != label]
                 _, found = self.trial.scan(point, others, rest)
@@ -309,7 +310,7 @@ class _Search:
             return False
         loss, point, base, rest = losses[label]
         numbers = {**base.numbers, **other.numbers}
-        at, fitted = self.trial.settle((*rest, other.name), numbers, point.path)
+        at, fitted = settle(self.trial, (*rest, other.name), numbers, point.path)
         more = fitted.evidence - self.base.evidence
         if not more > EXCHANGE:
             return False
@@ -362,8 +363,8 @@ def _settle(trial, point, base, found, included) -> list[tuple[Point, Found]]:
     for one in contenders:
         numbers = dict(base.numbers) | dict(one.numbers)
         beat = max((f.evidence for _, f in settled), default=-math.inf) - ALIKE
-        at, fitted = trial.settle(
-            (*included, one.name), numbers, point.path, beat, base.evidence - FALLS
+        at, fitted = settle(
+            trial, (*included, one.name), numbers, point.path, beat, base.evidence - FALLS
         )  # fmt: skip
         if np.isfinite(fitted.evidence):
             settled.append((at, fitted))

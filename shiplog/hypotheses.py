@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from shiplog import evidence, segments, unexplained
 from shiplog.causes import Cause
@@ -26,12 +25,6 @@ LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more un
 QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
-ROUNDS = 10  # of linearising again, at most: a map whose ends are held takes nine
-AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
-FALLS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
-SHORTER = 3  # times that a step is halved where the fit runs away
-REST = 0.02  # of a number's size: it rests
-HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
 Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `reading.read`
@@ -99,7 +92,11 @@ class Level:
 
 
 class Trial:
-    """Voyages under question, against a reference. `unrest` grows a pulse when one is found."""
+    """Voyages under question, against a reference. `unrest` grows a pulse when one is found.
+
+    first    where it was linearised first
+    rested   labels and pulse → numbers, path and λ at which a fit of these causes rested
+    """
 
     def __init__(self, reference: Reference, record: Record, fixed: Sequence[str] = ()) -> None:
         """`fixed`: labels of causes that the model has already, with numbers that stay."""
@@ -108,14 +105,14 @@ class Trial:
         self.grid = segments.grid(record)
         self.rows = segments.begins(record)
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
-        self._first: Point | None = None
+        self.first: Point | None = None
         self._modes: list[tuple[Weighed, Modes]] = []
         self._volumes: dict[tuple[float, bytes], float] = {}
-        self._rested: dict[tuple[tuple[str, ...], bytes], tuple[dict, Path, float]] = {}
+        self.rested: dict[tuple[tuple[str, ...], bytes], tuple[dict, Path, float]] = {}
         self.weight = np.ones(len(self.rows))
 
     @property
-    def _pulse(self) -> bytes:
+    def pulse(self) -> bytes:
         """Tells one unrest of this trial from another."""
         return b"" if self.unrest.pulse is None else self.unrest.pulse.tobytes()
 
@@ -141,8 +138,8 @@ class Trial:
         )
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
         point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest))
-        if self._first is None:
-            self._first = point
+        if self.first is None:
+            self.first = point
         return point
 
     def _read(self, numbers: Mapping[str, np.ndarray]) -> Read:
@@ -157,13 +154,13 @@ class Trial:
             if c.reads and c.label in numbers
         }
         for before, found in self._known:
-            if before.keys() == reading.keys() and self._apart(before, reading) == 0.0:
+            if before.keys() == reading.keys() and self.apart(before, reading) == 0.0:
                 return found
         found = read(ref.model, ref.setting, self.record, self.rows, reading)
         self._known = [*self._known[:1], (reading, found)]
         return found
 
-    def _apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
+    def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
         """The most that a number differs, in units of its size; of the same causes."""
         columns = self.reference.columns
         return max(
@@ -243,10 +240,10 @@ class Trial:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
         model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
         own misfit it would count as such."""
-        assert self._first is not None
-        key = (louder, self._pulse)
+        assert self.first is not None
+        key = (louder, self.pulse)
         if key not in self._volumes:
-            modes, louder_by = self.modes(self._first, louder)
+            modes, louder_by = self.modes(self.first, louder)
             self._volumes[key] = modes.log_volume(louder_by)
         return self._volumes[key]
 
@@ -399,76 +396,6 @@ class Trial:
         whole = np.concatenate(units or [np.zeros(0)])
         return found, level.inverse[start:, start:] * np.outer(whole, whole)
 
-    def settle(
-        self,
-        included: Sequence[str],
-        numbers: Mapping[str, np.ndarray],
-        path: Path | None,
-        beat: float = -np.inf,
-        lowest: float = -np.inf,
-    ) -> tuple[Point, Found]:
-        """These causes together, linearised where they are until they rest (from where they did
-        before, if they have); or until it is plain that their evidence will not `beat` what
-        another has. A step after which it is below the `lowest` that it can be at rest, or falls
-        far, went too far."""
-        point, louder, near, before = None, 1.0, None, np.inf
-        key = (tuple(included), self._pulse)
-        if key in self._rested:
-            numbers, path, louder = self._rested[key]
-            near = louder
-        stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
-        shorter = 0
-        for _ in range(ROUNDS):
-            try:
-                point = self.at(numbers, path, louder)
-                if np.abs(point.linear.e).max() > AWAY:
-                    raise np.linalg.LinAlgError("a path that ran away")
-                base, _ = self.scan(point, (), included, near)
-                if base.evidence < lowest:
-                    raise np.linalg.LinAlgError("a step too far")
-            except np.linalg.LinAlgError:  # the fit ran away, and its path with it
-                if shorter == SHORTER:
-                    assert self._first is not None
-                    return self._first, Found("+".join(included), -np.inf, louder, numbers)
-                shorter += 1
-                if stood is None:
-                    numbers = {**numbers, included[-1]: 0.5 * numbers[included[-1]]}
-                else:
-                    numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
-                continue
-            path, stood = point.path, numbers
-            lowest = max(lowest, base.evidence - FALLS)
-            louder = near = base.louder
-            if not all(np.isfinite(values).all() for values in base.numbers.values()):
-                base = replace(base, evidence=-np.inf)  # the fit ran away
-                break
-            moved = self._within_bounds(base.numbers, base.covariance)
-            far = self._apart(moved, numbers)
-            numbers = moved
-            lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
-            if far < REST:
-                self._rested[key] = (numbers, path, louder)
-                break
-            if lost and np.isfinite(before):
-                break
-            before = base.evidence
-        assert point is not None
-        return point, replace(base, name="+".join(included), numbers=numbers)
-
-    def _within_bounds(
-        self, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
-    ) -> dict[str, np.ndarray]:
-        """Numbers of a hypothesis as its causes allow them."""
-        by = {cause.label: cause for cause in self.reference.model.causes}
-        if not numbers:
-            return {}
-        assert covariance is not None
-        bounds = [by[name].bounds(self.reference.setting) for name in numbers]
-        low, high = (np.concatenate(of) for of in zip(*bounds, strict=True))
-        found = within(np.concatenate(list(numbers.values())), covariance, low, high)
-        ends = np.cumsum([len(values) for values in numbers.values()])[:-1]
-        return dict(zip(numbers, np.split(found, ends), strict=True))
-
     def without(
         self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -507,15 +434,3 @@ class Trial:
     def leave_out(self, segments_out: np.ndarray) -> None:
         """Segments [S] bool that no hypothesis is judged on."""
         self.weight = np.where(segments_out, 0.0, self.weight)
-
-
-def within(
-    mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """[Q] a Gaussian's likeliest numbers between bounds: what is held at one moves the others."""
-    if ((mean >= low) & (mean <= high)).all():
-        return mean
-    unit = np.sqrt(np.diagonal(covariance))
-    root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(unit, unit)))
-    found = lsq_linear(root, root @ (mean / unit), (low / unit, high / unit), method="bvls").x
-    return np.clip(found * unit, low, high)

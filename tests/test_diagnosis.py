@@ -38,8 +38,9 @@ from shiplog.causes.sensors import HeadingOffset
 from shiplog.config import Config, Physics
 from shiplog.exceptions import RunError
 from shiplog.gain import Gain
-from shiplog.hypotheses import Found, Told, Trial, within
+from shiplog.hypotheses import Found, Told, Trial
 from shiplog.ingest import ingest
+from shiplog.settling import settle, within
 from shiplog.store import Store
 from shiplog.verdict import limits_json, ranking_json, sentence
 
@@ -476,7 +477,7 @@ def test_a_second_cause_counts_where_it_would_be_taken(compass, sea):
     point = both.begin({})
     _, found = both.scan(point, search.catalogue)
     first = next(f for f in found if f.name == "heading_offset")
-    at, settled = both.settle((first.name,), first.numbers, point.path)
+    at, settled = settle(both, (first.name,), first.numbers, point.path)
     assert diagnose._Search(both, point, ())._second(at, settled) > diagnose.FURTHER
 
 
@@ -584,8 +585,8 @@ def test_what_is_not_missed_leaves_evidence_and_probability_to_what_explains_it(
     search.base = replace(search.base, evidence=1000.0, numbers=both)
     missed = {"current": 130.0, "heading_offset": loss}  # of what is left alone
     monkeypatch.setattr(
-        trial, "settle",
-        lambda rest, *_: (decision.first, Found(rest[0], 1000.0 - missed[rest[0]], 1.0)),
+        diagnose, "settle",
+        lambda _, rest, *__: (decision.first, Found(rest[0], 1000.0 - missed[rest[0]], 1.0)),
     )  # fmt: skip
     search.backwards()
     if loss == 6.0:
@@ -620,7 +621,7 @@ def test_a_cause_that_explains_more_beside_the_others_takes_the_place_of_one(
         ("heading_offset", "fouling"): 1000.0 + more,
     }  # fmt: skip
 
-    def settle(labels, *_):
+    def rested(_, labels, *__):
         numbers = {n: none[n] for n in labels}
         return decision.first, Found("+".join(labels), worth[labels], 1.0, numbers)
 
@@ -629,7 +630,7 @@ def test_a_cause_that_explains_more_beside_the_others_takes_the_place_of_one(
         nats = {"heading_offset": linear, "current": 20.0}.get(included[0], 0.0)
         return search.base, [Found("fouling", nats, 1.0, {"fouling": none["fouling"]})]
 
-    monkeypatch.setattr(trial, "settle", settle)
+    monkeypatch.setattr(diagnose, "settle", rested)
     monkeypatch.setattr(trial, "scan", scan)
     search.backwards()
     if not taken:
@@ -716,7 +717,7 @@ def test_causes_settle_from_where_they_rested_before(compass):
     asked.clear()
     rests = []
     for begin in (0.5, -0.5):
-        _, found = again.settle((label,), {label: np.array([begin])}, point.path)
+        _, found = settle(again, (label,), {label: np.array([begin])}, point.path)
         rests.append((len(asked), *found.numbers[label]))
         asked.clear()
     assert rests[0][0] > 2 and rests[1][0] == 1
@@ -818,7 +819,7 @@ def test_what_a_network_learned_from_counts_for_what_its_voyages_predict_of_each
     said = []
     for count, weight in ((0.25, 1.0), (1.0, 0.25)):
         trial = Trial(replace(sea.usual, counts=count), sea.done.trial.record)
-        trial._first, trial.weight = point, np.full(len(trial.rows), weight)
+        trial.first, trial.weight = point, np.full(len(trial.rows), weight)
         level = trial.level(point, 1.0, ())
         found = trial._with(level, "current")
         said.append((found.evidence - level.value, *found.numbers["current"]))
@@ -849,7 +850,7 @@ def test_what_no_function_of_a_networks_inputs_says_is_beyond_doubt(
     for learned in (True, False):
         seen = replace(sea.usual, adapts=True, learned=learned, nominal=None)
         trial = Trial(seen, sea.done.trial.record)
-        trial._first = sea.done.trial._first
+        trial.first = sea.done.trial.first
         assert len(Said(held.cut, held.before, trial).refuted(decision)[0].named) == left * learned
 
 
@@ -869,7 +870,7 @@ def test_little_evidence_beside_another_fit_is_named_where_the_gain_is_sure(sea,
 
     held = sea.done.held
     adapts = Trial(replace(sea.usual, adapts=True), sea.done.trial.record)
-    adapts._first = sea.done.trial._first
+    adapts.first = sea.done.trial.first
     rest, _, dropped = Said(held.cut, held.before, adapts).refuted(decision)
     assert len(rest.named) == left
     assert left or "none that is sure" in dropped["current"]
@@ -1020,7 +1021,7 @@ def test_reversing_the_campaign_turns_a_drift_round(sea, trials):
     back = Trial(sea.usual, replace(seen, share=1.0 - seen.share))
     point = back.begin({})
     both = ("thrust_loss", "thrust_drift")
-    _, found = back.settle(both, {n: np.zeros(1) for n in both}, point.path)
+    _, found = settle(back, both, {n: np.zeros(1) for n in both}, point.path)
     loss, drift = (found.numbers[n][0] for n in both)
     sure = np.sqrt(np.diag(found.covariance))
     (slope,) = plain.named[0].numbers
@@ -1172,7 +1173,7 @@ def test_linearising_again_brings_no_evidence_of_its_own(sea, still):
     for label in ("heading_offset", "current", "yaw_rate_scale"):
         cause = next(c for c in sea.usual.model.causes if c.label == label)
         begin = {label: np.zeros(cause.count)}
-        _, found = trial.settle((label,), begin, decision.first.path)
+        _, found = settle(trial, (label,), begin, decision.first.path)
         assert -15.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
 
 
@@ -1184,7 +1185,7 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
         raise np.linalg.LinAlgError
 
     monkeypatch.setattr(trial, "levels", broken)
-    _, found = trial.settle(("current",), {"current": np.zeros(2)}, decision.first.path)
+    _, found = settle(trial, ("current",), {"current": np.zeros(2)}, decision.first.path)
     assert found.evidence == -np.inf
 
 
@@ -1202,17 +1203,17 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
         return point
 
     monkeypatch.setattr(trial, "at", bounded)
-    monkeypatch.setattr(trial, "_rested", {})
-    _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([0.8])}, path)
+    monkeypatch.setattr(trial, "rested", {})
+    _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
     assert -30.0 < found.evidence - decision.nothing.evidence < diagnose.LEAST
     away.clear()
-    trial._rested.clear()
-    _, found = trial.settle(("heading_offset",), {"heading_offset": np.array([8.0])}, path)
+    trial.rested.clear()
+    _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     low = decision.nothing.evidence + 900.0  # nothing at rest is so high: each step went too far
     begin = {"heading_offset": np.array([0.01])}
-    _, found = trial.settle(("heading_offset",), begin, path, -np.inf, low)
+    _, found = settle(trial, ("heading_offset",), begin, path, -np.inf, low)
     assert found.evidence == -np.inf
 
 

@@ -9,6 +9,7 @@ from safetensors.numpy import load_file, save_file
 
 from pipelines.diagnose import diagnose_run
 from pipelines.diagnosis import own
+from pipelines.diagnosis import trial as trials
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.diagnosis.trial import record_of, trial_of, windows_of
 from pipelines.known_ship import cases, sensors
@@ -147,7 +148,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
 def test_what_refutes_a_cause_of_a_network_is_her_mmg(afloat):
     """It simulates as it was fitted, with what the run has of causes; of a physical run that is
     the run."""
-    judge = own.simulator(afloat.run, afloat.trial)
+    judge = trials.simulator(afloat.run, afloat.trial)
     ref = afloat.trial.reference
     assert judge.theta == pytest.approx(ref.theta) and judge.model.causes == ()
     assert type(judge.model.base).__name__ == "MMG"
@@ -155,7 +156,7 @@ def test_what_refutes_a_cause_of_a_network_is_her_mmg(afloat):
         afloat.run, afloat.work / "current", afloat.held.extended(afloat.decision)
     )
     trial, _ = trial_of(extended, None, afloat.recorded, ())
-    again = own.simulator(extended, trial)
+    again = trials.simulator(extended, trial)
     assert [c.label for c in again.model.causes] == ["current"]
     numbers = afloat.decision.named[0].numbers
     assert again.theta[-len(numbers) :] == pytest.approx(numbers)
@@ -176,7 +177,7 @@ def test_the_network_is_fitted_again_where_that_makes_its_error_less(afloat):
 
 def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
     done = diagnose_run(afloat.run.path, afloat.store, afloat.names, afloat.work / "out")
-    judge = HeldOut(afloat.held.cut, own.simulator(afloat.run, afloat.trial), afloat.trial)
+    judge = HeldOut(afloat.held.cut, trials.simulator(afloat.run, afloat.trial), afloat.trial)
     _, found, _ = judge.refuted(afloat.decision)
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
     assert [c["name"] for c in done.verdict.causes] == ["current"]

@@ -25,7 +25,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"misfit", "reading"},
     {"reference"},
     {"unseen", "external", "hypotheses", "remembered", "direct"},
-    {"unnamed"},
+    {"unnamed", "settling"},
     {"decision"},
     {"diagnose"},
     {"advise"},

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from pipelines.diagnosis.trial import constants_for
 from shiplog import reference
 from shiplog.decision import Decision
-from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.hypotheses import Trial
 from shiplog.models.extended import Extended
 from shiplog.runs import Run
@@ -61,20 +58,3 @@ class Own:
         return trial, replace(
             decision, point=point, base=base, louder=base.louder, first=first, nothing=nothing
         )
-
-
-def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
-    """What judges in a trial, with what the run has of causes, as it stands before any more."""
-    if run.config.physical:
-        return run.extended(run.config.seeds[0], trial.record)
-    ref = trial.reference
-    held = () if run.extension is None else run.extension.causes
-    numbers = run.extension_numbers()
-    theta = np.concatenate((ref.theta, *(numbers[c.label] for c in held)))
-    model = replace(
-        ref.model, causes=held, constants=constants_for(run, held, ref.setting)
-    )  # fmt: skip
-    shares, lengths = campaign(trial.record)
-    return ExtendedSimulator(
-        model, theta, np.zeros((len(theta),) * 2), run.profile, shares, lengths
-    )

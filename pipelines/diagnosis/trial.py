@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from shiplog import causes as catalogue
 from shiplog import record, reference, remembered, table, user_causes, windows
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
+from shiplog.extend import ExtendedSimulator, campaign
 from shiplog.hypotheses import Trial
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
@@ -88,6 +90,23 @@ def trial_of(
     at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
     known = reference.learn(model, setting, start, nominal, at)
     return Trial(known, recorded, tuple(held)), untested
+
+
+def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
+    """What judges in a trial, with what the run has of causes, as it stands before any more."""
+    if run.config.physical:
+        return run.extended(run.config.seeds[0], trial.record)
+    ref = trial.reference
+    held = () if run.extension is None else run.extension.causes
+    numbers = run.extension_numbers()
+    theta = np.concatenate((ref.theta, *(numbers[c.label] for c in held)))
+    model = replace(
+        ref.model, causes=held, constants=constants_for(run, held, ref.setting)
+    )  # fmt: skip
+    shares, lengths = campaign(trial.record)
+    return ExtendedSimulator(
+        model, theta, np.zeros((len(theta),) * 2), run.profile, shares, lengths
+    )
 
 
 def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
