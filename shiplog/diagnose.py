@@ -31,12 +31,13 @@ FAINT = 60.0  # nats of a cause, below which a structure that explains as much t
 POSES = 0.0  # nats that a structure as good as the first cause may still bring beside it
 STOCHASTIC = 40.0  # nats that louder unrest must bring to be said
 LOUD = 1.4  # times the usual unrest, from which on it is asked where it comes from
-PULSED = 40.0  # nats that pulses must bring beyond louder unrest
+PULSED = 40.0  # nats that pulses must bring beyond louder unrest, the first thing beyond all else
 TEMPERATURE = 2.0  # nats: at 3, 176 of 177 blind cases said with 0.9 and more were right
 ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 EXCHANGE = 2.0  # nats that a cause must bring in another one's place
 MOVED = "motion"  # what a thruster that nobody records changes itself
+LOAD = "payload"  # how she answers to forces: to those of such a thruster nobody knows
 SETTLED = 3  # contenders that are linearised again
 SHARE = 0.3  # of the best one's evidence that makes a contender
 
@@ -145,18 +146,24 @@ class _Search:
         if not self._may_pulse(self.base, self.included):
             return False
         tried = unnamed.pulses(self.trial, self.point, self.base)
-        rivals = [f.evidence for f in (*self.found[:1], *self.remains[:1])]
+        rivals = max((f.evidence for f in (*self.found[:1], *self.remains[:1])), default=0.0)
+        wanted = PULSED + max(rivals, 0.0)
         if self.rival is not None:  # it may do without cause and thruster
-            rivals.append(self.rival.evidence + SURE - self.steps[self.first][0])
-        if tried.gain <= max(PULSED, *rivals):
+            instead = self.rival.evidence + SURE - self.steps[self.first][0]
+            wanted = max(PULSED, rivals, instead)
+        if tried.gain <= wanted:
             return False
         self.rival = None
-        self.pulses = tried
-        self.trial.unrest = replace(self.trial.unrest, pulse=tried.unit * tried.force)
+        self._pulsed(tried)
+        return True
+
+    def _pulsed(self, pulses: Pulses) -> None:
+        """This is the thruster, beside which all else is judged."""
+        self.pulses = pulses
+        self.trial.unrest = replace(self.trial.unrest, pulse=pulses.unit * pulses.force)
         self.base, self.found = self.trial.scan(
             self.point, self._left(self.included), self.included
         )
-        return True
 
     def _structure(self, settled: Sequence[tuple[Point, Found]], gain: float) -> bool:
         """Whether an unknown structure explains far more than the best cause; or, where not much
@@ -246,10 +253,14 @@ class _Search:
         for other, nats in less.items():
             self.rejected.setdefault(other, f"{label} explains {nats:.0f} nats more")
         self.included = tuple(self.base.numbers)
+        if self.pulses is not None:  # its place was found while it had to explain this, too
+            self._pulsed(unnamed.pulses(self.trial, self.point, self.base))
+            return
         _, self.found = self.trial.scan(self.point, self._left(self.included), self.included)
 
     def _left(self, included: Sequence[str]) -> list[Cause]:
-        return [c for c in self.catalogue if all(c.beside(label) for label in included)]
+        left = [c for c in self.catalogue if all(c.beside(label) for label in included)]
+        return left if self.pulses is None else [c for c in left if c.label != LOAD]
 
     def _ranked(self, settled: Sequence[tuple[Point, Found]], wanted: float) -> dict[str, float]:
         """Probabilities of the first step, tempered; `none` holds the threshold."""

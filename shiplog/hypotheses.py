@@ -130,7 +130,7 @@ class Trial:
                  the likely one as a free rollout, and what is not linear then looks like evidence
         """
         ref = self.reference
-        wide = ref.wide if louder is None else ref.held(louder)
+        wide = ref.wide if louder is None else ref.held(louder, self.unrest.pulse)
         cut, moved, shown = self._read(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         path = segments.pulled(

@@ -97,9 +97,13 @@ class Reference:
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
 
-    def held(self, louder: float) -> Wide:
-        """How far a path may be pulled where the unrest is so much louder than usual."""
-        return Wide(self.unrest.noise, self.wide.start, FREE * louder * self.unrest.push)
+    def held(self, louder: float, pulse: np.ndarray | None = None) -> Wide:
+        """How far a path may be pulled where the unrest is so much louder than usual, and by a
+        force that comes and goes."""
+        push = louder * self.unrest.push
+        if pulse is not None:
+            push = np.hypot(push, pulse)
+        return Wide(self.unrest.noise, self.wide.start, FREE * push)
 
     @property
     def coefficients(self) -> dict[str, np.ndarray]:

@@ -4,11 +4,14 @@ and a force that nobody records.
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import minimize
 
 from shiplog import evidence, reference, structure
 from shiplog.columns import HELD
@@ -17,6 +20,7 @@ from shiplog.models.mmg import MMG, body
 from shiplog.structure import Basis, Products
 from shiplog.traced import traced
 
+FARTHEST = 0.5  # lengths from midship
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 
 
@@ -159,29 +163,32 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
         left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
     )
     startless = evidence.startless(alone, trial.unrest)
+    plain = replace(trial.unrest, pulse=None)
 
     def value(unrest: evidence.Unrest) -> float:
         each, volume = startless.square(unrest)
         return -0.5 * ref.counts * (float(trial.weight @ each) + volume)
 
-    isotropic = max(value(trial.unrest.louder(v)) for v in LOUDER)
-    best: Pulses | None = None
-    ship = ref.model.stand_in
-    coefficients = ref.coefficients
-    length = ref.setting.scale["length"]
-    levers = np.linspace(-0.45, 0.45, 7) * length
-    pushed = np.stack((np.zeros(7), np.ones(7), levers), -1)
-    units = accelerations(ship, coefficients, pushed)
-    for lever, unit in zip(levers, units, strict=True):
-        # in newtons that matter: from the usual unrest upwards
-        ordinary = trial.unrest.push[1] / abs(unit[1])
-        for size in ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0]):
-            tried = replace(trial.unrest, pulse=unit * size)
-            one = value(tried)
-            if best is None or one > best.value:
-                best = Pulses(one, one - isotropic, float(lever), float(size), unit)
-    assert best is not None
-    return best
+    isotropic = max(value(plain.louder(v)) for v in LOUDER)
+    ship, length = ref.model.stand_in, ref.setting.scale["length"]
+    across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
+
+    def of(lever: float, force: float) -> float:
+        unit = across + lever * length * turning
+        return value(replace(plain, pulse=unit * force))
+
+    levers = np.linspace(-0.45, 0.45, 7)
+    # in newtons that matter: from the usual unrest upwards
+    ordinary = plain.push[1] / abs(across[1])
+    sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
+    finer = minimize(  # beside the place itself a part of the force would be another cause's
+        lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
+        bounds=((-FARTHEST, FARTHEST), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
+    )  # fmt: skip
+    lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
+    one = -float(finer.fun)
+    return Pulses(one, one - isotropic, lever, force, across + lever * turning)
 
 
 def pulse_force(

@@ -10,6 +10,7 @@ from dataclasses import replace
 from importlib import resources
 from types import SimpleNamespace
 
+import afloat
 import numpy as np
 import pytest
 import sailing
@@ -25,6 +26,7 @@ from shiplog import (
     advise,
     conventions,
     diagnose,
+    evidence,
     reading,
     record,
     reference,
@@ -493,6 +495,52 @@ def test_an_unrecorded_thruster_is_a_second_cause(compass, monkeypatch, louder, 
     assert search._second(decision.point, replace(decision.base, louder=louder)) == counts
     search.pulses = found  # there is one already
     assert search._second(decision.point, replace(decision.base, louder=louder)) == 0.0
+
+
+def test_an_unrecorded_thruster_is_placed_where_it_stands():
+    """Its place [m ahead of midship] and force between those that are tried first, from products
+    drawn with it: sway and yaw rate pushed together."""
+    rng = np.random.default_rng(5)
+    ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
+    unit = unnamed.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
+    knots, count = 16, 300
+    unrest = replace(afloat.UNREST, pulse=1.7 * unit)
+    z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it seen, as well as a knot can be
+    drawn = np.zeros((count, 6 + 3 * knots, 1))
+    drawn[:, 6:, 0] = rng.multivariate_normal(np.zeros(3 * knots), unrest.kernel(knots), count)
+    sure = 1e12
+    weighed = evidence.Weighed(
+        sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
+    )
+    trial = SimpleNamespace(
+        reference=SimpleNamespace(
+            model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
+            setting=SimpleNamespace(scale={"length": 3.0}), counts=1.0,
+        ),
+        unrest=replace(unrest, pulse=np.array([9.0, 9.0, 9.0])),  # an earlier one is no matter
+        weight=np.ones(count),
+        left_of=lambda *_: (weighed, np.zeros(0)),
+        solved=lambda *_: np.zeros(0),
+    )  # fmt: skip
+    found = unnamed.pulses(trial, None, None)
+    assert found.lever == pytest.approx(1.1, abs=0.05)
+    assert found.force == pytest.approx(1.7, rel=0.1)
+    assert found.gain > 1000.0
+
+
+def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
+    """By as much as the unrest and it together may push, twice."""
+    ref, pulse = sea.usual, np.array([0.0, 0.02, 0.01])
+    plain, pulsed = ref.held(1.5), ref.held(1.5, pulse)
+    assert pulsed.push**2 == pytest.approx(plain.push**2 + (2.0 * pulse) ** 2)
+
+
+def test_beside_an_unrecorded_thruster_no_load_is_looked_for(compass):
+    trial, decision = compass
+    search = diagnose._Search(trial, decision.first, ())
+    assert "payload" in [c.label for c in search._left(())]
+    search.pulses = unnamed.Pulses(0.0, 900.0, 0.0, 1.0, np.array([0.0, 0.01, 0.0]))
+    assert "payload" not in [c.label for c in search._left(())]
 
 
 @pytest.mark.parametrize(("second", "poses"), [(4.0, True), (6.0, False)])
