@@ -114,7 +114,9 @@ def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     if labels:
         numbers = {n: decision.base.numbers[n] for n in labels}
         point, base = settle(trial, labels, numbers, decision.point.path)
-    else:
+        if base.covariance is None:  # the fit ran away: nothing is left of them
+            labels, named = (), ()
+    if not labels:
         point, base = decision.first, decision.nothing
     again, at = [], 0
     by = {n.cause.label: n for n in named}

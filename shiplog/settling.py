@@ -29,8 +29,8 @@ def settle(
 ) -> tuple[Point, Found]:
     """These causes together, linearised where they are until they rest (from where they did
     before, if they have); or until it is plain that their evidence will not `beat` what
-    another has. A step after which it is below the `lowest` that it can be at rest, or falls
-    far, went too far."""
+    another has. A step after which it is below the `lowest` that it can be at rest, where that is
+    known, or then falls far, went too far."""
     point, louder, near, before = None, 1.0, None, np.inf
     key = (tuple(included), trial.pulse)
     if key in trial.rested:
@@ -57,7 +57,8 @@ def settle(
                 numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
             continue
         path, stood = point.path, numbers
-        lowest = max(lowest, base.evidence - FALLS)
+        if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
+            lowest = max(lowest, base.evidence - FALLS)
         louder = near = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit ran away

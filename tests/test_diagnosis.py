@@ -35,6 +35,7 @@ from shiplog import (
     structure,
     unnamed,
 )
+from shiplog import decision as decisions
 from shiplog import profile as profiles
 from shiplog.causes.sensors import HeadingOffset
 from shiplog.config import Config, Physics
@@ -1235,6 +1236,43 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
     monkeypatch.setattr(trial, "levels", broken)
     _, found = settle(trial, ("current",), {"current": np.zeros(2)}, decision.first.path)
     assert found.evidence == -np.inf
+
+
+@pytest.mark.parametrize(("lowest", "evidence"), [(-np.inf, 850.0), (0.0, -np.inf)])
+def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, lowest, evidence):
+    """Linearised where they stood beside it they seem to explain 1000 nats, and 850 where they
+    rest. Of one that joins, a step that costs so much went too far."""
+    trial, decision = still
+    at = []
+
+    def told(*_):
+        high = at[-1] > 0.15
+        found = {"heading_offset": np.array([0.1])}
+        return Found("nothing", 1000.0 if high else 850.0, 1.0, found, np.eye(1) * 1e-4), []
+
+    monkeypatch.setattr(
+        trial, "at", lambda n, *_: at.append(n["heading_offset"][0]) or decision.first
+    )
+    monkeypatch.setattr(trial, "scan", told)
+    monkeypatch.setattr(trial, "rested", {})
+    begin = {"heading_offset": np.array([0.16])}
+    _, found = settle(trial, ("heading_offset",), begin, None, -np.inf, lowest)
+    assert found.evidence == evidence
+
+
+def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monkeypatch):
+    trial, decision = compass
+    (one,) = decision.named
+    other = replace(
+        one, cause=next(c for c in trial.reference.model.causes if c.label == "current")
+    )
+    both = {one.cause.label: one.numbers, other.cause.label: one.numbers}
+    two = replace(decision, named=(one, other), base=replace(decision.base, numbers=both))
+    gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
+    monkeypatch.setattr(decisions, "settle", lambda *_: (decision.point, gone))
+    left = decisions.without(trial, two, other)
+    assert left.named == () and left.verdict == "none"
+    assert (left.point, left.base) == (decision.first, decision.nothing)
 
 
 def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
