@@ -37,7 +37,6 @@ ALIKE = 8.0  # nats within which two causes cannot be told apart
 MOST = 3  # causes
 EXCHANGE = 2.0  # nats that a cause must bring in another one's place
 MOVED = "motion"  # what a thruster that nobody records changes itself
-LOAD = "payload"  # how she answers to forces: to those of such a thruster nobody knows
 SETTLED = 3  # contenders that are linearised again
 SHARE = 0.3  # of the best one's evidence that makes a contender
 
@@ -260,7 +259,7 @@ class _Search:
 
     def _left(self, included: Sequence[str]) -> list[Cause]:
         left = [c for c in self.catalogue if all(c.beside(label) for label in included)]
-        return left if self.pulses is None else [c for c in left if c.label != LOAD]
+        return left if self.pulses is None else [c for c in left if not c.answers]
 
     def _ranked(self, settled: Sequence[tuple[Point, Found]], wanted: float) -> dict[str, float]:
         """Probabilities of the first step, tempered; `none` holds the threshold."""

@@ -268,11 +268,6 @@ def _of_start(weighed: Weighed, known: np.ndarray) -> float:
     return float(of.sum())
 
 
-def gram(weighed: Weighed, unrest: Unrest) -> Gram:
-    """Start and acceleration eliminated."""
-    return modes(weighed, unrest).gram()
-
-
 def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Unrest:
     """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977), each
     round three steps of it of which the first two say how far the third may leap (SQUAREM,

@@ -29,6 +29,7 @@ from shiplog.segments import Linear, Path, Wide
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 5.0  # nats, for which they are not moved on
+ON_THE_WAY, AT_REST = 2, 3  # rounds in which the sizes of noise and unrest are learnt
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
 KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
@@ -162,12 +163,12 @@ def settled(
         path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
         found, _ = _solved(linear, unrest, columns, held)
-        unrest = evidence.learnt(linear, found * unit, unrest, rounds=2)
+        unrest = evidence.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
         found, gain = _solved(linear, unrest, columns, held)
         far = float(np.abs(found[:base]).max(initial=0.0))
         if round_ == rounds or (gain < NEAR and far < FARTHEST):
-            unrest = evidence.learnt(linear, found * unit, unrest, rounds=3)
+            unrest = evidence.learnt(linear, found * unit, unrest, rounds=AT_REST)
             break
         moved_to = theta + (found * unit)[:base] * min(1.0, FARTHEST / far)
         edge = 1e-6 * (start.high - start.low)

@@ -20,7 +20,7 @@ from shiplog.models.mmg import MMG, body
 from shiplog.structure import Basis, Products
 from shiplog.traced import traced
 
-FARTHEST = 0.5  # lengths from midship
+REACH = 0.5  # lengths from midship
 LOUD = 1.2  # from which on a structure may also bring the usual unrest back
 
 
@@ -184,7 +184,7 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
     finer = minimize(  # beside the place itself a part of the force would be another cause's
         lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
-        bounds=((-FARTHEST, FARTHEST), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
+        bounds=((-REACH, REACH), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
     )  # fmt: skip
     lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
     one = -float(finer.fun)

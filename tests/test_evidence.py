@@ -57,6 +57,10 @@ def observed(unrest: Unrest, bins: int) -> np.ndarray:
     return whole
 
 
+def _gram(weighed: evidence.Weighed, unrest: Unrest) -> evidence.Gram:
+    return evidence.modes(weighed, unrest).gram()
+
+
 def dense(given: Linear, unrest: Unrest, fitted: bool = False):
     """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
     `fitted`: without what the start adds to it."""
@@ -88,7 +92,7 @@ def test_gram_is_the_dense_gaussian(unrest):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
     restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
     given = linear(3)
-    found = evidence.gram(evidence.weighed(given, unrest), unrest)
+    found = _gram(evidence.weighed(given, unrest), unrest)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         block = np.concatenate((e[:, None], j), 1)
         assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
@@ -111,7 +115,7 @@ def test_a_square_of_errors_alone_is_that_of_their_gram(unrest):
     weighed = evidence.weighed(alone, unrest)
     for other in (unrest, unrest.louder(3.0), replace(unrest, pulse=np.array([0.1, 2.0, 0.7]))):
         each, volume = evidence.startless(weighed, unrest).square(other)
-        wanted = evidence.gram(weighed, other)
+        wanted = _gram(weighed, other)
         assert each == pytest.approx(wanted.each[:, 0, 0], rel=1e-9)
         assert volume == pytest.approx(wanted.logdet, rel=1e-9)
 
@@ -123,7 +127,7 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
     towards = np.concatenate(([1.0], -d))
     found, wanted = [], []
     for unrest in (sure, sure.louder(3.0)):
-        gram = evidence.gram(evidence.weighed(given, UNREST), unrest)
+        gram = _gram(evidence.weighed(given, UNREST), unrest)
         found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
         every = dense(given, unrest)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
@@ -133,10 +137,10 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
 
 def test_units_scale_columns_and_not_the_error():
     given = linear(2)
-    found = evidence.gram(evidence.weighed(given, UNREST), UNREST)
+    found = _gram(evidence.weighed(given, UNREST), UNREST)
     unit = np.array([1e-3, 40.0])
     bent = replace(given, j=given.j * unit)
-    direct = evidence.gram(evidence.weighed(bent, UNREST), UNREST)
+    direct = _gram(evidence.weighed(bent, UNREST), UNREST)
     assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
     assert found.scaled(unit).logdet == found.logdet
 
@@ -147,11 +151,11 @@ def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     found = evidence.modes(evidence.weighed(given, UNREST), UNREST).beside(pushed).gram()
     columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
-    direct = evidence.gram(evidence.weighed(written_out, UNREST), UNREST)
+    direct = _gram(evidence.weighed(written_out, UNREST), UNREST)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
     modes, weight = evidence.modes(evidence.weighed(given, UNREST), UNREST), np.array([1, 0, 0.4])
     for louder in (0.5, 2.0):
-        each = evidence.gram(evidence.weighed(written_out, UNREST), UNREST.louder(louder)).each
+        each = _gram(evidence.weighed(written_out, UNREST), UNREST.louder(louder)).each
         whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, louder)
         wanted = np.einsum("s,sij->ij", weight, each)
         assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
@@ -167,7 +171,7 @@ def test_less_an_acceleration_is_less_what_it_does():
 def test_the_total_is_the_weighted_sum():
     given, weight = linear(3), np.array([1.0, 0.0, 0.4])
     weighed = evidence.weighed(given, UNREST)
-    each = evidence.gram(weighed, UNREST.louder(2.0)).each
+    each = _gram(weighed, UNREST.louder(2.0)).each
     whole = evidence.modes(weighed, UNREST.louder(2.0)).total(weight)
     assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
 
@@ -177,7 +181,7 @@ def test_one_pass_serves_every_size_of_unrest():
     weighed, weight = evidence.weighed(given, UNREST), np.array([1.0, 0.0, 0.4])
     modes = evidence.modes(weighed, UNREST)
     for louder in (0.5, 2.0, 5.0):
-        found, wanted = modes.gram(louder), evidence.gram(weighed, UNREST.louder(louder))
+        found, wanted = modes.gram(louder), _gram(weighed, UNREST.louder(louder))
         assert found.each == pytest.approx(wanted.each, rel=1e-6)
         assert found.logdet == pytest.approx(wanted.logdet, rel=1e-9)
         whole = np.einsum("s,sij->ij", weight, wanted.each)

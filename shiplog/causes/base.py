@@ -93,6 +93,7 @@ class Cause:
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
     rough: ClassVar[bool] = False  # no two waters have its form: what it leaves is not another's
+    answers: ClassVar[bool] = False  # it is how she answers to forces: to unknown ones nobody knows
 
     @property
     def label(self) -> str:
