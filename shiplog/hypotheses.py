@@ -121,11 +121,12 @@ class Trial:
     def at(
         self,
         numbers: Mapping[str, np.ndarray],
-        path: Path | None = None,
+        near: Path | Point | None = None,
         louder: float | None = None,
     ) -> Point:
         """Linearised with these numbers, around a path pulled onto what was then measured.
 
+        near     a path to pull from, or a point that expects what these numbers do to its own
         louder   λ that holds the path: one that follows every wave of the noise is as far from
                  the likely one as a free rollout, and what is not linear then looks like evidence
         """
@@ -133,9 +134,13 @@ class Trial:
         wide = ref.wide if louder is None else ref.held(louder, self.unrest.pulse)
         cut, moved, shown = self._read(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
-        path = segments.pulled(
-            ref.model, whole, cut, self.grid, wide, path, rounds=1 if path else 2
-        )
+        if isinstance(near, Point):
+            stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
+            path = segments.ahead(near.linear, whole - stood, wide)
+        else:
+            path = segments.pulled(
+                ref.model, whole, cut, self.grid, wide, near, rounds=1 if near else 2
+            )
         linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
         point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest))
         if self.first is None:
@@ -174,7 +179,7 @@ class Trial:
         point = self.at(numbers)
         self.robust(point)
         base, _ = self.scan(point, (), self.fixed)
-        return self.at(numbers, point.path, base.louder)
+        return self.at(numbers, point, base.louder)
 
     def covering(self, point: Point) -> Linear:
         """The point's segments and those between them: what is left, known as well everywhere."""

@@ -155,12 +155,15 @@ def settled(
     base, unit = columns.base, columns.unit
     theta = np.clip(start.values, start.low, start.high)
     unrest = Unrest(wide.noise, 0.04 * wide.push, UNREST_TIME, wide.start)
-    path: Path | None = None
-    hold = wide
+    path = linear = None
+    whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
     for round_ in range(rounds + 1):
-        whole = np.concatenate((theta, np.zeros(len(unit) - base)))
+        if linear is None:
+            path = segments.pulled(model, whole, cut, g, hold)
+        else:
+            before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
+            path = segments.ahead(linear, whole - before, hold)
         held = _anchor(start, theta, columns)
-        path = segments.pulled(model, whole, cut, g, hold, path, rounds=1 if path else 2)
         linear = segments.linear(model, whole, cut, g, path, moved, shown)
         found, _ = _solved(linear, unrest, columns, held)
         unrest = evidence.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)

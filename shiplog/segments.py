@@ -205,6 +205,12 @@ class Path:
     def at_nodes(self, g: Grid) -> np.ndarray:
         return np.einsum("scj,kj->skc", self.push, g.weights)
 
+    @property
+    def known(self) -> np.ndarray:
+        """[S, 6 + 3J] what a linearisation puts back: the start is free, and its own value its
+        mean."""
+        return np.concatenate((np.zeros_like(self.start), self.push.reshape(len(self.push), -1)), 1)
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -306,21 +312,31 @@ def pulled(
 ) -> Path:
     """Each segment's path onto what was measured: Gauss-Newton in start and knots."""
     path = path or first_path(model, theta, segments, g)
-    size = 6 + 3 * g.knots
-    prior = np.concatenate((wide.start, np.repeat(wide.push, g.knots)))
-    weight = np.where(segments.used, 1.0 / wide.noise, 0.0)
     for _ in range(rounds):
         y, z = _run(model, theta, segments, path, g)
-        scaled = (z * weight[..., None]).reshape(len(z), -1, size)
-        gap = ((segments.y - y) * weight).reshape(len(y), -1)
-        known = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
-        # the start is free about where it stands, the knots about zero
-        turned = np.swapaxes(scaled, 1, 2)
-        normal = turned @ scaled + np.diag(prior**-2.0)
-        pull = (turned @ gap[..., None])[..., 0] - known * prior**-2.0
-        step = np.linalg.solve(normal, pull[..., None])[..., 0]
-        path = Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(len(y), 3, g.knots))
+        path = _closer(path, segments.y - y, z, segments.used, wide)
     return path
+
+
+def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
+    """Where a linearisation expects a path to be pulled once θ has moved by d [C]: nothing is
+    simulated, and what is not linear shows when it is linearised there."""
+    gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
+    return _closer(linear.path, gap, linear.z, linear.cut.used, wide)
+
+
+def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
+    """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated."""
+    count, _, _, size = z.shape
+    prior = np.concatenate((wide.start, np.repeat(wide.push, path.push.shape[-1])))
+    weight = np.where(used, 1.0 / wide.noise, 0.0)
+    scaled = (z * weight[..., None]).reshape(count, -1, size)
+    # the start is free about where it stands, the knots about zero
+    turned = np.swapaxes(scaled, 1, 2)
+    normal = turned @ scaled + np.diag(prior**-2.0)
+    pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - path.known * prior**-2.0
+    step = np.linalg.solve(normal, pull[..., None])[..., 0]
+    return Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(path.push.shape))
 
 
 def linear(
@@ -342,10 +358,7 @@ def linear(
     read = moved.shape[-1]
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= shown
-    at = np.concatenate(
-        (np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1
-    )  # the start is free: its own value is its mean
-    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, at)
+    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
     return Linear(segments, path, e, z, j)
 
 

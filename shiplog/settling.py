@@ -31,19 +31,20 @@ def settle(
     before, if they have); or until it is plain that their evidence will not `beat` what
     another has. A step after which it is below the `lowest` that it can be at rest, where that is
     known, or then falls far, went too far."""
-    point, louder, near, before = None, 1.0, None, np.inf
+    point, louder, lately, before = None, 1.0, None, np.inf
+    near: Path | Point | None = path
     key = (tuple(included), trial.pulse)
     if key in trial.rested:
-        numbers, path, louder = trial.rested[key]
-        near = louder
+        numbers, near, louder = trial.rested[key]
+        lately = louder
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
     for _ in range(ROUNDS):
         try:
-            point = trial.at(numbers, path, louder)
+            point = trial.at(numbers, near, louder)
             if np.abs(point.linear.e).max() > AWAY:
                 raise np.linalg.LinAlgError("a path that ran away")
-            base, _ = trial.scan(point, (), included, near)
+            base, _ = trial.scan(point, (), included, lately)
             if base.evidence < lowest:
                 raise np.linalg.LinAlgError("a step too far")
         except np.linalg.LinAlgError:  # the fit ran away, and its path with it
@@ -56,10 +57,10 @@ def settle(
             else:
                 numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
             continue
-        path, stood = point.path, numbers
+        near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
             lowest = max(lowest, base.evidence - FALLS)
-        louder = near = base.louder
+        louder = lately = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit ran away
             break
@@ -68,7 +69,7 @@ def settle(
         numbers = moved
         lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
         if far < REST:
-            trial.rested[key] = (numbers, path, louder)
+            trial.rested[key] = (numbers, point.path, louder)
             break
         if lost and np.isfinite(before):
             break

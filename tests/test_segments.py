@@ -301,6 +301,27 @@ def test_what_was_not_used_does_not_pull():
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 
+def test_a_linearisation_expects_where_its_path_will_be_pulled():
+    """Nothing pushes her, but the rudder turns her by a tenth less than the model has it: pulled,
+    the path says so by a push. Once the model has it right there is none, and what is expected
+    before that is linearised there is off by what is not linear: a tenth of the tenth."""
+    true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
+    stood = segments.pulled(Toy(), wrong, cut, GRID, tight)
+    size = np.abs(stood.push[:, 2]).max()
+    assert size > 1e-4
+    nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    linear = segments.linear(Toy(), wrong, cut, GRID, stood, *nothing)
+    found = segments.ahead(linear, THETA - wrong, tight)
+    assert np.abs(found.push[:, 2]).max() < 0.1 * size
+    assert found.start == pytest.approx(true.start, abs=1e-3)
+    stays = segments.ahead(linear, np.zeros(4), tight)
+    assert stays.push == pytest.approx(stood.push, abs=0.1 * size)
+    firm = segments.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
+    assert np.abs(firm.push[:, 2]).max() < 0.1 * size  # held about none, not about where it stood
+
+
 # --- a trap: recorded actuators held instead of interpolated
 
 

@@ -53,7 +53,7 @@ class Own:
         point, base = first, nothing
         if decision.named:
             numbers = {n.cause.label: n.numbers for n in decision.named}
-            point = trial.at({**self.numbers, **numbers}, first.path, nothing.louder)
+            point = trial.at({**self.numbers, **numbers}, first, nothing.louder)
             base, _ = trial.scan(point, (), trial.fixed)
         return trial, replace(
             decision, point=point, base=base, louder=base.louder, first=first, nothing=nothing
