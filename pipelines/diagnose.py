@@ -99,6 +99,11 @@ def diagnose_run(
         if decision.adapted:
             alone = held.adapted(decision).reduction
             notes.append(f"{run.name} is fitted again beside what is named.")
+    if decision.halves and decision.named:
+        notes.append(
+            "Neither voyage says enough of what is named to predict the other: held out were their "
+            "halves."
+        )
     context = Context(
         run,
         before_effect and nominal is not None,

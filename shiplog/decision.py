@@ -68,6 +68,7 @@ class Decision:
     told       label → what these data would tell of each cause, were it there
     apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
     adapted    whether the model's own coefficients are fitted again beside what is named
+    halves     whether halves of voyages are left out where it is judged, and not whole ones
     least      nats that the first cause had to bring
     """
 
@@ -87,6 +88,7 @@ class Decision:
     told: Mapping[str, Told] = field(default_factory=dict)
     apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     adapted: bool = False
+    halves: bool = False
     least: float = LEAST
 
     @property

@@ -344,6 +344,53 @@ def test_what_does_not_gain_is_no_cause_of_the_error(sea, label, evidence, after
 
 
 @pytest.mark.parametrize(
+    ("evidence", "after", "left"),
+    [
+        (61.0, 480.0, 1),  # beyond doubt, and each half is told by the others
+        (61.0, 610.0, 0),  # and is not
+        (60.0, 480.0, 0),  # not beyond doubt
+    ],
+)
+def test_what_one_of_two_voyages_shows_is_asked_by_their_halves(sea, evidence, after, left):
+    """The other voyage never came near the bank: without the first nobody knows how it draws."""
+    first = replace(sea.done.decision.named[0], evidence=evidence)
+    decision = replace(sea.done.decision, named=(first,))
+
+    class Said(HeldOut):
+        def gain(self, decided):
+            harms = decided.named and not decided.halves
+            return Gain(500.0, 765.0 if harms else after, -0.6 if harms else -0.05, 0.1, 4, {})
+
+        def worth(self, rest, decided):
+            return self.gain(decided)
+
+    held = sea.done.held
+    assert len(set(held.voyages)) == 2
+    rest, found, dropped = Said(held.cut, held.before, held.trial).refuted(decision)
+    assert len(rest.named) == left and set(dropped) == ({"current"} if not left else set())
+    if left:
+        assert rest.halves and found.after == after
+
+
+def test_halves_of_voyages_are_left_out_one_by_one(sea):
+    """Each window once, and of its voyage no row of the same half in the numbers."""
+    held = sea.done.held
+    folds = list(held._folds(True))
+    assert [(name, half[1]) for name, half, _ in folds] == [
+        (name, late) for name in dict.fromkeys(held.voyages) for late in (False, True)
+    ]
+    rows = np.concatenate([rows.numpy() for _, _, rows in folds])
+    assert sorted(rows) == list(range(len(held.voyages)))
+    size = float(held.cut.dt[0].sum())
+    for name, (middle, late), rows in folds:
+        for row in held.cut.plan[rows.numpy()].to_dicts():
+            assert row["voyage"] == name
+            inside = (row["elapsed"], row["elapsed"] + size)
+            assert min(inside) >= middle - 1.0 if late else max(inside) <= middle + 1.0
+    assert [half for _, half, _ in held._folds(False)] == [None, None]
+
+
+@pytest.mark.parametrize(
     ("evidence", "high", "left"),
     [
         (121.0, 0.03, 2),  # beyond doubt, and it may be worth something

@@ -76,7 +76,7 @@ class HeldOut(Rollouts):
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
         states = np.empty(tuple(self.cut.state.shape))
         needed = self._constants(decision)
-        for voyage, half, rows in self._folds():
+        for voyage, half, rows in self._folds(decision.halves):
             numbers, coefficients = self._without(decision, voyage, half)
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
@@ -117,9 +117,11 @@ class HeldOut(Rollouts):
         fault though it is worth nothing, but not where it makes the error more; so is what differs
         from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
         steps of a second hide a lag of a third of one. A model that has learned of it, and gains
-        by being fitted again beside it, is so without each cause, too.
+        by being fitted again beside it, is so without each cause, too. Of two voyages the other
+        need not know what one shows: what is there beyond doubt is asked again by their halves.
         """
         dropped: dict[str, str] = {}
+        few = len(set(self.voyages)) < VOYAGES
         if not decision.named:
             return decision, None, dropped
         found = self.gain(decision)
@@ -142,6 +144,10 @@ class HeldOut(Rollouts):
             undecided = worth.high > (0.0 if alone else WORTH)
             if not harm and undecided and self._sure(one, alone):
                 break
+            if few and not decision.halves and self._sure(one, alone):
+                decision = replace(decision, halves=True)
+                found = self.gain(decision)
+                continue
             why = f"{worth.reduction:+.1%}"
             if gains:
                 why = f"{why}, {worth.low:+.1%} to {worth.high:+.1%}: none that is sure"
@@ -151,7 +157,8 @@ class HeldOut(Rollouts):
                 other: f"{one.cause.label} explains {nats:.0f} nats more, and gains nothing"
                 for other, nats in one.beaten.items() if nats > diagnose.MORE and other not in left
             }  # fmt: skip
-            decision, found = rest, self.gain(rest)
+            decision = replace(rest, halves=False)
+            found = self.gain(decision)
         return decision, found if decision.named else None, dropped
 
     def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
@@ -236,20 +243,22 @@ class HeldOut(Rollouts):
     def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
         return constants_of((n.cause for n in decision.named), self.trial.reference.setting)
 
-    def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
-        """(voyage, half of it, window rows) that are left out: whole voyages, or the halves of one
-        alone."""
+    def _folds(self, halves: bool) -> Iterator[tuple[str, Half, torch.Tensor]]:
+        """(voyage, half of it, window rows) that are left out: whole voyages, or `halves` of them,
+        as of one alone."""
         known = list(dict.fromkeys(self.voyages))
-        if len(known) > 1:
-            for name in known:
-                yield name, None, torch.tensor([i for i, n in enumerate(self.voyages) if n == name])
-            return
         elapsed = self.cut.plan["elapsed"].to_numpy()
-        middle = 0.5 * (elapsed.min() + elapsed.max() + float(self.cut.dt[0].sum()))
-        for late in (False, True):
-            rows = torch.tensor(np.flatnonzero((elapsed >= middle) == late))
-            if len(rows):
-                yield known[0], (middle, late), rows
+        for name in known:
+            own = np.array([n == name for n in self.voyages])
+            if len(known) > 1 and not halves:
+                yield name, None, torch.tensor(np.flatnonzero(own))
+                continue
+            first, last = elapsed[own].min(), elapsed[own].max()
+            middle = 0.5 * (first + last + float(self.cut.dt[0].sum()))
+            for late in (False, True):
+                rows = torch.tensor(np.flatnonzero(own & ((elapsed >= middle) == late)))
+                if len(rows):
+                    yield name, (middle, late), rows
 
     def _without(
         self, decision: Decision, voyage: str, half: Half
