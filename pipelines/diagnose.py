@@ -101,8 +101,8 @@ def diagnose_run(
             notes.append(f"{run.name} is fitted again beside what is named.")
     if decision.halves and decision.named:
         notes.append(
-            "Neither voyage says enough of what is named to predict the other: held out were their "
-            "halves."
+            "One voyage does not say enough of what is named to predict the other: held out were "
+            "their halves."
         )
     context = Context(
         run,

@@ -46,6 +46,7 @@ class Verdict:
     verdict    named, none, unknown, coverage or external
     causes     as the contract has them
     said       one sentence
+    without    what of each held-out window the numbers have not seen
     """
 
     verdict: str
@@ -61,6 +62,7 @@ class Verdict:
     structure: dict | None = None
     intervals: tuple[Interval, ...] = ()
     gain: Gain | None = None
+    without: str = "its voyage"
     unseen: tuple[dict, ...] = ()
     limits: tuple[dict, ...] = ()
     notes: tuple[str, ...] = field(default=())
@@ -362,7 +364,7 @@ def markdown(verdict: Verdict) -> str:
             "## Gain on held-out windows", "",
             f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
             f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
-            "fitted without its voyage).", "",
+            f"fitted without {verdict.without}).", "",
             "By channel: " + ", ".join(
                 f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items()
             ) + ".", "",

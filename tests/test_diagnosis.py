@@ -388,6 +388,10 @@ def test_halves_of_voyages_are_left_out_one_by_one(sea):
             inside = (row["elapsed"], row["elapsed"] + size)
             assert min(inside) >= middle - 1.0 if late else max(inside) <= middle + 1.0
     assert [half for _, half, _ in held._folds(False)] == [None, None]
+    said = [held.left_out(replace(sea.done.decision, halves=h)) for h in (False, True)]
+    assert said == ["its voyage", "its half of the voyage"]
+    alone = HeldOut(held.cut.pick(folds[0][2]), held.before, held.trial)
+    assert alone.left_out(sea.done.decision) == said[1]
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,7 @@ def verdict(
         structure=structure if said == "unknown" else None,
         intervals=(*context.pushed, *context.uncovered),
         gain=found if causes else None,
+        without="" if held is None else held.left_out(decision),
         wrong=tuple(context.wrong),
         unseen=tuple(context.unseen),
         limits=verdicts.limits_json(decision, catalogue, setting)

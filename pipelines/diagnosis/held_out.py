@@ -243,6 +243,11 @@ class HeldOut(Rollouts):
     def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
         return constants_of((n.cause for n in decision.named), self.trial.reference.setting)
 
+    def left_out(self, decision: Decision) -> str:
+        """What of each window the numbers have not seen."""
+        whole = len(set(self.voyages)) > 1 and not decision.halves
+        return "its voyage" if whole else "its half of the voyage"
+
     def _folds(self, halves: bool) -> Iterator[tuple[str, Half, torch.Tensor]]:
         """(voyage, half of it, window rows) that are left out: whole voyages, or `halves` of them,
         as of one alone."""
