@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog import evidence, segments
+from shiplog import evidence, linearise, segments
 from shiplog.decision import Named
 from shiplog.hypotheses import Trial
 from shiplog.reading import read
@@ -120,8 +120,8 @@ def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | N
     rows = segments.begins(recorded)
     cut, moved, shown = read(ref.model, ref.setting, recorded, rows, numbers)
     grid = segments.grid(recorded)
-    path = segments.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
-    linear = segments.linear(ref.model, whole, cut, grid, path, moved, shown)
+    path = linearise.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
+    linear = linearise.linear(ref.model, whole, cut, grid, path, moved, shown)
     modes = evidence.modes(evidence.weighed(linear, ref.unrest), ref.unrest)
     if ref.misfit is not None:
         modes = modes.beside(ref.misfit.pushed(cut, grid))

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.segments import BIN, KNOT, Linear
+from shiplog.linearise import Linear
+from shiplog.segments import BIN, KNOT
 
 SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade

@@ -17,12 +17,13 @@ import numpy as np
 
 from shiplog import channels, midship, unexplained
 from shiplog.evidence import Unrest
+from shiplog.linearise import Linear
 from shiplog.models.mmg import MMG, body
 from shiplog.models.mmg import wind as air
 from shiplog.models.mmg.model import named
 from shiplog.quality import jumps, stretches
 from shiplog.record import Record
-from shiplog.segments import KNOT, Linear
+from shiplog.segments import KNOT
 from shiplog.traced import traced
 from shiplog.unexplained import Unexplained
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog import evidence, segments, unexplained
+from shiplog import evidence, linearise, segments, unexplained
 from shiplog.causes import Cause
 from shiplog.columns import HELD
 from shiplog.evidence import Modes, Weighed
+from shiplog.linearise import Linear, Path
 from shiplog.models.network import Network
 from shiplog.reading import read
 from shiplog.record import Record
 from shiplog.reference import Reference
-from shiplog.segments import Linear, Path
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
 QUIETER = (0.7, 0.5, 0.35, 0.25)
@@ -136,12 +136,12 @@ class Trial:
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         if isinstance(near, Point):
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
-            path = segments.ahead(near.linear, whole - stood, wide)
+            path = linearise.ahead(near.linear, whole - stood, wide)
         else:
-            path = segments.pulled(
+            path = linearise.pulled(
                 ref.model, whole, cut, self.grid, wide, near, rounds=1 if near else 2
             )
-        linear = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        linear = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown)
         point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest))
         if self.first is None:
             self.first = point
@@ -188,8 +188,8 @@ class Trial:
         numbers = dict(point.numbers)
         cut, moved, shown = read(ref.model, ref.setting, self.record, rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-        path = segments.pulled(ref.model, whole, cut, self.grid, ref.wide)
-        between = segments.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        path = linearise.pulled(ref.model, whole, cut, self.grid, ref.wide)
+        between = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown)
         return point.linear.beside(between)
 
     def robust(self, point: Point) -> None:

@@ -14,17 +14,17 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog import evidence, misfit, segments
+from shiplog import evidence, linearise, misfit, segments
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.columns import HELD, Columns
 from shiplog.evidence import Modes, Unrest
+from shiplog.linearise import Linear, Path, Wide
 from shiplog.misfit import Misfit
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
 from shiplog.models.network import Network
 from shiplog.reading import read
 from shiplog.record import Record
-from shiplog.segments import Linear, Path, Wide
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
@@ -159,12 +159,12 @@ def settled(
     whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
     for round_ in range(rounds + 1):
         if linear is None:
-            path = segments.pulled(model, whole, cut, g, hold)
+            path = linearise.pulled(model, whole, cut, g, hold)
         else:
             before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
-            path = segments.ahead(linear, whole - before, hold)
+            path = linearise.ahead(linear, whole - before, hold)
         held = _anchor(start, theta, columns)
-        linear = segments.linear(model, whole, cut, g, path, moved, shown)
+        linear = linearise.linear(model, whole, cut, g, path, moved, shown)
         found, _ = _solved(linear, unrest, columns, held)
         unrest = evidence.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
@@ -223,7 +223,7 @@ def learn(
     cut, moved, shown = read(model, setting, record, segments.begins(record))
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
-    linear = segments.linear(model, whole, cut, g, at.path, moved, shown)
+    linear = linearise.linear(model, whole, cut, g, at.path, moved, shown)
     modes = evidence.modes(evidence.weighed(linear, at.unrest), at.unrest)
     held = _anchor(start, at.theta, columns)
     wrong = None

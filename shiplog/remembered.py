@@ -19,10 +19,10 @@ import numpy as np
 from shiplog import cache, reference
 from shiplog.causes import Setting
 from shiplog.evidence import Unrest
+from shiplog.linearise import Path
 from shiplog.models.extended import Extended
 from shiplog.record import Record
 from shiplog.reference import Settled, Start
-from shiplog.segments import Path
 
 UNREST = ("noise", "push", "start", "coloured", "fade")
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from shiplog.hypotheses import Found, Point, Trial
-from shiplog.segments import Path
+from shiplog.linearise import Path
 
 ROUNDS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shiplog.linearise import resampled
 from shiplog.record import Record
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, resampled
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid
 
 FAMILIES = ("position", "heading", "time", "motion", "controls", "wind")
 UNSEEN = ("position", "heading", "time")  # by any model of forces, a network too

@@ -13,8 +13,9 @@ import polars as pl
 
 from shiplog import segments
 from shiplog.evidence import Unrest, starts_and_knots
+from shiplog.linearise import Linear
 from shiplog.record import Record
-from shiplog.segments import KNOT, Linear
+from shiplog.segments import KNOT
 
 HALF = 8  # knots: half a segment
 ACCELERATIONS = ("surge_acceleration", "sway_acceleration", "yaw_acceleration")

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from pipelines import known_ship
+from shiplog import linearise, segments, unexplained
 from shiplog import profile as profiles
-from shiplog import segments, unexplained
 from shiplog.evidence import Unrest
+from shiplog.linearise import Linear, Wide
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import body
 from shiplog.record import Record
-from shiplog.segments import Linear, Wide
 from shiplog.sensitivity import rate
 
 PROFILE = profiles.load("esso-vectwin")
@@ -99,13 +99,13 @@ def _sail(start, actuator, wind, push):
 def linear(seen: Record) -> Linear:
     """The record under the project's MMG as it is, covered to the end.
 
-    `segments.linear` without its columns by θ, which take twice as long to compile.
+    `linearise.linear` without its columns by θ, which take twice as long to compile.
     """
     model = Extended(MODEL, (), MODEL, np.zeros(0), {})
     g = segments.grid(seen)
     cut = segments.cut(seen, unexplained.covering(seen))
-    path = segments.pulled(model, THETA, cut, g, WIDE)
-    y, z = segments._run(model, THETA, cut, path, g)
+    path = linearise.pulled(model, THETA, cut, g, WIDE)
+    y, z = linearise._run(model, THETA, cut, path, g)
     at = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
     return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

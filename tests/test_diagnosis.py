@@ -27,6 +27,7 @@ from shiplog import (
     conventions,
     diagnose,
     evidence,
+    linearise,
     reading,
     record,
     reference,
@@ -1186,7 +1187,7 @@ def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     ref = sea.usual
     cut, moved, shown = reading.read(ref.model, ref.setting, trial.record, trial.rows, numbers)
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-    fresh = segments.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
+    fresh = linearise.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
     columns = ref.columns.of["antenna_offset"]
     assert late.linear.j[..., columns] == pytest.approx(fresh.j[..., columns], abs=1e-5)
 

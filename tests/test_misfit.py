@@ -7,9 +7,10 @@ import pytest
 
 from shiplog import evidence, misfit
 from shiplog.evidence import Unrest
+from shiplog.linearise import Linear, Path
 from shiplog.models.network import Network
 from shiplog.reference import marginal
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid, Linear, Path
+from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid
 from shiplog.structure import at_knots
 
 KNOTS, BINS, STEP = 6, 5, 0.2

@@ -20,8 +20,9 @@ from pipelines.hidden_effects import plan, rivals, run, score, suites, tables
 from pipelines.hidden_effects.plan import Planned
 from pipelines.hidden_effects.score import Answer, Sealed
 from shiplog.columns import Columns
-from shiplog.segments import BIN, Cut, Linear
-from shiplog.segments import Path as Along
+from shiplog.linearise import Linear
+from shiplog.linearise import Path as Along
+from shiplog.segments import BIN, Cut
 
 ROOT = Path(__file__).parent.parent
 OURS = ("pipelines.", "shiplog.")

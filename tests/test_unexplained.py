@@ -8,9 +8,10 @@ import pytest
 
 from shiplog import segments, unexplained
 from shiplog.evidence import Unrest
+from shiplog.linearise import Linear, Path
 from shiplog.models.mmg import body
 from shiplog.record import Record
-from shiplog.segments import Cut, Linear, Path
+from shiplog.segments import Cut
 
 UNREST = Unrest(
     noise=np.full(6, 3e-4), push=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)

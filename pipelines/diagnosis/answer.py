@@ -14,9 +14,9 @@ from shiplog.decision import Decision
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain
 from shiplog.hypotheses import Trial
+from shiplog.linearise import Linear
 from shiplog.record import Record
 from shiplog.runs import Run
-from shiplog.segments import Linear
 from shiplog.verdict import Interval, Verdict
 
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer

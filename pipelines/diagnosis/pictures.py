@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 
 from pipelines.diagnosis.answer import Diagnosis
-from shiplog import external, segments, unexplained, unnamed, viewer
+from shiplog import external, linearise, unexplained, unnamed, viewer
 from shiplog import verdict as verdicts
 from shiplog.channels import STATE, VELOCITY
 from shiplog.decision import PULSES, Decision
@@ -115,7 +115,7 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
             np.resize(values, (blocks, trial.grid.knots, values.shape[1]))
             for values in (state, np.concatenate((driven, wind), 1))
         )
-        found = segments.accelerations(ref.model, theta, state, driven)
+        found = linearise.accelerations(ref.model, theta, state, driven)
         return found.reshape(-1, 3)[: len(rows)]
 
     return acceleration(fixed | named) - acceleration(fixed)

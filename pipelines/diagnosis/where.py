@@ -15,9 +15,9 @@ from shiplog import verdict as verdicts
 from shiplog.decision import Decision
 from shiplog.extend import campaign
 from shiplog.hypotheses import Point, Trial
+from shiplog.linearise import Linear
 from shiplog.profile import Profile
 from shiplog.runs import Run
-from shiplog.segments import Linear
 from shiplog.sensitivity import series
 from shiplog.store import Store
 from shiplog.unnamed import Pulses

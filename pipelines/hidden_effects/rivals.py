@@ -32,8 +32,9 @@ from shiplog.columns import Columns
 from shiplog.evidence import Unrest
 from shiplog.exceptions import RunError, ShiplogError
 from shiplog.hypotheses import Point, Trial
+from shiplog.linearise import Linear
 from shiplog.record import Record
-from shiplog.segments import BIN, Cut, Linear
+from shiplog.segments import BIN, Cut
 from shiplog.store import Store
 
 VELOCITY = [1, 3, 5]  # of channels.STATE

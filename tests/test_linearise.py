@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from shiplog import linearise, reading, segments
 from shiplog import profile as profiles
-from shiplog import reading, segments
 from shiplog.causes import Cause, Setting
 from shiplog.causes.sensors import AntennaOffset, HeadingOffset
 from shiplog.causes.ship import RudderDelay, RudderLag
+from shiplog.linearise import Path, Wide
 from shiplog.record import Record
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Path, Wide
+from shiplog.segments import KNOT, NODE_ROWS, Cut
 
 PROFILE = profiles.load("esso-osaka")  # rudder and propeller
 SETTING = Setting(PROFILE, {"speed": 0.6, "length": 3.0}, np.zeros((1, 2)), 1.0)
@@ -72,7 +73,7 @@ def test_the_integration_is_of_second_order():
     for step in (0.2, 0.1, 0.05):
         nodes = round(seconds / step) + 1
         start = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
-        states = segments._path(
+        states = linearise._path(
             Coasting(), np.array([k]), start, np.zeros((1, nodes, 3)), np.zeros((1, nodes, 3)), step
         )
         last = np.asarray(states)[0, -1]
@@ -87,7 +88,7 @@ def test_a_push_is_an_acceleration():
     nodes, step = 61, 0.2
     push = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
-        segments._path(
+        linearise._path(
             Coasting(), np.zeros(1), np.zeros((1, 6)), push, np.zeros((1, nodes, 3)), step
         )
     )
@@ -165,7 +166,7 @@ def linearised():
         cut, moved, shown = reading.read(model, SETTING, SEEN, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()
-    return model, numbers, theta, at, segments.linear(model, theta, cut, GRID, at, moved, shown)
+    return model, numbers, theta, at, linearise.linear(model, theta, cut, GRID, at, moved, shown)
 
 
 def gap(model, theta, at: Path, numbers) -> np.ndarray:
@@ -173,7 +174,7 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
     record = reading.corrected(model.causes, SEEN, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
-        segments._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
+        linearise._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)
@@ -240,7 +241,7 @@ def test_columns_of_causes_that_read(linearised, label, i, column):
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
     """Segments whose measurements are the toy's own."""
     cut = segments.cut(SEEN, ROWS)
-    y, _ = segments._run(Toy(), theta, cut, at, GRID)
+    y, _ = linearise._run(Toy(), theta, cut, at, GRID)
     return replace(cut, y=y)
 
 
@@ -248,7 +249,7 @@ def test_nothing_is_left_of_what_the_model_made():
     at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
-    found = segments.linear(Toy(), THETA, cut, GRID, at, *none)
+    found = linearise.linear(Toy(), THETA, cut, GRID, at, *none)
     assert np.array_equal(found.e, np.zeros_like(found.e))
     assert found.j.shape[-1] == 4
     picked = found.pick(np.array([False, True, True, False]))
@@ -262,7 +263,7 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     exact, found = (
-        segments.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none) for smooth in (0.0, 1.0)
+        linearise.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none) for smooth in (0.0, 1.0)
     )
     assert np.array_equal(found.e, exact.e)
     for one, other in ((found.z, exact.z), (found.j, exact.j)):
@@ -270,7 +271,8 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
         assert 0.0 < np.abs((one - other) / size).max() < 0.01
     k = np.array([0.3])
     same = [
-        segments.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z for smooth in (0.0, 1.0)
+        linearise.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z
+        for smooth in (0.0, 1.0)
     ]
     assert same[0] == pytest.approx(same[1], abs=1e-12)
 
@@ -281,8 +283,8 @@ def test_a_path_is_pulled_onto_a_known_push():
     push = np.stack((0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t)))
     true = Path(SEEN.state[ROWS], np.tile(push, (4, 1, 1)))
     cut = simulated(true)
-    found = segments.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
-    y, _ = segments._run(Toy(), THETA, cut, found, GRID)
+    found = linearise.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
+    y, _ = linearise._run(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
     # within, where bins on both sides see a knot
@@ -296,8 +298,8 @@ def test_what_was_not_used_does_not_pull():
     used[:, 6:8] = False
     wrong = np.where(used, cut.y, 1e3)
     bad = replace(cut, y=wrong, used=used)
-    found = segments.pulled(Toy(), THETA, bad, GRID, WIDE, true)
-    y, _ = segments._run(Toy(), THETA, bad, found, GRID)
+    found = linearise.pulled(Toy(), THETA, bad, GRID, WIDE, true)
+    y, _ = linearise._run(Toy(), THETA, bad, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 
@@ -308,17 +310,17 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)
     wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
-    stood = segments.pulled(Toy(), wrong, cut, GRID, tight)
+    stood = linearise.pulled(Toy(), wrong, cut, GRID, tight)
     size = np.abs(stood.push[:, 2]).max()
     assert size > 1e-4
     nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
-    linear = segments.linear(Toy(), wrong, cut, GRID, stood, *nothing)
-    found = segments.ahead(linear, THETA - wrong, tight)
+    linear = linearise.linear(Toy(), wrong, cut, GRID, stood, *nothing)
+    found = linearise.ahead(linear, THETA - wrong, tight)
     assert np.abs(found.push[:, 2]).max() < 0.1 * size
     assert found.start == pytest.approx(true.start, abs=1e-3)
-    stays = segments.ahead(linear, np.zeros(4), tight)
+    stays = linearise.ahead(linear, np.zeros(4), tight)
     assert stays.push == pytest.approx(stood.push, abs=0.1 * size)
-    firm = segments.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
+    firm = linearise.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
     assert np.abs(firm.push[:, 2]).max() < 0.1 * size  # held about none, not about where it stood
 
 
@@ -349,7 +351,7 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     cut, moved, shown = reading.read(model, SETTING, record, ROWS)
     theta = np.concatenate((THETA, [0.0]))
     at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
-    found = segments.linear(model, theta, cut, GRID, at, moved, shown)
+    found = linearise.linear(model, theta, cut, GRID, at, moved, shown)
     rows = found.e[..., 4:].ravel()  # heading and yaw rate
     start = found.z[..., 4:, 4:6].reshape(len(rows), 2)
     owned = np.zeros((len(rows), 8))  # each segment has a start of its own
