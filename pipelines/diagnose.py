@@ -12,8 +12,7 @@ from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
-from shiplog import diagnose, runs, segments
-from shiplog import verdict as verdicts
+from shiplog import diagnose, page, runs, segments
 from shiplog.decision import Decision
 from shiplog.exceptions import RunError, listed
 from shiplog.gain import Gain
@@ -161,7 +160,7 @@ def _decided(
 
 def _write(done: Diagnosis) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
-    (done.folder / "report.md").write_text(verdicts.markdown(done.verdict), encoding="utf-8")
+    (done.folder / "report.md").write_text(page.markdown(done.verdict), encoding="utf-8")
     runs.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
@@ -195,7 +194,7 @@ def diagnose_command(
     done = diagnose_run(
         run, Store(store_path), voyages, out, extend=extend, cause_files=cause_files
     )
-    text = f"{verdicts.markdown(done.verdict)}\nReport: {out / 'report.md'}"
+    text = f"{page.markdown(done.verdict)}\nReport: {out / 'report.md'}"
     content = done.verdict.as_json()
     if done.recording is not None:
         text += f"\nRecording: {done.recording}"

@@ -29,7 +29,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"decision"},
     {"diagnose"},
     {"advise"},
-    {"runs", "report", "viewer", "verdict"},
+    {"runs", "report", "viewer", "verdict", "page"},
     {"cli"},
 )
 LEVEL = {name: level for level, row in enumerate(ROWS) for name in row}

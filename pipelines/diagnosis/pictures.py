@@ -8,8 +8,7 @@ import numpy as np
 import polars as pl
 
 from pipelines.diagnosis.answer import Diagnosis
-from shiplog import external, linearise, unexplained, unnamed, viewer
-from shiplog import verdict as verdicts
+from shiplog import external, linearise, page, unexplained, unnamed, viewer
 from shiplog.channels import STATE, VELOCITY
 from shiplog.decision import PULSES, Decision
 from shiplog.exceptions import listed
@@ -48,7 +47,7 @@ def exhibit(done: Diagnosis) -> Exhibit:
         extended=tuple(n.cause.label for n in decision.named) if done.after is not None else (),
         tracks=tracks,
         errors=errors,
-        report=verdicts.markdown(done.verdict),
+        report=page.markdown(done.verdict),
     )
 
 
