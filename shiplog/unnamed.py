@@ -4,6 +4,7 @@ and a force that nobody records.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -154,8 +155,7 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
 
 def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
-    accelerations go together as those of no other unrest do. Judged on what is left, beside
-    unrest as loud as it must be: a cause that nobody found yet is in that, too."""
+    accelerations go together as those of no other unrest do. Judged on what is left."""
     ref = trial.reference
     left, d = trial.left_of(point, trial.solved(point, base))
     r = np.concatenate(([1.0], -d))
@@ -173,25 +173,17 @@ def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     ship, length = ref.model.stand_in, ref.setting.scale["length"]
     across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
 
-    def of(lever: float, force: float, louder: float) -> float:
+    def of(lever: float, force: float) -> float:
         unit = across + lever * length * turning
-        return value(replace(plain.louder(louder), pulse=unit * force))
+        return value(replace(plain, pulse=unit * force))
 
     levers = np.linspace(-0.45, 0.45, 7)
     # in newtons that matter: from the usual unrest upwards
     ordinary = plain.push[1] / abs(across[1])
     sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    best, most = (0.0, ordinary, 1.0), -math.inf
-    for louder in LOUDER[::2]:
-        tried = {(at, size, louder): of(at, size, louder) for at in levers for size in sizes}
-        likeliest = max(tried, key=lambda one: tried[one])
-        if tried[likeliest] < most:
-            break
-        best, most = likeliest, tried[likeliest]
-    lever, force, louder = best
+    lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
     finer = minimize(  # beside the place itself a part of the force would be another cause's
-        lambda at: -of(at[0], math.exp(at[1]), louder), (lever, math.log(force)),
-        method="Nelder-Mead",
+        lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
         bounds=((-REACH, REACH), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
     )  # fmt: skip
     lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
