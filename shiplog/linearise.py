@@ -208,8 +208,8 @@ def pulled(
 
 
 def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
-    """Where a linearisation expects a path to be pulled once θ has moved by d [C]: nothing is
-    simulated, and what is not linear shows when it is linearised there."""
+    """Where a linearisation expects a path to be pulled once θ has moved by d [C], by one step of
+    Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there."""
     gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
     return _closer(linear.path, gap, linear.z, linear.cut.used, wide)
 

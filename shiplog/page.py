@@ -7,7 +7,7 @@ from shiplog.verdict import HOPELESS, Verdict, less
 
 
 def markdown(verdict: Verdict) -> str:
-    """The page."""
+    """Markdown: what is named with its numbers and gain, what is not and why, where it is wrong."""
     lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
     lines += [f"Model: {verdict.run}, made {verdict.made}.", ""]
     for cause in verdict.causes:

@@ -76,7 +76,7 @@ class HeldOut(Rollouts):
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
         states = np.empty(tuple(self.cut.state.shape))
         needed = self._constants(decision)
-        for voyage, half, rows in self._folds(decision.halves):
+        for voyage, half, rows in self._folds(self._halved(decision)):
             numbers, coefficients = self._without(decision, voyage, half)
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
@@ -144,7 +144,7 @@ class HeldOut(Rollouts):
             undecided = worth.high > (0.0 if alone else WORTH)
             if not harm and undecided and self._sure(one, alone):
                 break
-            if few and not decision.halves and self._sure(one, alone):
+            if few and not self._halved(decision) and self._sure(one, alone):
                 decision = replace(decision, halves=True)
                 found = self.gain(decision)
                 continue
@@ -245,17 +245,18 @@ class HeldOut(Rollouts):
 
     def left_out(self, decision: Decision) -> str:
         """What of each window the numbers have not seen."""
-        whole = len(set(self.voyages)) > 1 and not decision.halves
-        return "its voyage" if whole else "its half of the voyage"
+        return "its half of the voyage" if self._halved(decision) else "its voyage"
+
+    def _halved(self, decision: Decision) -> bool:
+        """Whether halves of voyages are left out: where it says so, and of one alone."""
+        return decision.halves or len(set(self.voyages)) == 1
 
     def _folds(self, halves: bool) -> Iterator[tuple[str, Half, torch.Tensor]]:
-        """(voyage, half of it, window rows) that are left out: whole voyages, or `halves` of them,
-        as of one alone."""
-        known = list(dict.fromkeys(self.voyages))
+        """(voyage, half of it, window rows) that are left out: whole voyages, or `halves`."""
         elapsed = self.cut.plan["elapsed"].to_numpy()
-        for name in known:
+        for name in dict.fromkeys(self.voyages):
             own = np.array([n == name for n in self.voyages])
-            if len(known) > 1 and not halves:
+            if not halves:
                 yield name, None, torch.tensor(np.flatnonzero(own))
                 continue
             first, last = elapsed[own].min(), elapsed[own].max()
