@@ -163,12 +163,12 @@ def settled(
         else:
             before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
             path = linearise.ahead(linear, whole - before, hold)
-        held = _anchor(start, theta, columns)
+        held = anchored(start, theta, columns)
         linear = linearise.linear(model, whole, cut, g, path, moved, shown)
-        found, _ = _solved(linear, unrest, columns, held)
+        found, _ = solved(linear, unrest, columns, held)
         unrest = evidence.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
-        found, gain = _solved(linear, unrest, columns, held)
+        found, gain = solved(linear, unrest, columns, held)
         far = float(np.abs(found[:base]).max(initial=0.0))
         if round_ == rounds or (gain < NEAR and far < FARTHEST):
             unrest = evidence.learnt(linear, found * unit, unrest, rounds=AT_REST)
@@ -181,7 +181,7 @@ def settled(
     return Settled(theta, path, unrest)
 
 
-def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
+def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
     """[C] how the run's own coefficients pull on those that stand elsewhere, in units.
 
     Forces and masses share a scale: held to where they last stood, and not to the run's, masses
@@ -192,7 +192,7 @@ def _anchor(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
     return pull
 
 
-def _solved(
+def solved(
     linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """[C] numbers, in units, that the campaign itself and what was known of them ask for; nats
@@ -225,7 +225,7 @@ def learn(
     g = segments.grid(record)
     linear = linearise.linear(model, whole, cut, g, at.path, moved, shown)
     modes = evidence.modes(evidence.weighed(linear, at.unrest), at.unrest)
-    held = _anchor(start, at.theta, columns)
+    held = anchored(start, at.theta, columns)
     wrong = None
     if inputs is not None:
         wrong = misfit.of(

@@ -65,7 +65,7 @@ class Basis:
         waves = self._waves(z)
         if self.level is not None:
             waves = waves - self.level
-        out = _in_each_channel(waves)
+        out = in_each_channel(waves)
         if self.family != "position":
             return out
         # what pulls towards a place pulls along the earth's axes
@@ -101,7 +101,7 @@ class Products:
             a[..., [i]] * squares[..., [j]] for i in range(drive, a.shape[-1]) for j in range(drive)
         ]
         found = np.concatenate((squares, *jets), -1)
-        return _in_each_channel(found / np.sqrt(found.shape[-1]))
+        return in_each_channel(found / np.sqrt(found.shape[-1]))
 
     def of(self, knots: Knots) -> np.ndarray:
         """[S, J, V]: speeds, sines, cosines."""
@@ -128,7 +128,7 @@ def products(record: Record, *campaigns: Knots) -> Products:
     return replace(plain, scale=np.where(scale > 1e-9, scale, 1.0))
 
 
-def _in_each_channel(waves: np.ndarray) -> np.ndarray:
+def in_each_channel(waves: np.ndarray) -> np.ndarray:
     """[S, J, F] → [S, J, 3, 3F]."""
     count = waves.shape[-1]
     out = np.zeros((*waves.shape[:2], 3, 3 * count))

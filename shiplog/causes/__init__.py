@@ -30,7 +30,7 @@ CATALOGUE: tuple[Cause, ...] = (
     Current(), WindForce(), ShallowWater(), Bank(),
     Fouling(), Payload(), CrossFlowDrag(), ThrustLoss(), ThrustDrift(), RudderForce(),
     RudderOffset(), RudderLag(), RudderDelay(),
-    HeadingOffset(), YawRateBias(), YawRateScale(),
+    HeadingOffset(), HeadingOffset(turned=True), YawRateBias(), YawRateScale(),
     ClockOffset("position"), ClockOffset("velocity"), ClockOffset("gnss"),
     ClockOffset("yaw_rate"), ClockOffset("wind"),
     AntennaOffset(), WindDirectionOffset(), WindSpeedScale(),

@@ -13,6 +13,12 @@ from shiplog.record import Record, reduced
 
 @dataclass(frozen=True)
 class HeadingOffset(Cause):
+    """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which knows
+    no heading, or from GNSS velocity that the recorder has turned by the compass: `turned`.
+    """
+
+    turned: bool = False
+
     name = "heading_offset"
     kind = "sensor"
     story = "The compass stands beside the ship's axis."
@@ -23,8 +29,26 @@ class HeadingOffset(Cause):
         "rudder_offset": "hover and coasting with the screw stopped: the rudders' offset vanishes",
     }
 
+    @property
+    def label(self) -> str:
+        return f"{self.name}:gnss" if self.turned else self.name
+
+    def beside(self, label: str) -> bool:
+        return label.partition(":")[0] != self.name
+
+    def missing(self, setting: Setting) -> str | None:
+        if self.turned and setting.profile.sensors.kind("velocity") != "body":
+            return "the velocity is recorded over ground"
+        return None
+
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return reduced(record, record.sighted.turned(-float(p[0])))
+        seen = record.sighted.turned(-float(p[0]))
+        if self.turned:
+            c, s = np.cos(p[0]), np.sin(p[0])
+            ahead, starboard = seen.velocity[:, 0], seen.velocity[:, 1]
+            was = np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+            seen = replace(seen, velocity=was)
+        return reduced(record, seen)
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."

@@ -1,0 +1,1 @@
+"""From segments to a verdict: nominal campaign, hypotheses, posterior, refutation."""

@@ -1,0 +1,213 @@
+"""What a model gets wrong, as functions of what the model sees and of what it does not.
+
+An acceleration that depends on motion, controls or wind is what equations of another form leave
+over; one that depends on position, heading or time no model of forces has. Each family is a sum of
+fixed features with unknown weights (Kennedy & O'Hagan 2001). The nominal campaign teaches the
+weights of what a model sees; an unknown structure of the trial is a change of one family's weights.
+
+Motion, controls and wind have the products of ship hydrodynamics (Abkowitz 1964; moduli after
+Fedyaevsky & Sobolev 1964) beside smooth random features (Rahimi & Recht 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog import structure
+from shiplog.profile import Profile
+from shiplog.segments import Cut, Grid
+from shiplog.structure import Knots
+
+SEEN = ("motion", "controls", "wind")  # by a model of forces
+UNSEEN = ("position", "heading", "time")
+WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, "time": 5}
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Smooth features of z [..., n]: √(2/F) cos(z·frequency + phase), less their mean."""
+
+    middle: np.ndarray
+    width: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    def __call__(self, z: np.ndarray) -> np.ndarray:
+        scaled = (z - self.middle) / self.width
+        return np.sqrt(2.0 / len(self.phase)) * np.cos(scaled @ self.frequency + self.phase)
+
+
+@dataclass(frozen=True)
+class Family:
+    """One family: `columns` of the discrepancy's weights, and its features at the knots.
+
+    level   [F] taken off, and scale [F] of each feature, both over the campaigns
+    """
+
+    name: str
+    profile: Profile
+    waves: Waves
+    level: np.ndarray
+    scale: np.ndarray
+    columns: np.ndarray
+
+    def features(self, knots: Knots) -> np.ndarray:
+        """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
+        values = (_features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
+        out = structure.in_each_channel(values / np.sqrt(values.shape[-1]))
+        return _turned(out, knots) if self.name == "position" else out
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """All families of one ship. push [3]: the unit of each channel's acceleration."""
+
+    families: tuple[Family, ...]
+    push: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return sum(len(family.columns) for family in self.families)
+
+    def pushed(self, cut: Cut, g: Grid) -> np.ndarray:
+        """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        knots = structure.at_knots(cut, g)
+        parts = [structure.pushed(f.features(knots), self.push) for f in self.families]
+        return np.concatenate(parts, axis=-1)
+
+
+def of(
+    profile: Profile, push: np.ndarray, first: int, names: Sequence[str], *campaigns: Knots
+) -> Discrepancy:
+    """The families that these campaigns can show anything of.
+
+    first   column of the first weight
+    """
+    found: list[Family] = []
+    for name in names:
+        if name == "wind" and not profile.has_wind:
+            continue
+        waves = _waves(name, *campaigns)
+        if waves is None:
+            continue
+        parts = [_features(name, profile, waves, knots) for knots in campaigns]
+        both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
+        # a push that is always there depends on nothing
+        level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
+        scale = np.sqrt(((both - level) ** 2).mean(0))
+        # a feature that hardly varies says nothing, and must not be blown up
+        scale = np.maximum(scale, 1e-3 * max(float(scale.max()), 1e-9))
+        columns = np.arange(first, first + 3 * len(level))
+        first += len(columns)
+        found.append(Family(name, profile, waves, level, scale, columns))
+    return Discrepancy(tuple(found), push)
+
+
+def _waves(name: str, *campaigns: Knots) -> Waves | None:
+    """None where nothing of the family varies."""
+    z = np.concatenate([v.reshape(-1, v.shape[-1]) for v in (_inputs(name, k) for k in campaigns)])
+    width = z.std(0)
+    if not (width > 1e-9).any():
+        return None
+    count = WAVES[name]
+    if name == "heading":  # harmonics of one angle: cosine and sine come from the phase
+        order = np.arange(count) // 2 + 1
+        phase = np.where(np.arange(count) % 2, -0.5 * np.pi, 0.0)
+        return Waves(np.zeros(1), np.ones(1), order[None].astype(float), phase)
+    rng = np.random.default_rng([len(name), *name.encode()])
+    frequency = rng.standard_normal((z.shape[1], count)) / np.sqrt(max(z.shape[1] / 2.0, 1.0))
+    phase = rng.uniform(0.0, 2.0 * np.pi, count)
+    return Waves(z.mean(0), np.where(width > 1e-9, width, 1.0), frequency, phase)
+
+
+def _features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
+    """[S, J, F]"""
+    smooth = waves(_inputs(name, knots))
+    products = PRODUCTS.get(name)
+    if products is None:
+        return smooth
+    return np.concatenate((*products(profile, knots), smooth), -1)
+
+
+def _inputs(name: str, knots: Knots) -> np.ndarray:
+    state, driven = knots.state, knots.driven
+    if name == "position":
+        return state[..., [0, 2]]
+    if name == "heading":
+        return state[..., [4]]
+    if name == "time":
+        return driven[..., [-3]]
+    if name == "motion":
+        return state[..., [1, 3, 5]]
+    if name == "controls":
+        return np.concatenate((driven[..., :-3], state[..., [1]]), -1)
+    return _apparent(knots)
+
+
+def _apparent(knots: Knots) -> np.ndarray:
+    """[..., 2] where the apparent wind comes from, ahead and to starboard [m/s]."""
+    state = knots.state
+    c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+    north, east = knots.driven[..., -2], knots.driven[..., -1]
+    return np.stack(
+        (c * north + s * east + state[..., 1], c * east - s * north + state[..., 3]), -1
+    )
+
+
+def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    u, v, r = (knots.state[..., [i]] for i in (1, 3, 5))
+    return [
+        u, v, r, u * np.abs(u), v * np.abs(v), r * np.abs(r), u * v, u * r, v * r,
+        np.abs(u) * v, np.abs(u) * r, np.abs(v) * r, np.abs(r) * v,
+    ]  # fmt: skip
+
+
+def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    """Of every unit that drives its thrust n|n| and n u, of every blade sin δ in the stream of
+    the ship and of the first screw; of what turns all the way round the thrust's parts."""
+    u = knots.state[..., [1]]
+    driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
+    found = []
+    for i in driving:
+        n = knots.driven[..., [i]]
+        found += [n * np.abs(n), np.abs(n) * u]
+    for i, actuator in enumerate(profile.actuators):
+        if actuator.kind not in ("rudder", "azimuth"):
+            continue
+        angle = knots.driven[..., [i]]
+        found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
+        for j in _driven_by(profile, i, driving):
+            thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
+            found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
+    return found
+
+
+def _driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
+    """Units whose jet an angle turns: those at the same place; of a rudder the first two."""
+    place = profile.actuators[angle].position_m
+    same = [j for j in driving if profile.actuators[j].position_m == place]
+    return same or driving[:2]
+
+
+def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
+    wind = _apparent(knots)
+    speed, angle = np.hypot(wind[..., [0]], wind[..., [1]]), np.arctan2(wind[..., [1]], wind[..., [0]])
+    square = speed**2
+    return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
+
+
+PRODUCTS: dict[str, Callable[[Profile, Knots], list[np.ndarray]]] = {
+    "motion": _of_motion, "controls": _of_controls, "wind": _of_wind,
+}  # fmt: skip
+
+
+def _turned(out: np.ndarray, knots: Knots) -> np.ndarray:
+    """What pulls towards a place pulls along the earth's axes: turned into the body's."""
+    c, s = np.cos(knots.state[..., 4]), np.sin(knots.state[..., 4])
+    north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
+    out[..., 0, :] = c[..., None] * north + s[..., None] * east
+    out[..., 1, :] = c[..., None] * east - s[..., None] * north
+    return out

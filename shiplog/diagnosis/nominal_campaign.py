@@ -1,0 +1,222 @@
+"""The nominal campaign: what is usual for a ship, and how far its own voyages are from each other.
+
+Coefficients, the causes' usual numbers and the weights of the model's discrepancy are learned
+together. How far the parts of the campaign disagree in each of them (`voyage_effects`) is how far a
+trial may differ without any change: once as a campaign, and once more in each of its parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from shiplog import evidence, linearise, reference, segments, structure
+from shiplog.causes import Setting
+from shiplog.columns import Columns
+from shiplog.diagnosis import discrepancy, voyage_effects
+from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
+from shiplog.evidence import Modes, Unrest
+from shiplog.linearise import Linear
+from shiplog.models.extended import Extended
+from shiplog.reading import read
+from shiplog.record import Record
+from shiplog.reference import Reference, Settled, Start
+
+PART = 20  # segments of one part of a campaign: 10 minutes
+FEWEST = 4  # parts that a campaign is cut into, where it has twice as many segments
+NOISE_TIMES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, of the process noise
+SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a trial is compared with.
+
+    reference    the linearisation point and prior of a trial's numbers, [C] with the discrepancy's
+                 weights; `counts` is the share of itself that a trial counts
+    effects      deviation of one part's numbers from the others' [C]
+    discrepancy  its families and their columns
+    each         products [V, 1 + C, 1 + C] of the nominal parts, in units; empty without any
+    noise        standard deviation, over the parts, of the logarithm of the process noise
+    """
+
+    reference: Reference
+    effects: VoyageEffects
+    discrepancy: Discrepancy
+    each: tuple[np.ndarray, ...]
+    noise: float
+
+    @cached_property
+    def parts(self) -> tuple[np.ndarray, ...]:
+        """`each` with every part's own numbers integrated out."""
+        return tuple(reduced(g, self.effects.deviation)[0] for g in self.each)
+
+    def prior_without(self, left_out: int) -> tuple[np.ndarray, np.ndarray]:
+        """Information and pull of a trial's numbers, one nominal part left out."""
+        kept = [g for i, g in enumerate(self.parts) if i != left_out]
+        known = self.effects.size**-2.0
+        return prior(kept, known, self.reference.anchor, self.effects.deviation,
+                     self.reference.counts)  # fmt: skip
+
+
+def parts_of(voyage: np.ndarray, part: int = PART, fewest: int = FEWEST) -> list[np.ndarray]:
+    """Rows of contiguous segments that belong together: no part crosses two voyages.
+
+    voyage   [S] of each segment, in order
+    """
+    while True:
+        found: list[np.ndarray] = []
+        for name in dict.fromkeys(voyage.tolist()):
+            rows = np.flatnonzero(voyage == name)
+            found += np.array_split(rows, max(round(len(rows) / part), 1))
+        if len(found) >= fewest or part <= 2 or len(voyage) < 2 * fewest:
+            return found
+        part = part // 2
+
+
+def picked(modes: Modes, rows: np.ndarray) -> Modes:
+    """The segments `rows` of a pass; its volume is not theirs."""
+    return replace(
+        modes, dd=modes.dd[rows], md=modes.md[rows], felt=modes.felt[rows], axes=modes.axes[rows],
+        pushed=modes.pushed[rows],
+    )  # fmt: skip
+
+
+def products(
+    modes: Modes, parts: Sequence[np.ndarray], unit: np.ndarray,
+    weight: np.ndarray | None = None, noise: float = 1.0,
+) -> list[np.ndarray]:  # fmt: skip
+    """[1 + C, 1 + C] of each part, in units [C]."""
+    by = np.concatenate(([1.0], unit))
+    scale = np.outer(by, by)
+    weight = np.ones(len(modes.dd)) if weight is None else weight
+    return [picked(modes, rows).total(weight[rows], noise) * scale for rows in parts]
+
+
+def prior(
+    parts: Sequence[np.ndarray], known: np.ndarray, anchor: np.ndarray, deviation: np.ndarray,
+    share: float,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Information [C, C] and pull [C] on a trial's numbers: the posterior of the nominal parts,
+    which count for `share` of themselves, widened by one campaign's own deviation."""
+    total = share * sum(parts, np.zeros((len(known) + 1,) * 2))
+    covariance = np.linalg.inv(total[1:, 1:] + np.diag(known))
+    mean = covariance @ (total[1:, 0] + anchor)
+    information = np.linalg.inv(covariance + np.diag(deviation**2))
+    return information, information @ mean
+
+
+def learn(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
+) -> Campaign:
+    """From the nominal voyages, linearised `at` where their coefficients converged."""
+    columns = reference.columns_of(model, setting, start)
+    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
+    g = segments.grid(record)
+    linear = linearise.linear(model, whole, cut, g, at.path, moved, shown)
+    held = reference.anchored(start, at.theta, columns)
+    families = discrepancy.of(
+        record.profile, at.unrest.push, len(columns.unit), discrepancy.SEEN,
+        structure.at_knots(linear.cut, g),
+    )  # fmt: skip
+    pushed = families.pushed(linear.cut, g)
+    columns = columns.with_misfit(families.count)
+    held = np.concatenate((held, np.zeros(families.count)))
+    known, rows = columns.known, parts_of(linear.cut.voyage)
+    unrest = noise_time(linear, pushed, columns, held, at.unrest)
+    modes = evidence.modes(evidence.weighed(linear, unrest), unrest).beside(pushed)
+    each = products(modes, rows, columns.unit)
+    effects = voyage_effects.learn(
+        each, known, held, _groups(model, columns, families), [f.columns for f in families.families]
+    )
+    parts = [reduced(one, effects.deviation)[0] for one in each]
+    share = _share(parts, effects, held)
+    information, pull = prior(parts, effects.size**-2.0, held, effects.deviation, share)
+    made = Reference(
+        model, setting, at.theta, columns, unrest, reference.wide_of(setting), information, pull,
+        held, 1.0 / share, linear, modes, reference.freedom(len(rows)), misfit=families,
+        counts=share,
+    )  # fmt: skip
+    spread = _noise(modes, rows, columns, effects, information, pull)
+    return Campaign(made, effects, families, tuple(each), spread)
+
+
+def noise_time(
+    linear: Linear, pushed: np.ndarray, columns: Columns, held: np.ndarray, unrest: Unrest
+) -> Unrest:
+    """Sizes and correlation time of the process noise that make the nominal campaign likeliest,
+    the model's discrepancy aside."""
+    best, found = -math.inf, unrest
+    middle = NOISE_TIMES.index(4.0)
+    for way in (NOISE_TIMES[middle:], NOISE_TIMES[:middle][::-1]):
+        for time in way:
+            tried = replace(found, time=time)
+            for _ in range(2 if time == 4.0 else 1):
+                numbers, _ = _solved(linear, pushed, tried, columns, held)
+                left = linear.less(pushed @ numbers[columns.linearised :])
+                tried = evidence.learnt(left, numbers[: columns.linearised], tried, rounds=2)
+            _, value = _solved(linear, pushed, tried, columns, held)
+            if value < best:
+                break
+            best, found = value, tried
+    return found
+
+
+def _solved(
+    linear: Linear, pushed: np.ndarray, unrest: Unrest, columns: Columns, held: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
+    modes = evidence.modes(evidence.weighed(linear, unrest), unrest).beside(pushed)
+    by = np.concatenate(([1.0], columns.unit))
+    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
+    both = total[1:, 1:] + np.diag(columns.known)
+    value = reference.marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
+    return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
+
+
+def _groups(model: Extended, columns: Columns, families: Discrepancy) -> list[np.ndarray]:
+    """Columns that share one variance: coefficients of one part of the ship, each cause's numbers,
+    each family of the discrepancy."""
+    part = np.array([name.split(".")[0] for name in model.base.names])
+    found = [np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())]
+    found += [columns.of[cause.label] for cause in model.causes if cause.usual]
+    return found + [family.columns for family in families.families]
+
+
+def _share(parts: Sequence[np.ndarray], effects: VoyageEffects, held: np.ndarray) -> float:
+    """How much of itself a trial counts: the share with which the parts predict each other best
+    (a power posterior: Grünwald & van Ommen 2017)."""
+    known = effects.size**-2.0
+    scores = []
+    for share in SHARES:
+        score = 0.0
+        for i, left in enumerate(parts):
+            kept = [g for j, g in enumerate(parts) if j != i]
+            information, pull = prior(kept, known, held, effects.deviation, share)
+            score += reference.marginal(left, information, pull)
+        scores.append(score)
+        if score < max(scores):
+            break
+    return SHARES[int(np.argmax(scores))]
+
+
+def _noise(modes, rows, columns, effects, information, pull) -> float:
+    """Standard deviation of the logarithm of the process noise over the parts."""
+    found = []
+    for part in rows:
+        own = picked(modes, part)
+        scores = []
+        tried = np.exp(np.linspace(-0.6, 0.6, 7))
+        for factor in tried:
+            gram = products(own, [np.arange(len(part))], columns.unit, None, factor)[0]
+            gram, logdet = reduced(gram, effects.deviation)
+            volume = float(np.log1p(factor**2 * own.felt).sum()) + logdet
+            scores.append(reference.marginal(gram, information, pull) - 0.5 * volume)
+        found.append(math.log(tried[int(np.argmax(scores))]))
+    return float(np.sqrt(np.mean(np.square(found))))

@@ -1,0 +1,219 @@
+"""A trial: its segments, and the log evidence of every hypothesis about them.
+
+A hypothesis is a set of causes and one kind of remainder. Its columns join those of the campaign: a
+cause's numbers as a change from usual, or a family of the discrepancy as a change of its weights.
+Every part of the trial has deviations of its own (`voyage_effects`), which are integrated out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog import hypotheses, segments, structure, unnamed
+from shiplog.columns import HELD
+from shiplog.diagnosis import discrepancy
+from shiplog.diagnosis.nominal_campaign import Campaign, parts_of, products
+from shiplog.diagnosis.voyage_effects import reduced
+from shiplog.evidence import Modes
+from shiplog.hypotheses import Found, Level, Point
+from shiplog.record import Record
+
+NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
+NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the usual
+FINER = 1.08  # step about the best of them
+SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
+LEAST_SPREAD = 0.05  # of the logarithm of the process noise: two campaigns are never alike
+RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either way
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What remains beside the causes: a kind, and the size of a family's change."""
+
+    kind: str = NOMINAL
+    size: float = 1.0
+
+
+class Trial(hypotheses.Trial):
+    """Voyages in question, against a campaign."""
+
+    def __init__(self, campaign: Campaign, record: Record, fixed: Sequence[str] = ()) -> None:
+        super().__init__(campaign.reference, record, fixed)
+        self.campaign = campaign
+        knots = structure.at_knots(segments.cut(record, self.rows), self.grid)
+        known = len(campaign.reference.columns.unit)
+        self.unseen = discrepancy.of(
+            record.profile, campaign.reference.unrest.push, known, discrepancy.UNSEEN, knots
+        )
+        both = (*campaign.discrepancy.families, *self.unseen.families)
+        self.families = {family.name: family.columns for family in both}
+        self.parts = parts_of(record.voyage[self.rows])
+        self.remainder = Remainder()  # that `scan` includes
+        self._totals: list[tuple[tuple, np.ndarray, float]] = []
+
+    # --- products ---
+
+    def _misfitting(self, modes: Modes, point: Point) -> Modes:
+        cut = point.linear.cut
+        modes = modes.beside(self.campaign.discrepancy.pushed(cut, self.grid))
+        return modes.beside(self.unseen.pushed(cut, self.grid))
+
+    def total(self, point: Point, noise: float) -> tuple[np.ndarray, float]:
+        """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
+        key = (id(point.weighed), noise, self.weight.tobytes(), self.pulse)
+        for known, total, volume in self._totals:
+            if known == key:
+                return total, volume
+        modes, noise = self.modes(point, noise)
+        unit = np.append(self.reference.columns.unit, np.ones(self.unseen.count))
+        deviation = np.append(self.campaign.effects.deviation, np.zeros(self.unseen.count))
+        each = products(modes, self.parts, unit, self.weight, noise)
+        total, volume = np.zeros_like(each[0]), 0.0
+        for gram in each:
+            gram, logdet = reduced(gram, deviation)
+            total, volume = total + gram, volume + logdet
+        self._totals = [*self._totals[-40:], (key, total, volume)]
+        return total, volume
+
+    def volume(self, louder: float) -> float:
+        """log |C| at one level of process noise, the same for every hypothesis: that of the first
+        point. How far a model lets noise be felt is no evidence of a cause."""
+        assert self.first is not None
+        key = (louder, self.pulse + self.weight.tobytes())
+        if key not in self._volumes:
+            modes, by = self.modes(self.first, louder)
+            self._volumes[key] = modes.log_volume(by) + self.total(self.first, louder)[1]
+        return self._volumes[key]
+
+    def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
+        total, _ = self.total(point, louder)
+        ref = self.reference
+        level = self.solve(
+            total, self.volume(louder), louder, point, included, ref.information, ref.pull
+        )
+        return Level(
+            level.louder, level.gram, level.logdet, level.inverse, level.solution,
+            level.value + self.expected(louder),
+        )  # fmt: skip
+
+    def expected(self, noise: float) -> float:
+        """Log prior density of a level of process noise, less its greatest under `nominal`."""
+        usual = max(self.campaign.noise, LEAST_SPREAD)
+        spread = RAISED_SPREAD if self.remainder.kind in (RAISED, INTERMITTENT) else usual
+        return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
+
+    def solve(self, total, logdet, louder, point, included, information, pull) -> Level:
+        """The base hypothesis of a trial's products [1 + C, 1 + C]: what is usual, the included
+        causes, and the remainder's change of weights."""
+        columns, share = self.reference.columns, self.reference.counts
+        total, logdet = share * total, share * logdet
+        extra = [columns.of[name] for name in included]
+        family = self.families.get(self.remainder.kind, np.zeros(0, int))
+        held = [np.full(len(c), HELD if n in self.fixed else 1.0)
+                for n, c in zip(included, extra, strict=True)]  # fmt: skip
+        held.append(np.full(len(family), self.remainder.size**-2.0))
+        count = len(pull)
+        chosen = np.concatenate((np.arange(count), *extra, family)).astype(int)
+        gram = total[np.ix_(np.append(0, 1 + chosen), np.append(0, 1 + chosen))]
+        more = len(chosen) - count
+        known = np.zeros((count + more, count + more))
+        known[:count, :count] = information
+        known[count:, count:] = np.diag(np.concatenate(held))
+        # the included numbers are counted from where they were linearised
+        before = [
+            np.zeros(len(c)) if n in self.fixed
+            else -np.asarray(point.numbers.get(n, np.zeros(len(c)))) / columns.unit[c]
+            for n, c in zip(included, extra, strict=True)
+        ]  # fmt: skip
+        towards = np.concatenate((pull, *(k * b for k, b in zip(held, before, strict=False)),
+                                  np.zeros(len(family))))  # fmt: skip
+        both = gram[1:, 1:] + known
+        inverse = np.linalg.inv(both)
+        solution = inverse @ (gram[1:, 0] + towards)
+        square = gram[0, 0] + self._square_of_prior(towards, count, held, information)
+        square -= (gram[1:, 0] + towards) @ solution
+        volume = np.linalg.slogdet(both)[1] - self._volume_of_prior(held, information)
+        return Level(louder, gram, logdet, inverse, solution, -0.5 * float(square + volume + logdet))
+
+    def _square_of_prior(self, towards, count, held, information) -> float:
+        own = np.concatenate([*held, np.zeros(0)])
+        mean = self.reference.mean
+        return float(towards[:count] @ mean + (towards[count:] ** 2 / own).sum())
+
+    def _volume_of_prior(self, held, information) -> float:
+        if not hasattr(self, "_information_volume"):
+            self._information_volume = np.linalg.slogdet(information)[1]
+        return self._information_volume + float(np.log(np.concatenate([*held, np.ones(0)])).sum())
+
+    def levels(self, point, included=(), near=None) -> list[Level]:
+        """From the usual process noise outwards while it gets likelier; finely about the best."""
+        tried: dict[float, Level] = {}
+
+        def at(noise: float) -> float:
+            if noise not in tried:
+                tried[noise] = self.level(point, noise, included)
+            return tried[noise].value
+
+        if near is None:
+            middle = NOISES.index(1.0)
+            best = middle
+            for way in (1, -1):
+                i = middle
+                while 0 <= i + way < len(NOISES) and at(NOISES[i + way]) > at(NOISES[i]):
+                    i += way
+                if at(NOISES[i]) > at(NOISES[best]):
+                    best = i
+                if best != middle:
+                    break
+            here = NOISES[best]
+        else:
+            here = near
+        below, middle_value, above = at(here / FINER), at(here), at(here * FINER)
+        bend = below - 2.0 * middle_value + above
+        if bend < 0.0:  # the top of the parabola through them
+            at(here * FINER ** float(np.clip(0.5 * (below - above) / bend, -2.0, 2.0)))
+        return list(tried.values())
+
+    # --- remainders ---
+
+    def changed(self, point: Point, level: Level, included: Sequence[str], family: str):
+        """Nats that a change of one family's weights brings at a level without one, at its best
+        size, and that size."""
+        columns, share = self.families[family], self.reference.counts
+        total, _ = self.total(point, level.louder)
+        base = [np.arange(len(self.reference.pull)), *(self.reference.columns.of[n] for n in included)]
+        rows = 1 + np.concatenate(base)
+        joined = share * total[np.ix_(rows, 1 + columns)]
+        pull = share * total[1 + columns, 0] - joined.T @ level.solution
+        own = share * total[np.ix_(1 + columns, 1 + columns)] - joined.T @ level.inverse @ joined
+        found = []
+        for size in SIZES:
+            whole = size**2 * own + np.eye(len(own))
+            gained = 0.5 * size**2 * float(pull @ np.linalg.solve(whole, pull))
+            found.append((gained - 0.5 * float(np.linalg.slogdet(whole)[1]), size))
+        return max(found)
+
+    def intermittent(self, point: Point, base: Found) -> unnamed.Pulses:
+        """A force that comes and goes at one place along the ship, and its gain over raised noise."""
+        return unnamed.pulses(self, point, base)
+
+    def acts_on(self, point: Point, base: Found, family: str) -> tuple[str, ...]:
+        """Channels in which a change of a family pushes by more than a third of its most."""
+        kept, self.remainder = self.remainder, Remainder(family, SIZES[1])
+        try:
+            level = self.level(point, base.louder, tuple(base.numbers))
+        finally:
+            self.remainder = kept
+        of = self.unseen if family in discrepancy.UNSEEN else self.campaign.discrepancy
+        columns = self.families[family]
+        weights = np.zeros(of.count)
+        weights[columns - of.families[0].columns[0]] = level.solution[-len(columns) :]
+        pushed = of.pushed(point.linear.cut, self.grid) @ weights
+        size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / self.reference.unrest.push
+        names = np.array(["surge", "sway", "yaw_rate"])
+        return tuple(str(n) for n in names[size > size.max() / 3.0])
+
