@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
+from safetensors.numpy import load_file, save_file
 from test_cli import call
 
 from pipelines import known_ship
@@ -102,6 +103,27 @@ def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_pat
     assert len(content["seeds"]) == 1 and content["windows"] == 3
     assert sorted(content["band_90"]) == sorted(STATES)
     assert all(0.0 <= share <= 1.0 for share in content["band_90"].values())
+
+
+def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
+    """Its folder holds neither names nor numbers of the five coefficients."""
+    old = tmp_path / "old"
+    shutil.copytree(published[0], old)
+    table = runs.load(old).identified()
+    late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
+    assert late.sum() == 5
+    table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
+    arrays = load_file(old / "seed0" / "model.safetensors")
+    had = ~late.to_numpy()
+    arrays |= {"theta": arrays["theta"][had], "covariance": arrays["covariance"][had][:, had]}
+    save_file(
+        {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
+    )
+    now, was = runs.load(published[0]), runs.load(old)
+    assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
+    start = was.base()[1]
+    assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
+    assert start.spread[had].tolist() == now.base()[1].spread[had].tolist()
 
 
 def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
