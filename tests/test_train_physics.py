@@ -153,7 +153,7 @@ def test_the_answer_says_what_was_found(fitted):
     assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split"}
     assert content["contract"] == 1 and content["windows"] == 6
     assert content["label"] == "mmg identified on ref, without propeller, rudder"
-    assert len(content["parameters"]) == 3 + 10 + 10
+    assert len(content["parameters"]) == 3 + 15 + 10
     first = content["parameters"][0]
     assert set(first) == {"name", "symbol", "meaning", "unit", "start", "spread", "value",
                           "standard_error", "free"}  # fmt: skip
@@ -413,10 +413,10 @@ def test_a_hybrid_is_opened_as_it_was_fitted(hybrid, store, tmp_path):
     run, _ = hybrid
     model = run.simulator(0).model
     assert model.residual.width == 2
-    assert len(model.names) == 3 + 10 + model.residual.count == len(run.simulator(0).theta)
+    assert len(model.names) == 3 + 15 + model.residual.count == len(run.simulator(0).theta)
     assert model.residual.anchors.shape == (150, 6)  # two voyages of three windows of 25 s
     found = run.identified()
-    assert found.height == 13 and not any("network" in name for name in found["name"])
+    assert found.height == 18 and not any("network" in name for name in found["name"])
     assert found.filter(pl.col("free"))["name"].to_list() == ["hull.x_0f"]
     held = found.filter(~pl.col("free"))
     assert (held["value"] == held["start"]).all()
