@@ -36,7 +36,7 @@ from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog import config as configuration
-from shiplog import user_causes
+from shiplog import earlier_runs, user_causes
 from shiplog.band import Band
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
@@ -51,6 +51,8 @@ from shiplog.reference import Start
 from shiplog.report import finite
 from shiplog.sensitivity import Simulator
 from shiplog.train import HISTORY, Progress
+
+HELD = 1e-9  # spread of numbers that a diagnosis leaves where they are
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,11 @@ class Run:
         arrays = _arrays(self.path / "extension.safetensors")
         own = user_causes.load(sorted(self.path.glob("extension-*.py")))
         found = Extension.of(told, arrays, own)
+        if self.config.physical:
+            seed = self.config.seeds[0]
+            names = self.simulator(seed).model.names
+            place = self._kept(seed, len(found.coefficients), names)
+            found = replace(found, coefficients=place.vector(found.coefficients))
         if not self.config.physical and found.coefficients.any() and found.coefficients.ndim != 2:
             raise RunError(
                 f"{self.name} was extended by an earlier shiplog, which bent networks otherwise.",
@@ -167,10 +174,11 @@ class Run:
         simulator = self.simulator(seed)
         known = self.identified(seed)
         count, more = len(usual.names), len(simulator.theta) - len(usual.names)
-        # a hybrid's network stays as it was trained
+        place = self._kept(seed, known.height, usual.names)
+        # a hybrid's network stays as it was trained, and so do terms that the run did not have
         start = Start(
             simulator.theta,
-            np.concatenate((known["spread"].to_numpy(), np.full(more, 1e-9))),
+            np.concatenate((place.vector(known["spread"].to_numpy(), HELD), np.full(more, HELD))),
             np.concatenate((usual.low, np.full(more, -np.inf))),
             np.concatenate((usual.high, np.full(more, np.inf))),
         )
@@ -228,14 +236,21 @@ class Run:
         ship, _, _ = mmg.geometry_of(self.profile, self.config.physics.without)
         physics = mmg.MMG(ship, self.config.physics.substeps)
         if self.config.model == "mmg":
-            return Simulator(physics, arrays["theta"], arrays["covariance"])
+            return self._simulator(physics, seed, arrays)
         fixed = {
             name.removeprefix("residual."): value
             for name, value in arrays.items()
             if name.startswith("residual.")
         }
         residual = hybrid.Residual(width=self.config.physics.width, **fixed)
-        return Simulator(hybrid.Hybrid(physics, residual), arrays["theta"], arrays["covariance"])
+        return self._simulator(hybrid.Hybrid(physics, residual), seed, arrays)
+
+    def _simulator(self, model: Any, seed: int, arrays: dict[str, np.ndarray]) -> Simulator:
+        place = self._kept(seed, len(arrays["theta"]), model.names)
+        return Simulator(model, place.vector(arrays["theta"]), place.matrix(arrays["covariance"]))
+
+    def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:
+        return earlier_runs.kept(self.identified(seed)["name"].to_list(), count, names)
 
     def save_simulator(
         self,

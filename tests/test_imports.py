@@ -28,7 +28,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"unnamed", "settling"},
     {"decision"},
     {"diagnose"},
-    {"advise"},
+    {"advise", "earlier_runs"},
     {"runs", "report", "viewer", "verdict", "page"},
     {"cli"},
 )

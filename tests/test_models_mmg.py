@@ -326,6 +326,60 @@ def test_astern_the_cross_terms_change_sign_and_the_damping_does_not(esso):
         assert n == pytest.approx(q * 3.0 * (-0.1458 * v * u - 0.04849 * lr * 0.3))
 
 
+# ---------------------------------------------------------------- linear damping at low speed
+
+# The supply vessel of Fossen, Sagatun & Sorensen 1996, Bis system: D'' with length L, mass m and
+# speed sqrt(gL) as units; D = m sqrt(g/L) T D'' T with T = diag(1, 1, L) and forces -D v.
+SUPPLY = """
+[ship]
+name = "supply vessel"
+length_m = 76.2
+breadth_m = 18.8
+draught_m = 6.25
+mass_kg = 6.0e6
+""" + TUNNEL[TUNNEL.index("[sensors.position]") :]
+DAMPING = np.array([[0.0358, 0.0, 0.0], [0.0, 0.1183, -0.0124], [0.0, -0.0041, 0.0308]])
+LINEAR = ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")
+
+
+@pytest.fixture(scope="module")
+def supply() -> Ship:
+    """With no other hull force than the published linear damping."""
+    ship = estimated(profiles.parse(SUPPLY, "supply.toml"))
+    m_nd = supply_mass_nd()
+    of = dict(zip(LINEAR, -m_nd * DAMPING[[0, 1, 1, 2, 2], [0, 1, 2, 1, 2]], strict=True))
+    none = dict.fromkeys(("x_0f", "x_0a", "x_vr", "y_v", "y_r", "n_v", "n_r", "c_d"), 0.0)
+    return ship.changed(**{f"hull__{key}": value for key, value in (of | none).items()})
+
+
+@pytest.mark.parametrize("velocity", [(0.5, 0, 0), (0, -0.2, 0), (0, 0, 0.01), (-1.0, 0.3, -0.02)])
+def test_linear_damping_is_that_of_the_published_supply_vessel(supply, velocity):
+    arm = np.diag([1.0, 1.0, 76.2])
+    wanted = -6.0e6 * math.sqrt(9.80665 / 76.2) * arm @ DAMPING @ arm @ np.array(velocity)
+    assert supply.forces(*velocity)["hull"] == pytest.approx(wanted, rel=1e-12, abs=1e-6)
+
+
+def test_a_drifting_supply_vessel_loses_speed_as_its_published_time_constant_says(supply):
+    """m_x = 0.1274 m in surge: u falls by e in (1.1274/0.0358) sqrt(L/g) = 87.8 s."""
+    slow = supply.changed(body__m_x=0.1274 * supply_mass_nd())
+    assert slow.acceleration(0.1)[0] == pytest.approx(-0.1 / 87.78, rel=1e-3)
+
+
+def supply_mass_nd() -> float:
+    return 6.0e6 / (0.5 * 1025.0 * 76.2**2 * 6.25)
+
+
+def test_linear_damping_is_neutral_unless_a_file_or_a_fit_says_otherwise(esso, vectwin):
+    for ship in (esso, vectwin):
+        assert [ship[f"hull.{key}"] for key in LINEAR] == [0.0] * 5
+    at = [vectwin.parameters.names.index(f"hull.{key}") for key in LINEAR]
+    published = 0.3226 * np.array([0.0358, 0.1183, 0.0124, 0.0041, 0.0308])
+    # an estimated ship may well have the damping of the supply vessel, and not ten times as much
+    assert (vectwin.parameters.spread[at] >= published).all()
+    assert (vectwin.parameters.spread[at] < 0.1).all()
+    assert (vectwin.parameters.high[at][[0, 1, 4]] <= 0.11 * published[[0, 1, 4]]).all()
+
+
 # ---------------------------------------------------------------- wind
 
 
@@ -766,11 +820,11 @@ def test_published_values_have_half_the_spread_of_estimated_ones(esso):
 
 def test_names_follow_the_parts_and_a_thrusters_are_its_own(esso):
     assert esso.model.names == esso.parameters.names
-    assert len(esso.model.names) == 3 + 10 + 27 + 13 + 10
+    assert len(esso.model.names) == 3 + 15 + 27 + 13 + 10
     assert esso.model.names[:4] == ("body.m_x", "body.m_y", "body.i_j", "hull.x_0f")
     tunnel, _, _ = geometry_of(profiles.parse(TUNNEL, "tunnel.toml"))
     wanted = [f"thruster.{n}_{k}" for n in ("bow", "pod") for k in ("ahead", "astern", "loss")]
-    assert list(parameters.names(tunnel)[13:]) == wanted
+    assert list(parameters.names(tunnel)[18:]) == wanted
     assert esso.parameters.entry("hull.y_v").symbol == "Y'_v"
     assert estimated(profiles.parse(TUNNEL, "t")).parameters.entry(wanted[5]).unit == "s/m"
 
@@ -860,7 +914,7 @@ def test_a_whole_part_that_is_missing_is_named_and_can_be_left_out(tmp_path):
         parameters.load(path, geometry_of(ship)[0])
     assert "--without wind" in error.value.hint
     calm = geometry_of(ship, without=["wind"])[0]
-    assert parameters.load(path, calm).names == parameters.names(geometry_of(ship)[0])[:53]
+    assert parameters.load(path, calm).names == parameters.names(geometry_of(ship)[0])[:58]
     with pytest.raises(ProfileError, match="cannot be read"):
         parameters.load(tmp_path / "nowhere.toml", geometry_of(ship)[0])
 

@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
+from safetensors.numpy import load_file, save_file
 from test_cli import call
 
 from pipelines import known_ship
@@ -104,6 +105,27 @@ def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_pat
     assert all(0.0 <= share <= 1.0 for share in content["band_90"].values())
 
 
+def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
+    """Its folder holds neither names nor numbers of the five coefficients."""
+    old = tmp_path / "old"
+    shutil.copytree(published[0], old)
+    table = runs.load(old).identified()
+    late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
+    assert late.sum() == 5
+    table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
+    arrays = load_file(old / "seed0" / "model.safetensors")
+    had = ~late.to_numpy()
+    arrays |= {"theta": arrays["theta"][had], "covariance": arrays["covariance"][had][:, had]}
+    save_file(
+        {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
+    )
+    now, was = runs.load(published[0]), runs.load(old)
+    assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
+    start = was.base()[1]
+    assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
+    assert start.spread[had].tolist() == now.base()[1].spread[had].tolist()
+
+
 def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
     run = runs.load(published[0])
     identified = run.identified()
@@ -131,7 +153,7 @@ def test_the_answer_says_what_was_found(fitted):
     assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split"}
     assert content["contract"] == 1 and content["windows"] == 6
     assert content["label"] == "mmg identified on ref, without propeller, rudder"
-    assert len(content["parameters"]) == 3 + 10 + 10
+    assert len(content["parameters"]) == 3 + 15 + 10
     first = content["parameters"][0]
     assert set(first) == {"name", "symbol", "meaning", "unit", "start", "spread", "value",
                           "standard_error", "free"}  # fmt: skip
@@ -391,10 +413,10 @@ def test_a_hybrid_is_opened_as_it_was_fitted(hybrid, store, tmp_path):
     run, _ = hybrid
     model = run.simulator(0).model
     assert model.residual.width == 2
-    assert len(model.names) == 3 + 10 + model.residual.count == len(run.simulator(0).theta)
+    assert len(model.names) == 3 + 15 + model.residual.count == len(run.simulator(0).theta)
     assert model.residual.anchors.shape == (150, 6)  # two voyages of three windows of 25 s
     found = run.identified()
-    assert found.height == 13 and not any("network" in name for name in found["name"])
+    assert found.height == 18 and not any("network" in name for name in found["name"])
     assert found.filter(pl.col("free"))["name"].to_list() == ["hull.x_0f"]
     held = found.filter(~pl.col("free"))
     assert (held["value"] == held["start"]).all()

@@ -6,7 +6,7 @@ import jax
 
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning
+from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning, neutral
 
 jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
@@ -20,4 +20,5 @@ __all__ = [
     "geometry_of",
     "load",
     "meaning",
+    "neutral",
 ]

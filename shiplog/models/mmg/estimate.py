@@ -133,7 +133,8 @@ def hull(p: Particulars) -> dict[str, float]:
     Y'_v = -(πk/2 + 1.4 C_b B/L), Y'_r = m' + m'_x - 1.5 C_b B/L, N'_v = -k, N'_r = -0.54 k + k²
     (Inoue, Hirano & Kijima 1981; Kijima, Katsuno, Nakiri & Furukawa 1990).
     X'_0F = -(1 + 0.35) C_F S/(L d), C_F of ITTC 1957 at a Froude number of 0.05, S = 1.7 L d + ∇/d
-    (Denny-Mumford). Cross-flow form of Yoshimura, Nakao & Ishibashi 2009.
+    (Denny-Mumford). Cross-flow form of Yoshimura, Nakao & Ishibashi 2009. The linear damping of
+    low speed has no published formula: it is left at its neutral value, for the data to say.
     """
     k = 2.0 * p.draught / p.length
     turning = min(k, 0.27)  # the parabola's turning point: no less damping for more draught

@@ -1,4 +1,5 @@
-"""Hull force at low speed: Yoshimura, Nakao & Ishibashi 2009, with cross-flow drag."""
+"""Hull force at low speed: Yoshimura, Nakao & Ishibashi 2009, with cross-flow drag, and the linear
+damping of a ship that barely moves (Fossen 2011)."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.models.mmg.geometry import Geometry
 from shiplog.models.mmg.smooth import speed
 
@@ -20,7 +22,7 @@ def hull(p: Mapping[str, Array], g: Geometry, u: Array, v: Array, r: Array) -> A
     N_H = q L [N'_v v u + N'_r L r |u| - C_D ∫ |w_N| w_N ξ dξ],  w = v + C_r L r ξ
 
     Resistance from straight ahead to straight astern goes with the drift angle β; linear damping
-    acts both ways; cross terms change sign astern.
+    acts both ways; cross terms change sign astern. To these `linear` damping is added.
     """
     q = 0.5 * g.density * g.length * g.draught
     lr = g.length * r
@@ -36,6 +38,24 @@ def hull(p: Mapping[str, Array], g: Geometry, u: Array, v: Array, r: Array) -> A
         * g.length
         * (p["hull.n_v"] * v * u + p["hull.n_r"] * lr * jnp.abs(u) - p["hull.c_d"] * turning)
     )
+    return jnp.stack((x, y, n), axis=-1) + linear(p, g, u, v, r)
+
+
+def linear(p: Mapping[str, Array], g: Geometry, u: Array, v: Array, r: Array) -> Array:
+    """Damping [..., 3] in N and N m that is proportional to velocity and does not need headway.
+
+    X = q √(gL) X'_u u,  Y = q √(gL) (Y'_vL v + Y'_rL L r),  N = q L √(gL) (N'_vL v + N'_rL L r)
+
+    Linear damping at low speed, as dynamic positioning has it (Fossen 2011, Sec. 6.4). The speed
+    that makes it non-dimensional is the Bis system's √(gL), since the ship's own may be zero:
+    X'_u = -m' D''₁₁ of the D'' in Fossen, Sagatun & Sørensen 1996, m' = m/(½ρL²d), and so on.
+    """
+    wave = jnp.sqrt(GRAVITY * g.length)
+    q = 0.5 * g.density * g.length * g.draught * wave
+    lr = g.length * r
+    x = q * p["hull.x_u"] * u
+    y = q * (p["hull.y_vl"] * v + p["hull.y_rl"] * lr)
+    n = q * g.length * (p["hull.n_vl"] * v + p["hull.n_rl"] * lr)
     return jnp.stack((x, y, n), axis=-1)
 
 

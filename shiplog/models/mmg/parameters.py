@@ -57,6 +57,15 @@ TABLE: dict[str, dict[str, Entry]] = {
         "c_d": _E("C_D", "cross-flow drag", 0.3, 0.1, 0.0, 4.0),
         "c_ry": _E("C_rY", "cross-flow: turning in sway", 0.3, 0.3, 0.0, 6.0),
         "c_rn": _E("C_rN", "cross-flow: turning in yaw", 0.3, 0.2, 0.0, 6.0),
+        # Linear damping at low speed. The supply vessel of Fossen, Sagatun & Sorensen 1996 has
+        # m' = 0.32 times D'' = 0.0358, 0.1183, 0.0308, which is 0.012, 0.038 and 0.010. Spreads
+        # are about half of these, and double for estimated ships. Damping takes energy out only
+        # if a coupling is below sqrt(0.038 * 0.010) = 0.02: half of that, too.
+        "x_u": _E("X'_u", "linear surge damping", 0.0, 0.01, -0.3, 0.001, neutral=0.0),
+        "y_vl": _E("Y'_vL", "linear sway damping", 0.0, 0.025, -1.0, 0.002, neutral=0.0),
+        "y_rl": _E("Y'_rL", "linear sway force of turning", 0.0, 0.01, -0.2, 0.2, neutral=0.0),
+        "n_vl": _E("N'_vL", "linear yaw moment of drifting", 0.0, 0.01, -0.2, 0.2, neutral=0.0),
+        "n_rl": _E("N'_rL", "linear yaw damping", 0.0, 0.005, -0.3, 0.001, neutral=0.0),
     },
     "propeller": {
         "k0": _E("k₀", "thrust at rest", 0.15, 0.0, 0.02, 1.0),
@@ -170,6 +179,11 @@ def meaning(name: str) -> str:
     if name.startswith("network."):
         return "weight of the residual network"
     return _entry(name).meaning
+
+
+def neutral(name: str) -> float | None:
+    """The value that leaves a parameter's term out; None where it has none."""
+    return None if name.startswith("network.") else _entry(name).neutral
 
 
 def names(geometry: Geometry) -> tuple[str, ...]:
