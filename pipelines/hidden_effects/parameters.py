@@ -14,9 +14,11 @@ PRECISE = (  # median error within 3 %; of the others within 10 %
     "current", "heading_offset", "antenna_offset", "rudder_offset", "rudder_lag", "rudder_delay",
     "clock_offset",
 )  # fmt: skip
-# Listed, and in no goal: their forms differ on purpose between simulator and diagnosis. A shoal is
-# a line there and a map of bumps here, a bank's reach is drawn there and fixed here, a thruster
-# pulses there and one figure cannot say so.
+# Listed, and in no goal: simulator and diagnosis have no number in common that could be compared.
+# The shoal of a blind case is a ridge, a slope or a plateau on which each force grows by a share
+# and a power drawn for that ship; here it is a map of bumps with fixed shares. Suction, fading,
+# speed and lever of its bank are drawn, and fixed here. A thruster pulses there and one figure
+# cannot say so. (The sample logs share shares and constants with the catalogue; none hides these.)
 OTHER_FORM = ("shallow_water", "bank", "side_thrust")
 FACTORS = (  # new over old: 1 is none, and the error is a share of what was added
     "wind_force", "fouling", "cross_flow_drag", "thrust_loss", "rudder_force", "yaw_rate_scale",

@@ -1,8 +1,9 @@
 """Blind cases: a sister ship, a campaign of hers as she is, and one with something hidden in it.
 
-All of a case follows from its seed. What is hidden is drawn apart from ship, weather, helm and
-noise: the same seed with another cause is the same campaign with another cause. The logs do not
-say which; the key does, and lies elsewhere.
+All of a case follows from its seed. What is hidden is drawn apart from ship, laws, weather, helm
+and noise: the same seed with another cause is the same campaign with another cause. The logs do
+not say which; the key does, and lies elsewhere. The laws are the seed's own, and so share no form
+and no number with the catalogue of causes.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipelines.known_ship import laws
+from pipelines.known_ship.laws import Laws
 from pipelines.known_ship.sensors import write_voyage
 from pipelines.known_ship.ship import Effects, Ship, varied
 from pipelines.known_ship.voyage import Voyage, sail
@@ -50,13 +53,19 @@ def _either(rng: np.random.Generator) -> float:
     return float(rng.choice((-1.0, 1.0)))
 
 
+def _within(rng: np.random.Generator, low: float, high: float) -> float:
+    """A realistic size, its inverse uniform: small faults are commoner than large ones, and half of
+    the draws do not lie below the catalogue's prior."""
+    return 1.0 / rng.uniform(1.0 / high, 1.0 / low)
+
+
 def _share(
     name: str, low: float, high: float, parameter: str, signs: tuple[float, ...] = (1.0,)
 ) -> Draw:
     """A share added to something; the key gives the new over the old, 1.3 for 30 % more."""
 
     def draw(rng: np.random.Generator, size: float) -> Drawn:
-        share = float(rng.choice(signs)) * rng.uniform(low, high) * size
+        share = float(rng.choice(signs)) * _within(rng, low, high) * size
         factor = 1.0 - share if name == "thrust_loss" else 1.0 + share
         return {name: share}, _said(**{parameter: (factor, "1")})
 
@@ -67,7 +76,7 @@ def _angle(name: str, low: float, high: float, parameter: str = "angle", unit: s
     """An angle, or its rate, of either sign."""
 
     def draw(rng: np.random.Generator, size: float) -> Drawn:
-        degrees = _either(rng) * rng.uniform(low, high) * size
+        degrees = _either(rng) * _within(rng, low, high) * size
         return {name: math.radians(degrees)}, _said(**{parameter: (degrees, unit)})
 
     return draw
@@ -75,14 +84,14 @@ def _angle(name: str, low: float, high: float, parameter: str = "angle", unit: s
 
 def _time(name: str, low: float, high: float) -> Draw:
     def draw(rng: np.random.Generator, size: float) -> Drawn:
-        seconds = rng.uniform(low, high) * size
+        seconds = _within(rng, low, high) * size
         return {name: seconds}, _said(time=(seconds, "s"))
 
     return draw
 
 
 def _current(rng: np.random.Generator, size: float) -> Drawn:
-    speed, towards = rng.uniform(0.05, 0.18) * size, rng.uniform(0.0, 2.0 * np.pi)
+    speed, towards = _within(rng, 0.05, 0.18) * size, rng.uniform(0.0, 2.0 * np.pi)
     changes = {
         "current_north": speed * math.cos(towards),
         "current_east": speed * math.sin(towards),
@@ -94,15 +103,15 @@ def _wind_force(rng: np.random.Generator, size: float) -> Drawn:
     """More or less windage: surge and sway go together, the lever of yaw on its own."""
     sign = _either(rng)
     signs = (sign, sign, _either(rng))
-    force = tuple(s * rng.uniform(0.25, 0.50) * size for s in signs)
+    force = tuple(s * _within(rng, 0.25, 0.50) * size for s in signs)
     names = ("surge_factor", "sway_factor", "yaw_factor")
     said = {name: (1.0 + share, "1") for name, share in zip(names, force, strict=True)}
     return {"wind_force": force}, _said(**said)
 
 
 def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
-    """A shoal whose crest runs some way through the part of the pond that she uses."""
-    strength, length = rng.uniform(0.5, 1.2) * size, rng.uniform(4.0, 10.0)
+    """A shoal whose line runs some way through the part of the pond that she uses."""
+    strength, length = _within(rng, 0.5, 1.2) * size, rng.uniform(4.0, 10.0)
     off, at, towards = rng.uniform((0.0, -np.pi, -np.pi), (15.0, np.pi, np.pi))
     north, east = off * math.cos(at), off * math.sin(at)
     changes = {
@@ -116,13 +125,13 @@ def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
 
 
 def _bank(rng: np.random.Generator, size: float) -> Drawn:
-    strength, length = rng.uniform(0.8, 1.6) * size, rng.uniform(7.0, 13.0)
+    strength, length = _within(rng, 0.8, 1.6) * size, rng.uniform(7.0, 13.0)
     changes = {"bank": strength, "bank_length": length}
     return changes, _said(strength=(strength, "1"), length=(length, "m"))
 
 
 def _payload(rng: np.random.Generator, size: float) -> Drawn:
-    mass, ahead = rng.uniform(20.0, 55.0) * size, rng.uniform(-1.0, 1.0)
+    mass, ahead = _within(rng, 20.0, 55.0) * size, rng.uniform(-1.0, 1.0)
     return {"payload": mass, "payload_ahead": ahead}, _said(
         mass=(mass, "kg"), position=(ahead, "m")
     )
@@ -130,7 +139,7 @@ def _payload(rng: np.random.Generator, size: float) -> Drawn:
 
 def _rudder_offset(rng: np.random.Generator, size: float) -> Drawn:
     """Port, starboard or both."""
-    degrees = [_either(rng) * rng.uniform(3.0, 8.0) * size for _ in range(2)]
+    degrees = [_either(rng) * _within(rng, 3.0, 8.0) * size for _ in range(2)]
     which = rng.integers(3)  # 0: port alone, 1: starboard alone
     port, starboard = (0.0 if which == 1 - side else degrees[side] for side in range(2))
     changes = {
@@ -145,19 +154,19 @@ def _side_thrust(rng: np.random.Generator, size: float) -> Drawn:
 
 
 def _thrust_drift(rng: np.random.Generator, size: float) -> Drawn:
-    slope = -rng.uniform(0.12, 0.35) * size
+    slope = -_within(rng, 0.12, 0.35) * size
     return {"thrust_drift": slope}, _said(slope=(slope, "1"))
 
 
 def _clock_offset(rng: np.random.Generator, size: float) -> Drawn:
     channel = str(rng.choice(("position", "velocity", "gnss", "yaw_rate", "wind")))
-    late = rng.uniform(0.3, 1.5) * size
+    late = _within(rng, 0.3, 1.5) * size
     return {"clock_offset": {channel: late}}, _said(time=(late, "s"), channel=(channel, ""))
 
 
 def _antenna_offset(rng: np.random.Generator, size: float) -> Drawn:
-    ahead = _either(rng) * rng.uniform(0.3, 1.2) * size
-    aside = _either(rng) * rng.uniform(0.05, 0.3) * size
+    ahead = _either(rng) * _within(rng, 0.3, 1.2) * size
+    aside = _either(rng) * _within(rng, 0.05, 0.3) * size
     return {"antenna_offset": (ahead, aside)}, _said(x=(ahead, "m"), y=(aside, "m"))
 
 
@@ -245,6 +254,7 @@ class Leg:
 class Case:
     seed: int
     ship: Ship
+    laws: Laws
     causes: tuple[Cause, ...]
     ordinary: Effects  # noise and unrest of both campaigns
     effects: Effects  # the same, and what is hidden in the trial
@@ -298,6 +308,7 @@ def draw(
         causes.append(Cause(name, large, parameters, family))
     return Case(
         seed=seed, ship=replace(varied(seed), name=Ship().name),  # her name would tell the seed
+        laws=laws.drawn(_stream(seed, "laws")),
         causes=tuple(causes), ordinary=ordinary, effects=effects,
         nominal=_legs(seed, "nominal", NOMINAL_DAY, DURATIONS[NOMINAL[seconds]]),
         trial=_legs(seed, "trial", TRIAL_DAY, DURATIONS[seconds]),
@@ -334,7 +345,7 @@ def voyage(case: Case, leg: Leg) -> Voyage:
     effects = case.effects if leg in case.trial else case.ordinary
     return sail(
         leg.seconds, seed=leg.seed, wind=leg.wind, ship=case.ship, effects=effects,
-        campaign=leg.campaign,
+        laws=case.laws, campaign=leg.campaign,
     )  # fmt: skip
 
 
@@ -386,5 +397,6 @@ def _told(case: Case, folder: Path, pulses: dict) -> dict[str, Any]:
             "coloured": {"value": case.ordinary.coloured, "unit": "1"},
             "clock_jitter": {"value": case.ordinary.clock_jitter, "unit": "s"},
         },
+        "laws": asdict(case.laws),
         "sha256": logs,
     }

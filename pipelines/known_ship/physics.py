@@ -3,7 +3,8 @@
 Axes as in MMG: x₀ north, y₀ east, heading ψ clockwise; body x ahead, y to starboard, origin at
 midship. Forces are those of Yasukawa & Yoshimura (2015) in their division into hull, propeller,
 rudder and wind; each part's own source stands at the part. Forms and numbers are chosen apart
-from `shiplog.models`: a fit must not win because both sides were written with one pen.
+from `shiplog.models`: a fit must not win because both sides were written with one pen. Exponents
+and shares that a blind case draws come from `laws`.
 
 Compiled by numba in about 2 s a process. Not cached: its cache would not notice that a field of
 `Ship` has moved.
@@ -18,11 +19,14 @@ from dataclasses import fields
 import numpy as np
 from numba import njit
 
-from pipelines.known_ship.ship import BANK_EAST, Effects, Ship
+from pipelines.known_ship.laws import Laws, force_numbers
+from pipelines.known_ship.place import WATER, bank, grown, powered, shoal
+from pipelines.known_ship.ship import Effects, Ship
 
 STEP = 0.02  # s; logged at 0.1 s
-WATER, AIR = 998.0, 1.225  # kg/m³
+AIR = 1.225  # kg/m³
 THRUSTER = 1.3  # m ahead of midship, the one nobody records
+CROSS_FLOW_SPEED = 0.1  # m/s across a strip, as usual: there any power of it is the square
 # state: x₀ u y₀ v ψ r, measured δ_port δ_starboard n, and the rudder angles after a hidden lag
 STATES = 11
 
@@ -35,7 +39,8 @@ _FORCES = [
     "shoal_east", "shoal_towards", "bank", "bank_length",
 ]  # fmt: skip
 _DERIVED = ["wind_force_surge", "wind_force_sway", "wind_force_yaw", "drift_start", "drift_slope"]
-Coefficients = namedtuple("Coefficients", _SHIP)
+_LAWS = list(force_numbers(Laws()))
+Coefficients = namedtuple("Coefficients", _SHIP + _LAWS)
 Hidden = namedtuple("Hidden", _FORCES + _DERIVED)
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -43,8 +48,9 @@ STATIONS = tuple(0.5 * _NODES)  # ξ = x/L, from stern to bow
 STATION_WIDTHS = tuple(0.5 * _WEIGHTS)
 
 
-def coefficients(ship: Ship) -> Coefficients:
-    return Coefficients(*(float(getattr(ship, name)) for name in _SHIP))
+def coefficients(ship: Ship, laws: Laws | None = None) -> Coefficients:
+    own = (float(getattr(ship, name)) for name in _SHIP)
+    return Coefficients(*own, *force_numbers(laws or Laws()).values())
 
 
 def hidden(effects: Effects, campaign: tuple[float, float], duration: float) -> Hidden:
@@ -57,64 +63,56 @@ def hidden(effects: Effects, campaign: tuple[float, float], duration: float) -> 
 
 
 @njit
-def shoal(h, north, east):
-    """0 in deep water to `shallow_water` over the crest of a shoal: (h₀/h)², h the depth here.
-
-    The bed falls off the crest as a hyperbola, h² = h₀² (1 + s²/l²) at s metres from it. What
-    grows does so by a power of draught over depth, as measured in shallow tanks (Kijima, Katsuno,
-    Nakiri & Furukawa 1990), each with a power of its own in `hull` and `rates`. The masses' own
-    gradient is left out: below 0.2 N here.
-    """
-    off = -(north - h.shoal_north) * math.sin(h.shoal_towards) + (east - h.shoal_east) * math.cos(
-        h.shoal_towards
-    )
-    return 1.0 / (1.0 + (off / h.shoal_length) ** 2)
-
-
-@njit
-def bank(c, h, east, u, psi):
-    """Suction towards the bank at y₀ = `BANK_EAST` and the moment that turns the leading end out.
-
-    Both grow with the square of the speed along the bank (Norrbin 1974) and fade with the gap as
-    1/(1 + (gap/l)³), our own; they are bounded at the wall and nothing behind it.
-    """
-    gap = BANK_EAST - 0.5 * c.breadth - east
-    if gap < -c.breadth:
-        return 0.0, 0.0, 0.0
-    cos, sin = math.cos(psi), math.sin(psi)
-    near = 1.0 / (1.0 + (max(gap, 0.0) / h.bank_length) ** 3)
-    pull = h.bank * 0.15 * 0.5 * WATER * c.length * c.draught * (u * cos) ** 2 * near
-    lead = u / math.sqrt(u * u + 1e-4)  # which end leads
-    return pull * sin, pull * cos, -0.25 * c.length * pull * cos * lead
-
-
-@njit
 def hull(c, h, u, v, r, shallow):
     """Hull force at velocity through the water, after Yoshimura, Nakao & Ishibashi (2009).
 
-    Linear damping fades with |u|; cross-flow drag is integrated along the hull with a coefficient
-    that grows towards the ends, as Hooft (1994) found. `shallow` is the shoal's (h₀/h)².
+    Linear damping fades with |u|, but not below `hull_low_speed`, where it stays linear in the
+    motion (Fossen 2011); cross-flow drag is integrated along the hull with a coefficient that
+    grows towards the ends, as Hooft (1994) found. `shallow` is the shoal's (h₀/h)².
     """
     crest = h.shallow_water
-    slow, damped = 1.0 + 0.3 * crest * shallow, 1.0 + 0.8 * crest * shallow
-    blocked = 1.0 + 1.2 * crest * shallow * math.sqrt(shallow)
+    slow = 1.0 + grown(c.shallow_resistance * crest, shallow, c.shallow_resistance_power)
+    swaying = 1.0 + grown(c.shallow_sway_damping * crest, shallow, c.shallow_sway_damping_power)
+    yawing = 1.0 + grown(c.shallow_yaw_damping * crest, shallow, c.shallow_yaw_damping_power)
+    turning = 1.0 + grown(c.shallow_sway_turning * crest, shallow, c.shallow_sway_turning_power)
+    drifting = 1.0 + grown(c.shallow_yaw_drift * crest, shallow, c.shallow_yaw_drift_power)
+    blocked = 1.0 + grown(c.shallow_cross_flow * crest, shallow, c.shallow_cross_flow_power)
     q = 0.5 * WATER * c.length * c.draught
     speed = math.sqrt(u * u + v * v)
     astern = 0.5 - 0.5 * u / speed if speed > 0.0 else 0.0  # 0 straight ahead, 1 straight astern
+    along = abs(u)
+    if c.hull_low_speed > 0.0:
+        along = math.sqrt(u * u + c.hull_low_speed**2)
+        speed = math.sqrt(speed * speed + c.hull_low_speed**2)
     rough = 1.0 + h.fouling
     straight = c.resistance_ahead + (c.resistance_astern - c.resistance_ahead) * astern
     lr = c.length * r
     x = q * (-rough * straight * slow * u * speed + c.surge_turning * v * lr)
-    y = q * (c.sway_damping * damped * v * abs(u) + c.sway_turning * lr * u)
-    n = q * c.length * (c.yaw_drift * v * u + c.yaw_damping * damped * lr * abs(u))
+    y = q * (c.sway_damping * swaying * v * along + c.sway_turning * turning * lr * u)
+    n = q * c.length * (c.yaw_drift * drifting * v * u + c.yaw_damping * yawing * lr * along)
     drag = q * c.cross_flow * (1.0 + h.cross_flow_drag) * blocked
     for i in range(len(STATIONS)):
         xi = STATIONS[i]
         across = v + lr * xi
-        strip = drag * (1.0 + 4.0 * c.cross_flow_ends * xi * xi) * STATION_WIDTHS[i]
-        y -= strip * abs(across) * across
-        n -= strip * abs(across) * across * xi * c.length
+        strip = drag * (1.0 + _ends(c, xi)) * STATION_WIDTHS[i]
+        if c.hull_cross_flow_power == 2.0:
+            push = strip * abs(across) * across
+        else:
+            square = powered(across, c.hull_cross_flow_power, CROSS_FLOW_SPEED)
+            push = strip * math.copysign(square, across)
+        y -= push
+        n -= push * xi * c.length
     return x, y, n
+
+
+@njit
+def _ends(c, xi):
+    """How much more cross-flow drag there is at ξ = x/L than amidships."""
+    if c.hull_end_power == 2.0:
+        more = 4.0 * c.cross_flow_ends * xi * xi
+    else:
+        more = c.cross_flow_ends * abs(2.0 * xi) ** c.hull_end_power
+    return more * c.hull_end_growth * (1.0 + c.hull_end_skew * 2.0 * xi)
 
 
 @njit
@@ -190,6 +188,9 @@ def rudders(c, h, u, v, r, thrust, inflow, port, starboard):
 def wind_force(c, h, ahead, starboard):
     """Fujiwara, Ueno & Nimura (1998)-type harmonics of the apparent wind's direction.
 
+    The cross-force parameter δ makes an oblique wind push harder than its components would
+    (Blendermann 1994); the terms of `laws.Air` are such as Isherwood (1973) found.
+
     ahead, starboard   where the wind comes FROM, as a vector in body axes [m/s]
     """
     speed2 = ahead * ahead + starboard * starboard
@@ -206,6 +207,12 @@ def wind_force(c, h, ahead, starboard):
     n = -q * c.lateral_area * c.length * (
         c.wind_yaw * math.sin(angle) + c.wind_yaw_2 * math.sin(2.0 * angle)
     )  # fmt: skip
+    ratio = c.wind_surge * c.frontal_area / (c.wind_sway * c.lateral_area)
+    oblique = 1.0 - 0.5 * c.air_cross_force * (1.0 - ratio) * math.sin(2.0 * angle) ** 2
+    x, y, n = x / oblique, y / oblique, n / oblique
+    x -= q * c.frontal_area * (c.air_surge_0 + c.air_surge_2 * math.cos(2.0 * angle))
+    y -= q * c.lateral_area * c.air_sway_2 * math.sin(2.0 * angle)
+    n -= q * c.lateral_area * c.length * c.air_yaw_3 * math.sin(3.0 * angle)
     return (
         x * (1.0 + h.wind_force_surge), y * (1.0 + h.wind_force_sway), n * (1.0 + h.wind_force_yaw)
     )  # fmt: skip
@@ -227,7 +234,7 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
     vc = -h.current_north * sin + h.current_east * cos
     uw, vw = u - uc, v - vc  # through the water
 
-    shallow = shoal(h, state[0], state[2]) if h.shallow_water > 0.0 else 0.0
+    shallow = shoal(c, h, state[0], state[2]) if h.shallow_water > 0.0 else 0.0
     x, y, n = hull(c, h, uw, vw, r, shallow)
     thrust, inflow = propeller(c, uw, vw, r, state[8])
     weaker = (1.0 - h.thrust_loss) * (1.0 + h.drift_start + h.drift_slope * time)
@@ -254,9 +261,12 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
     mass = c.mass + h.payload
     moment = c.mass * c.gravity_ahead + h.payload * h.payload_ahead  # m x_G
     inertia = c.inertia + h.payload * h.payload_ahead**2
-    crest = h.shallow_water * shallow
-    mx, my = mass + c.added_surge, mass + c.added_sway * (1.0 + 0.7 * crest)
-    inertia += 0.2 * c.inertia * crest  # J_zz is some 0.4 of it, and grows by half
+    crest = h.shallow_water
+    more_x = c.shallow_added_surge * grown(crest, shallow, c.shallow_added_surge_power)
+    more_y = c.shallow_added_sway * grown(crest, shallow, c.shallow_added_sway_power)
+    more_j = grown(crest, shallow, c.shallow_added_inertia_power)
+    mx, my = mass + c.added_surge * (1.0 + more_x), mass + c.added_sway * (1.0 + more_y)
+    inertia += c.shallow_added_inertia * c.inertia * more_j  # J_zz is some 0.4 of it
     udot = (x + my * vw * r + moment * r * r) / mx
     ya = y - mx * uw * r
     na = n - moment * uw * r

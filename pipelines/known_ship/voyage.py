@@ -8,13 +8,13 @@ import numpy as np
 
 from pipelines.known_ship import physics
 from pipelines.known_ship.helm import Helm, Operator
+from pipelines.known_ship.laws import Laws
+from pipelines.known_ship.noise import process_noise
 from pipelines.known_ship.ship import Effects, Ship
-from pipelines.known_ship.weather import GRID, Wind, blow, ornstein_uhlenbeck
+from pipelines.known_ship.weather import Wind, blow
 
 PERIOD = 0.1  # s
 WATCH = 1.0  # s, between two looks of the operator
-UNREST = (3e-4, 3e-4, 2e-4)  # m/s², m/s², rad/s²: what pushes a ship at random on an ordinary day
-UNREST_TIME = 4.0  # s
 PULSES = (0.375, 1.0)  # of the strongest, 1.5 to 4 N
 PULSE_TIMES = (10.0, 40.0)  # s
 QUIET = 60.0  # s, mean between two pulses
@@ -54,6 +54,7 @@ def sail(
     wind: Wind,
     ship: Ship | None = None,
     effects: Effects | None = None,
+    laws: Laws | None = None,
     helm: Helm | None = None,
     start: tuple[float, ...] | None = None,
     campaign: tuple[float, float] = (0.0, 1.0),
@@ -61,6 +62,7 @@ def sail(
 ) -> Voyage:
     """Sail for `duration_s`, integrated at `step` and kept at 10 Hz.
 
+    laws      which exponents and shares forces have; those of the sample logs unless given
     helm      who steers; a random `Operator` of this seed unless given, asked once a second
     start     x₀, u, y₀, v, ψ, r; near the middle and at rest unless given
     campaign  which share of a campaign this voyage is, for effects that grow along it
@@ -68,7 +70,7 @@ def sail(
     Weather and operator each draw from a stream of their own: the same seed meets the same gusts
     whatever is hidden.
     """
-    ship, effects = ship or Ship(), effects or Effects()
+    ship, effects, laws = ship or Ship(), effects or Effects(), laws or Laws()
     weather_rng, helm_rng, start_rng, unrest_rng, pulse_rng = (
         np.random.default_rng([seed, i]) for i in range(5)
     )
@@ -88,8 +90,9 @@ def sail(
     for begin, length, force in pulses:
         push[(halves >= begin) & (halves < begin + length), 0] = force
     if effects.turbulence > 0.0:
-        push[:, 1:] = effects.turbulence * _unrest(duration_s, halves, unrest_rng)
-    numbers = physics.coefficients(ship)
+        pushed = process_noise(laws.noise, duration_s, halves, unrest_rng)
+        push[:, 1:] = effects.turbulence * pushed
+    numbers = physics.coefficients(ship, laws)
     hidden = physics.hidden(effects, campaign, duration_s)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
@@ -123,15 +126,3 @@ def draw_pulses(strongest: float, duration: float, rng: np.random.Generator) -> 
         found.append((round(begin, 1), round(length, 1), round(float(force), 4)))
         begin = found[-1][0] + length + 1.0 + rng.exponential(QUIET)
     return tuple(found)
-
-
-def _unrest(duration: float, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """[K, 3] accelerations, drawn on the weather's grid: a finer step meets the same."""
-    count = int(np.ceil(duration / GRID)) + 2
-    grid = GRID * np.arange(count)
-    return np.column_stack(
-        [
-            np.interp(times, grid, ornstein_uhlenbeck(rng, count, GRID, UNREST_TIME, sigma))
-            for sigma in UNREST
-        ]
-    )
