@@ -41,25 +41,29 @@ class Campaign:
                  weights; `counts` is the share of itself that a trial counts
     effects      deviation of one part's numbers from the others' [C]
     discrepancy  its families and their columns
-    each         products [V, 1 + C, 1 + C] of the nominal parts, in units; empty without any
+    unseen       families that no model of forces has, over the nominal campaign
+    each         products of the nominal parts, in units: [1 + C, 1 + C], then the unseen families'
     noise        standard deviation, over the parts, of the logarithm of the process noise
     """
 
     reference: Reference
     effects: VoyageEffects
     discrepancy: Discrepancy
+    unseen: Discrepancy
     each: tuple[np.ndarray, ...]
     noise: float
 
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
         """`each` with every part's own numbers integrated out."""
-        return tuple(reduced(g, self.effects.deviation)[0] for g in self.each)
+        deviation = np.append(self.effects.deviation, np.zeros(self.unseen.count))
+        return tuple(reduced(g, deviation)[0] for g in self.each)
 
     def prior_without(self, left_out: int) -> tuple[np.ndarray, np.ndarray]:
         """Information and pull of a trial's numbers, one nominal part left out."""
-        kept = [g for i, g in enumerate(self.parts) if i != left_out]
         known = self.effects.size**-2.0
+        count = 1 + len(known)
+        kept = [g[:count, :count] for i, g in enumerate(self.parts) if i != left_out]
         return prior(kept, known, self.reference.anchor, self.effects.deviation,
                      self.reference.counts)  # fmt: skip
 
@@ -131,7 +135,13 @@ def learn(
     known, rows = columns.known, parts_of(linear.cut.voyage)
     unrest = noise_time(linear, pushed, columns, held, at.unrest)
     modes = evidence.modes(evidence.weighed(linear, unrest), unrest).beside(pushed)
-    each = products(modes, rows, columns.unit)
+    unseen = discrepancy.of(
+        record.profile, unrest.push, len(columns.unit), discrepancy.UNSEEN,
+        structure.at_knots(linear.cut, g),
+    )  # fmt: skip
+    whole = modes.beside(unseen.pushed(linear.cut, g))
+    every = products(whole, rows, np.append(columns.unit, np.ones(unseen.count)))
+    each = [g[: 1 + len(known), : 1 + len(known)] for g in every]
     effects = voyage_effects.learn(
         each, known, held, _groups(model, columns, families), [f.columns for f in families.families]
     )
@@ -144,7 +154,7 @@ def learn(
         counts=share,
     )  # fmt: skip
     spread = _noise(modes, rows, columns, effects, information, pull)
-    return Campaign(made, effects, families, tuple(each), spread)
+    return Campaign(made, effects, families, unseen, tuple(every), spread)
 
 
 def noise_time(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Trial(hypotheses.Trial):
         self.remainder = Remainder()  # that `scan` includes
         self._totals: list[tuple[tuple, np.ndarray, float]] = []
 
+    @property
+    def pulse(self) -> bytes:
+        """Tells one remainder of this trial from another."""
+        return super().pulse + f"{self.remainder.kind} {self.remainder.size}".encode()
+
     # --- products ---
 
     def _misfitting(self, modes: Modes, point: Point) -> Modes:
@@ -64,7 +69,7 @@ class Trial(hypotheses.Trial):
 
     def total(self, point: Point, noise: float) -> tuple[np.ndarray, float]:
         """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
-        key = (id(point.weighed), noise, self.weight.tobytes(), self.pulse)
+        key = (id(point.weighed), noise, self.weight.tobytes(), super().pulse)
         for known, total, volume in self._totals:
             if known == key:
                 return total, volume
@@ -83,7 +88,7 @@ class Trial(hypotheses.Trial):
         """log |C| at one level of process noise, the same for every hypothesis: that of the first
         point. How far a model lets noise be felt is no evidence of a cause."""
         assert self.first is not None
-        key = (louder, self.pulse + self.weight.tobytes())
+        key = (louder, super().pulse + self.weight.tobytes())
         if key not in self._volumes:
             modes, by = self.modes(self.first, louder)
             self._volumes[key] = modes.log_volume(by) + self.total(self.first, louder)[1]
@@ -95,15 +100,13 @@ class Trial(hypotheses.Trial):
         level = self.solve(
             total, self.volume(louder), louder, point, included, ref.information, ref.pull
         )
-        return Level(
-            level.louder, level.gram, level.logdet, level.inverse, level.solution,
-            level.value + self.expected(louder),
-        )  # fmt: skip
+        return replace(level, value=level.value + self.expected(louder, self.remainder.kind))
 
-    def expected(self, noise: float) -> float:
-        """Log prior density of a level of process noise, less its greatest under `nominal`."""
+    def expected(self, noise: float, kind: str) -> float:
+        """Log prior density of a level of process noise under a kind of remainder, less the
+        greatest one under `nominal`."""
         usual = max(self.campaign.noise, LEAST_SPREAD)
-        spread = RAISED_SPREAD if self.remainder.kind in (RAISED, INTERMITTENT) else usual
+        spread = RAISED_SPREAD if kind in (RAISED, INTERMITTENT) else usual
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 
     def solve(self, total, logdet, louder, point, included, information, pull) -> Level:
@@ -177,6 +180,21 @@ class Trial(hypotheses.Trial):
         if bend < 0.0:  # the top of the parabola through them
             at(here * FINER ** float(np.clip(0.5 * (below - above) / bend, -2.0, 2.0)))
         return list(tried.values())
+
+    def _numbers(self, level, point, included):
+        """Numbers and covariance of the included causes; a family's weights come after them."""
+        found: dict[str, np.ndarray] = {}
+        columns = self.reference.columns
+        at = first = len(self.reference.pull)
+        units = []
+        for name in included:
+            unit = columns.unit[columns.of[name]]
+            stood = point.numbers.get(name, np.zeros(len(unit)))
+            found[name] = stood + level.solution[at : at + len(unit)] * unit
+            units.append(unit)
+            at += len(unit)
+        whole = np.concatenate(units or [np.zeros(0)])
+        return found, level.inverse[first:at, first:at] * np.outer(whole, whole)
 
     # --- remainders ---
 

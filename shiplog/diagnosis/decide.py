@@ -1,0 +1,133 @@
+"""The verdict of a posterior, as the report and the refutation take it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shiplog.decision import Decision, Named, Structure
+from shiplog.diagnosis import posterior as posteriors
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
+from shiplog.diagnosis.search import Search
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.unnamed import pulse_force
+
+EVERYWHERE = ("surge", "sway", "yaw_rate")
+
+
+def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[Decision, Posterior]:
+    """The verdict, some names refuted by held-out data (with the reason)."""
+    refuted = dict(refuted or {})
+    found = posteriors.posterior(search, tuple(refuted))
+    names = found.stated
+    best = posteriors.best_with(found, names)
+    mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
+    trial = search.trial
+    trial.remainder = best.remainder
+    verdict, structure, named, pulses = "undecided", None, (), None
+    kind = found.remainder
+    if names and mostly:
+        verdict, named = "named", _named(search, found, best, names)
+    elif best.kind != NOMINAL and (kind is not None or names):
+        verdict, structure = "unknown", _structure(search, best)
+        if best.kind == INTERMITTENT and best.pulses is not None and _is_device(search, best):
+            verdict, structure, pulses = "named", None, best.pulses
+    elif found.none >= thresholds.STATED:
+        verdict = "none"
+    if verdict == "named" and best.kind == INTERMITTENT and _is_device(search, best):
+        pulses = best.pulses
+    traces = _named(search, found, best, [n for n in map(name_of, best.causes) if n not in names]) \
+        if verdict == "none" else ()
+    shown = best if verdict in ("named", "unknown") else search.nothing
+    trial.remainder = shown.remainder
+    return Decision(
+        verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
+        found.ranking(), shown.found.louder, shown.point, shown.found, search.first,
+        search.nothing.found, (), search.told,
+    ), found  # fmt: skip
+
+
+def _named(
+    search: Search, found: Posterior, best: Hypothesis, names: Sequence[str]
+) -> tuple[Named, ...]:
+    """The causes of a hypothesis that have these names, with what else they may be."""
+    by = {c.label: c for c in search.catalogue}
+    columns = search.trial.reference.columns
+    given, at = [], 0
+    for label in best.found.numbers:
+        part = slice(at, at + len(columns.of[label]))
+        at = part.stop
+        if label not in by or name_of(label) not in names:
+            continue
+        others = _instead(found, best, label)
+        assert best.found.covariance is not None
+        given.append(
+            Named(
+                by[label], search.alone.get(label, float("nan")),
+                found.names.get(name_of(label), 0.0), np.asarray(best.found.numbers[label]),
+                best.found.covariance[part, part], tuple(others), others,
+                search.trial.reference.freedom,
+            )
+        )  # fmt: skip
+    return tuple(given)
+
+
+def _instead(found: Posterior, best: Hypothesis, label: str) -> dict[str, float]:
+    """Names of causes that may stand in a cause's place → nats by which they are less likely."""
+    rest = set(best.causes) - {label}
+    others: dict[str, float] = {}
+    for one in found.hypotheses:
+        more = set(one.causes) - rest
+        if len(more) == 1 and rest <= set(one.causes) and one.kind == best.kind:
+            other = name_of(next(iter(more)))
+            behind = best.score - one.score
+            if other != name_of(label) and behind < np.log(1.0 / (1.0 - thresholds.STATED)) * 2.0:
+                others.setdefault(other, float(behind))
+    return others
+
+
+def _structure(search: Search, best: Hypothesis) -> Structure:
+    gained = best.evidence - search.nothing.evidence
+    family = FAMILY.get(best.kind, best.kind)
+    if family in (STOCHASTIC, INTERMITTENT):
+        return Structure(family, gained, EVERYWHERE if family == STOCHASTIC else ("sway", "yaw_rate"))
+    acts_on = search.trial.acts_on(best.point, best.found, best.kind)
+    return Structure(family, gained, acts_on)
+
+
+def _is_device(search: Search, best: Hypothesis) -> bool:
+    assert best.pulses is not None
+    trial = search.trial
+    kept = trial.unrest, trial.remainder
+    from dataclasses import replace
+
+    trial.unrest = replace(trial.unrest, pulse=best.pulses.unit * best.pulses.force)
+    try:
+        force, deviation = pulse_force(trial, best.point, best.found, best.pulses)
+    finally:
+        trial.unrest, trial.remainder = kept
+    return posteriors.of_one_device(force, deviation)
+
+
+def _reasons(
+    search: Search, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
+) -> dict[str, str]:
+    """Label → why it is not named."""
+    said = dict(refuted)
+    kept = {n.cause.name for n in named}
+    for label, gained in sorted(search.alone.items(), key=lambda pair: -pair[1])[:8]:
+        name = name_of(label)
+        if name in kept or name in said:
+            continue
+        misfit = search.placebo.get(label, 0.0)
+        why = f"log Bayes factor {gained:+.0f} nats by itself"
+        if misfit >= 1.0:
+            why += f", of which a nominal voyage has {misfit:.0f} too"
+        said[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
+    return said
+
+
+__all__ = ["NOMINAL", "RAISED", "decide"]

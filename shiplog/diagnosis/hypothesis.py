@@ -1,0 +1,78 @@
+"""A hypothesis about a trial: a set of causes and one kind of remainder, with its prior."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from shiplog.causes import Cause
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.hypotheses import Found, Point
+from shiplog.unnamed import Pulses
+
+STOCHASTIC = "stochastic"  # the contract's word for raised process noise
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Causes by label, in alphabetical order, and a remainder.
+
+    evidence   log marginal likelihood [nats], the trial counting for its share
+    score      log evidence + log prior - placebo: log posterior up to a constant
+    point      the trial linearised where the causes' numbers stand
+    found      their numbers and covariance there
+    pulses     of an intermittent remainder
+    """
+
+    causes: tuple[str, ...]
+    remainder: Remainder
+    evidence: float
+    score: float
+    point: Point
+    found: Found
+    pulses: Pulses | None = None
+
+    @property
+    def kind(self) -> str:
+        return self.remainder.kind
+
+
+def name_of(label: str) -> str:
+    """`clock_offset:wind` is the wind's clock."""
+    return label.partition(":")[0]
+
+
+class Priors:
+    """Log prior of every hypothesis about one ship; causes of one name share that name's."""
+
+    def __init__(self, catalogue: Sequence[Cause], families: Sequence[str]) -> None:
+        names = [name_of(cause.label) for cause in catalogue]
+        self.each = {
+            cause.label: -math.log(len(set(names)) * names.count(name_of(cause.label)))
+            for cause in catalogue
+        }
+        kinds = (RAISED, INTERMITTENT, *families)
+        self.kinds = dict.fromkeys(kinds, math.log(thresholds.REMAINDER / len(kinds)))
+        self.kinds[NOMINAL] = math.log(1.0 - thresholds.REMAINDER)
+
+    def causes(self, labels: Sequence[str]) -> float:
+        if not labels:
+            return math.log(thresholds.NO_CHANGE)
+        further = (len(labels) - 1) * math.log(thresholds.ANOTHER_CAUSE)
+        return math.log(1.0 - thresholds.NO_CHANGE) + further + sum(self.each[n] for n in labels)
+
+    def of(self, labels: Sequence[str], kind: str) -> float:
+        return self.causes(labels) + self.kinds[kind]
+
+
+def form_error(alone: Mapping[str, float], labels: Sequence[str]) -> float:
+    """Nats that further causes bring by imitating what the strongest one's form leaves over.
+
+    alone   log Bayes factor of each cause by itself, against nothing
+    """
+    if len(labels) < 2:
+        return 0.0
+    first = max((alone.get(label, 0.0) for label in labels), default=0.0)
+    return thresholds.FORM_ERROR * max(first, 0.0) * (len(labels) - 1)

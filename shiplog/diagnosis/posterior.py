@@ -1,0 +1,123 @@
+"""Probabilities of causes and remainders, and the verdict that they allow.
+
+P(cause) is the sum over all hypotheses that contain it. A cause is named where that is at least
+`thresholds.STATED`; otherwise a kind of remainder is, or nothing, or the verdict is undecided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.search import Search
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+
+STOCHASTIC = "stochastic"  # the contract's word for raised process noise
+FAMILY = {RAISED: STOCHASTIC}
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the weighed hypotheses say together.
+
+    hypotheses   best first, with their probabilities [H]
+    names        name of a cause → probability; below practical size it counts as no change
+    kinds        kind of remainder → probability
+    none         probability that nothing of practical size changed
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    probability: np.ndarray
+    names: Mapping[str, float]
+    kinds: Mapping[str, float]
+    none: float
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """Names that are probable enough to be stated."""
+        return tuple(n for n, p in self.names.items() if p >= thresholds.STATED)
+
+    @property
+    def remainder(self) -> str | None:
+        """The kind of remainder that is probable enough to be stated; none for `nominal`."""
+        found = [k for k, p in self.kinds.items() if k != NOMINAL and p >= thresholds.STATED]
+        return found[0] if found else None
+
+    def ranking(self) -> dict[str, float]:
+        """Every answer with its probability, likeliest first."""
+        of = {**self.names, "none": self.none}
+        of |= {f"unknown:{FAMILY.get(k, k)}": p for k, p in self.kinds.items() if k != NOMINAL}
+        return dict(sorted(of.items(), key=lambda pair: -pair[1]))
+
+
+def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
+    """Of the weighed hypotheses, without those that contain a refuted cause (by name)."""
+    kept = [h for h in search.ranked() if not {name_of(n) for n in h.causes} & set(refuted)]
+    score = np.array([h.score for h in kept])
+    share = np.exp(score - score.max())
+    share /= share.sum()
+    names: dict[str, float] = {}
+    kinds: dict[str, float] = {}
+    none = 0.0
+    for one, p in zip(kept, share, strict=True):
+        real = practical(search, one)
+        for name in dict.fromkeys(name_of(label) for label in real):
+            names[name] = names.get(name, 0.0) + float(p)
+        kinds[one.kind] = kinds.get(one.kind, 0.0) + float(p)
+        if not real and one.kind == NOMINAL:
+            none += float(p)
+    order = sorted(names, key=lambda name: -names[name])
+    return Posterior(tuple(kept), share, {n: names[n] for n in order}, kinds, none)
+
+
+def practical(search: Search, one: Hypothesis) -> tuple[str, ...]:
+    """Causes of a hypothesis that are large enough to matter."""
+    setting = search.trial.reference.setting
+    by = {c.label: c for c in search.catalogue}
+    return tuple(
+        label for label in one.causes
+        if by[label].practical(np.asarray(one.found.numbers[label]), setting)
+    )  # fmt: skip
+
+
+def share_of_causes(search: Search, one: Hypothesis) -> float:
+    """Of what a hypothesis explains beyond nothing, the share that its causes explain."""
+    nothing = search.nothing.evidence
+    whole = one.evidence - nothing
+    alone = max(
+        (search.found[one.causes, kind].evidence for kind in (NOMINAL, RAISED)
+         if (one.causes, kind) in search.found), default=nothing,
+    )  # fmt: skip
+    return (alone - nothing) / whole if whole > 0.0 else 1.0
+
+
+def best_with(found: Posterior, names: Sequence[str]) -> Hypothesis:
+    """The likeliest hypothesis that contains all of these names."""
+    for one in found.hypotheses:
+        if set(names) <= {name_of(label) for label in one.causes}:
+            return one
+    return found.hypotheses[0]
+
+
+def of_one_device(force: np.ndarray, deviation: np.ndarray) -> bool:
+    """Whether a side force [S, J], N, is that of one device which is on or off.
+
+    It is off for most of the time, on for several nodes at a stretch, and of the same size whenever
+    it is on. `deviation` [S, J] is the standard deviation of its estimate.
+    """
+    clear = np.abs(force) > 2.0 * deviation
+    if clear.sum() < 20 or clear.mean() > 0.5:
+        return False
+    size = np.abs(force[clear])
+    middle, strongest = np.quantile(size, (0.5, 0.95))
+    inside = np.abs(force[:, 1:-1]) > 0.5 * strongest
+    lasting = inside & (np.abs(force[:, :-2]) > 0.35 * strongest)
+    steady = lasting.sum() / max(inside.sum(), 1)
+    return bool(middle > 0.4 * strongest and steady > 0.6)
+
+
+__all__ = ["FAMILY", "INTERMITTENT", "Posterior", "best_with", "of_one_device", "posterior"]

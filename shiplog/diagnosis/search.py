@@ -1,0 +1,196 @@
+"""Which hypotheses are weighed: a search outwards from the best ones found so far.
+
+A set of causes is linearised again where its numbers are likeliest, and compared under every kind
+of remainder. From the best hypotheses one cause is added or dropped, until no set that is worth it
+is left; which set came first cannot matter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
+from shiplog.hypotheses import Found, Level, Point
+from shiplog.linearise import Path
+from shiplog.settling import settle
+
+MOST_CAUSES = 3
+MOST_SETS = 16  # that are linearised; what is left then is far behind
+WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
+LIKELY = 0.3  # share of the best one's evidence: before it is linearised again a cause may lack more
+CONTENDERS = 3  # causes that are tried from one hypothesis
+FALLS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
+RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
+
+
+class Search:
+    """All hypotheses weighed so far.
+
+    alone   label → log Bayes factor of that cause by itself against nothing
+    told    label → what these data would show of it, were it there
+    """
+
+    def __init__(
+        self, trial: Trial, point: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
+    ) -> None:
+        self.trial, self.first, self.placebo = trial, point, placebo
+        self.catalogue = [
+            c for c in trial.reference.model.causes
+            if c.label not in trial.fixed and c.label not in banned
+        ]  # fmt: skip
+        self.priors = Priors(self.catalogue, tuple(trial.families))
+        self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
+        self.alone: dict[str, float] = {}
+        self.told: dict = {}
+        self._tried: set[tuple[str, ...]] = set()
+        self._expanded: set[tuple[tuple[str, ...], str]] = set()
+
+    def run(self) -> None:
+        self.weigh((), {}, self.first)
+        while len(self._tried) < MOST_SETS:
+            best = self.ranked()
+            near = [h for h in best if h.score > best[0].score - WINDOW]
+            fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
+            if not fresh:
+                return
+            self._expand(fresh[0])
+
+    def ranked(self) -> list[Hypothesis]:
+        """Best first."""
+        return sorted(self.found.values(), key=lambda h: -h.score)
+
+    @property
+    def nothing(self) -> Hypothesis:
+        return self.found[(), NOMINAL]
+
+    # --- moves ---
+
+    def _expand(self, one: Hypothesis) -> None:
+        """The sets with one cause more or less than a hypothesis has."""
+        self._expanded.add((one.causes, one.kind))
+        best = self.ranked()[0].score
+        for labels, numbers, predicted in self._additions(one):
+            worth = predicted > best - WINDOW or not one.causes
+            if worth and labels not in self._tried and len(self._tried) < MOST_SETS:
+                self.weigh(labels, numbers, one.point)
+        for label in one.causes if len(one.causes) > 1 else ():
+            labels = tuple(n for n in one.causes if n != label)
+            if labels not in self._tried:
+                self.weigh(labels, {n: one.found.numbers[n] for n in labels}, one.point)
+
+    def _additions(
+        self, one: Hypothesis
+    ) -> list[tuple[tuple[str, ...], dict[str, np.ndarray], float]]:
+        if len(one.causes) >= MOST_CAUSES or one.kind == INTERMITTENT:
+            return []
+        candidates = [
+            c for c in self.catalogue
+            if c.label not in one.causes and all(c.beside(label) for label in one.causes)
+        ]  # fmt: skip
+        self.trial.remainder = one.remainder
+        base, found = self.trial.scan(one.point, candidates, one.causes, one.found.louder)
+        if not one.causes and one.kind == NOMINAL:
+            self.alone |= {f.name: f.evidence for f in found}
+            self.told = {f.name: f.told for f in found}
+        said = []
+        for f in found:
+            if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
+                continue
+            labels = tuple(sorted((*one.causes, f.name)))
+            numbers = {**one.found.numbers, **f.numbers}
+            said.append((labels, numbers, self._score(base.evidence + f.evidence, labels, one.kind)))
+        return said[:CONTENDERS]
+
+    # --- one set of causes ---
+
+    def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], near: Point) -> None:
+        """A set of causes under every remainder, linearised where it is likeliest."""
+        self._tried.add(labels)
+        trial = self.trial
+        trial.remainder = Remainder(RAISED)
+        point = near
+        if labels:
+            lowest = self.nothing.evidence - FALLS
+            path = near.path if isinstance(near, Point) else near
+            point, base = settle(trial, labels, numbers, path, lowest=lowest)
+            if not math.isfinite(base.evidence):
+                return
+        levels = trial.levels(point, labels)
+        for kind in (NOMINAL, RAISED):
+            self._keep(point, labels, Remainder(kind), self._best(levels, kind))
+        if len(labels) == 1:
+            gained = self.found[labels, NOMINAL].evidence - self.nothing.evidence
+            self.alone[labels[0]] = max(gained, self.alone.get(labels[0], -math.inf))
+        best = max((self.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
+        for family in trial.families:
+            self._change(point, labels, levels, family, best)
+        if max(level.louder for level in levels if level is self._best(levels, RAISED)) > RAISED_FROM:
+            self._pulses(point, labels)
+
+    def _best(self, levels: Sequence[Level], kind: str) -> Level:
+        """Of levels made under RAISED the best under a kind of remainder."""
+        trial = self.trial
+
+        def under(level: Level) -> Level:
+            more = trial.expected(level.louder, kind) - trial.expected(level.louder, RAISED)
+            return replace(level, value=level.value + more)
+
+        if kind == RAISED:
+            return max(levels, key=lambda level: level.value)
+        return max(map(under, levels), key=lambda level: level.value)
+
+    def _change(
+        self, point: Point, labels: tuple[str, ...], levels: Sequence[Level], family: str,
+        plain: Hypothesis,
+    ) -> None:  # fmt: skip
+        """The set with a change of one family beside it; linearised again where that leads."""
+        trial = self.trial
+        tried = []
+        for level in levels:
+            gained, size = trial.changed(point, level, labels, family)
+            more = trial.expected(level.louder, NOMINAL) - trial.expected(level.louder, RAISED)
+            tried.append((level.value + more + gained, size, level.louder))
+        value, size, noise = max(tried)
+        remainder = Remainder(family, size)
+        if self._score(value, labels, family) < plain.score:
+            # far behind: its numbers are never asked for
+            self._put(labels, remainder, value, point, replace(plain.found, evidence=value))
+            return
+        trial.remainder = remainder
+        if labels:
+            start = trial.scan(point, (), labels, noise)[0].numbers
+            again, base = settle(trial, labels, start, point.path)
+            if math.isfinite(base.evidence) and base.evidence > value:
+                self._put(labels, remainder, base.evidence, again, base)
+                return
+        base, _ = trial.scan(point, (), labels, noise)
+        self._put(labels, remainder, max(value, base.evidence), point, base)
+
+    def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
+        """An intermittent side force instead of raised process noise."""
+        raised = self.found[labels, RAISED]
+        tried = self.trial.intermittent(point, raised.found)
+        value = raised.evidence + max(tried.gain, 0.0)
+        self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
+
+    def _keep(
+        self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level
+    ) -> None:
+        numbers, covariance = self.trial._numbers(level, point, labels)
+        found = Found("+".join(labels), level.value, level.louder, numbers, covariance)
+        self._put(labels, remainder, level.value, point, found)
+
+    def _put(self, labels, remainder, value, point, found, pulses=None) -> None:
+        score = self._score(value, labels, remainder.kind)
+        key = labels, remainder.kind
+        if key not in self.found or self.found[key].score < score:
+            self.found[key] = Hypothesis(labels, remainder, value, score, point, found, pulses)
+
+    def _score(self, evidence: float, labels: Sequence[str], kind: str) -> float:
+        misfit = sum(self.placebo.get(n, 0.0) for n in labels) + self.placebo.get(kind, 0.0)
+        return evidence + self.priors.of(labels, kind) - misfit - form_error(self.alone, labels)
