@@ -172,13 +172,15 @@ class Extension:
         by = {c.label: c for c in (*CATALOGUE, *own)}
         causes, numbers, covariance, at = [], {}, {}, 0
         for entry in told["causes"]:
-            if entry["label"] not in by:
+            # of one unit of the ship, the catalogue has the cause without the unit's name
+            kind = by.get(entry["label"], by.get(entry["name"]))
+            if kind is None:
                 raise RunError(
                     f"The run was extended by {entry['label']!r}, which nobody knows here.",
                     hint="extend it again with the --cause file that defines it.",
                 )
             made = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["made"].items()}
-            cause = replace(by[entry["label"]], **made)
+            cause = replace(kind, **made)
             causes.append(cause)
             numbers[cause.label] = np.array(entry["numbers"])
             part = slice(at, at + cause.count)

@@ -126,11 +126,16 @@ def cause_json(named: Named, advice: Advice | None = None) -> dict:
     return content
 
 
+WHICH = ("channel", "actuator")  # what a cause's label has behind its colon
+
+
 def _which(named: Named) -> dict:
-    channel = getattr(named.cause, "channel", None)
-    if channel is None:
-        return {}
-    return {"channel": {"value": channel, "low": channel, "high": channel, "unit": ""}}
+    found = {key: getattr(named.cause, key, "") for key in WHICH}
+    return {
+        key: {"value": value, "low": value, "high": value, "unit": ""}
+        for key, value in found.items()
+        if value
+    }
 
 
 def equation(named: Named) -> str:
@@ -225,7 +230,8 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
             {"name": cause.name, "share": told.together(decision.least), "parameters": numbers}
         )
         if label != cause.name:
-            found[-1]["channel"] = label.partition(":")[2]
+            key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
+            found[-1][key] = label.partition(":")[2]
     return tuple(sorted(found, key=lambda one: one["share"]))
 
 

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from shiplog import causes as catalogue
 from shiplog import profile as profiles
 from shiplog.causes import CATALOGUE, Setting
 from shiplog.causes.environment import Current, WindForce
@@ -668,7 +669,7 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
 MISSING = {
     "wind_force": "wind", "wind_direction_offset": "wind", "wind_speed_scale": "wind",
     "clock_offset:wind": "wind", "clock_offset:yaw_rate": "yaw rate", "bank": "bank",
-    "rudder_force": "rudder",
+    "rudder_force": "rudder", "yaw_rate_bias": "yaw rate", "yaw_rate_scale": "yaw rate",
 }  # fmt: skip
 
 
@@ -688,6 +689,217 @@ def test_a_ship_without_screw_has_no_thrust_to_lose():
     profile = SINGLE.model_copy(update={"actuators": SINGLE.actuators[:1]})
     for label in ("thrust_loss", "thrust_drift"):
         assert "screw" in (BY[label].missing(setting(profile)) or "")
+
+
+# --- every cause that is called testable changes something ----------------------------------------
+
+
+def of_its_size(profile: Profile) -> Setting:
+    """As `trial.setting_of` makes it, of a ship that goes two thirds of its length in 10 s."""
+    ship, main, _ = mmg.geometry_of(profile)
+    scale = {"speed": 0.2 * main.length / 3.0, "length": main.length, "mass": main.mass,
+             "moment": main.mass * main.length}  # fmt: skip
+    return Setting(profile, scale, PLACES * main.length / 3.0, 8.0 * main.length / 3.0,
+                   parts=ship.parts)  # fmt: skip
+
+
+def driven_hard(profile: Profile, scale) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Random states at about the ship's speed, actuators up to their limits, a fresh wind."""
+    rng = np.random.default_rng(5)
+    count, speed, length = 60, scale["speed"], scale["length"]
+    size = np.array((7.0 * length, speed, 7.0 * length, 0.4 * speed, 3.0, 0.4 * speed / length))
+    state = size * rng.uniform(-1.0, 1.0, (count, 6))
+    full = {"rudder": 0.6, "azimuth": 3.0, "propeller": 10.0, "thruster": 1.0}
+    top = {t.column: t.full for t in mmg.geometry_of(profile)[0].thrusters}
+    each = [top.get(i, full[a.kind]) for i, a in enumerate(profile.actuators)]
+    actuator = np.append(each, 1.0) * rng.uniform(-1.0, 1.0, (count, len(each) + 1))
+    return state, np.abs(actuator), rng.uniform(-6.0, 6.0, (count, 2))
+
+
+def reading(profile: Profile) -> Record:
+    """Ten seconds in which all moves and turns."""
+    rng = np.random.default_rng(6)
+    rows = 100
+    return Record(
+        profile=profile, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
+        share=np.zeros(rows), starts=np.arange(rows) == 0, seen=np.ones(rows, bool),
+        state=rng.standard_normal((rows, 6)).cumsum(0),
+        actuator=rng.standard_normal((rows, len(profile.actuators))).cumsum(0),
+        wind=rng.standard_normal((rows, 2)),
+    )  # fmt: skip
+
+
+SHIPPED = pytest.mark.parametrize("name", profiles.shipped())
+
+
+def inert(cause, profile: Profile, at: Setting) -> bool:
+    """Whether its realistic numbers change neither the record nor the accelerations by more than
+    a thousandth of what the ship has."""
+    numbers = cause.sizes(at)
+    before = reading(profile)
+    after = cause.read(before, numbers)
+    if any(not np.allclose(getattr(after, n), getattr(before, n), atol=1e-9) for n in CHANGED):
+        return False
+    ship, main, _ = mmg.geometry_of(profile)
+    values = mmg.estimated(ship, main).values
+    model = Extended(mmg.MMG(ship), (cause,), mmg.MMG(ship), values, cause.constants(at))
+    batch = driven_hard(profile, at.scale)
+    plain = acceleration(model, values, np.zeros(cause.count), *batch)
+    changed = acceleration(model, values, numbers, *batch)
+    assert np.isfinite(changed).all()
+    return bool((np.abs(changed - plain) < 1e-3 * np.abs(plain).max(0)).all())
+
+
+@SHIPPED
+def test_no_cause_that_is_called_testable_is_inert(name):
+    profile = profiles.load(name)
+    at = of_its_size(profile)
+    chosen, untested = catalogue.testable(at)
+    labels = [cause.label for cause in chosen]
+    assert len(labels) == len(set(labels)) and not set(labels) & set(untested)
+    assert {label.partition(":")[0] for label in (*labels, *untested)} == {
+        cause.name for cause in CATALOGUE
+    }
+    assert [cause.label for cause in chosen if inert(cause, profile, at)] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [
+        ("esso-vectwin", []),
+        ("kvlcc2", []),
+        ("blueboat", ["thruster_port", "thruster_starboard"]),
+        ("milliampere", [f"thruster_{i}" for i in range(1, 5)]),
+    ],
+)
+def test_of_several_units_each_can_lose_its_thrust(name, units):
+    labels = [c.label for c in catalogue.testable(of_its_size(profiles.load(name)))[0]]
+    found = [label for label in labels if label.startswith("thrust_loss")]
+    assert found == ["thrust_loss", *(f"thrust_loss:{unit}" for unit in units)]
+
+
+def test_what_the_model_leaves_out_cannot_be_tested():
+    """Trained with `--without rudder`, it has no rudder force to scale and none to turn."""
+    plain = of_its_size(TWIN)
+    without = replace(plain, parts=tuple(p for p in plain.parts if p != "rudder"))
+    untested = catalogue.testable(without)[1]
+    for label in ("rudder_force", "rudder_offset", "rudder_lag", "rudder_delay"):
+        assert label not in catalogue.testable(plain)[1]
+        assert untested[label] == "the ship has no rudder"
+    bare = catalogue.testable(replace(plain, parts=("hull",)))[1]
+    assert "screw" in bare["thrust_loss"] and "screw" in bare["thrust_drift"]
+
+
+def test_fitted_to_the_voyages_in_question_a_model_has_absorbed_its_coefficients():
+    at = of_its_size(profiles.load("blueboat"))
+    for fitted, word in (("physics", None), ("network", "network")):
+        chosen, untested = catalogue.testable(at, fitted=fitted)
+        assert "absorbs" in untested["thrust_loss"] and "absorbs" in untested["fouling"]
+        assert "absorbs" in untested["thrust_loss:thruster_port"]
+        assert "current" in {c.label for c in chosen}
+        assert (word or "") in untested.get("antenna_offset", "")
+
+
+# --- thrust lost ----------------------------------------------------------------------------------
+
+TWO_SCREWS = TWIN.model_copy(  # a pair instead of the one on the centreline
+    update={
+        "actuators": (
+            *TWIN.actuators[:2],
+            *(
+                TWIN.actuators[2].model_copy(
+                    update={"name": f"screw_{side}", "position_m": (-1.4, across)}
+                )
+                for side, across in (("port", -0.09), ("starboard", 0.09))
+            ),
+        )
+    }
+)
+
+
+def parts_of(profile: Profile, c, actuator) -> dict[str, np.ndarray]:
+    ship, _, _ = mmg.geometry_of(profile)
+    state = jnp.asarray([0.0, 0.4, 0.0, 0.02, 0.3, 0.01])
+    found = mmg.MMG(ship).forces_of(c, state, jnp.asarray(actuator), jnp.zeros(2))
+    return {part: np.asarray(force) for part, force in found.items()}
+
+
+def plain_coefficients(profile: Profile) -> dict[str, float]:
+    ship, main, _ = mmg.geometry_of(profile)
+    p = mmg.estimated(ship, main)
+    return dict(zip(p.names, p.values.tolist(), strict=True))
+
+
+def test_one_thruster_of_four_loses_its_own_thrust_alone():
+    """Each alone running: 0.7 of its force if it is the one, all of it if not."""
+    c = plain_coefficients(FERRY)
+    weaker = replace(BY["thrust_loss"], actuator="thruster_2").coefficients(c, (-0.3,), 0, 0, {})
+    together = BY["thrust_loss"].coefficients(c, (-0.3,), 0, 0, {})
+    for i, a in enumerate(FERRY.actuators):
+        if a.kind != "thruster":
+            continue
+        for command in (15.0, -15.0):
+            running = np.where(np.arange(len(FERRY.actuators)) == i, command, 0.2)
+            running[
+                [j for j, b in enumerate(FERRY.actuators) if b.kind == "thruster" and j != i]
+            ] = 0
+            before = parts_of(FERRY, c, running)["thruster"]
+            assert np.abs(before[:2]).max() > 10.0
+            share = 0.7 if a.name == "thruster_2" else 1.0
+            assert parts_of(FERRY, weaker, running)["thruster"] == pytest.approx(share * before)
+            assert parts_of(FERRY, together, running)["thruster"] == pytest.approx(0.7 * before)
+
+
+def test_one_screw_of_two_loses_its_own_thrust_alone():
+    """The screws' coefficients are one set: at rest the pair's thrust falls by half of the loss,
+    and the yaw moment is that of what the one screw lacks."""
+    c = plain_coefficients(TWO_SCREWS)
+    weaker = replace(BY["thrust_loss"], actuator="screw_port").coefficients(c, (-0.3,), 0, 0, {})
+    rest = {"state": jnp.zeros(6)}
+    ship, _, _ = mmg.geometry_of(TWO_SCREWS)
+
+    def thrust(p, port, starboard):
+        orders = jnp.asarray([0.0, 0.0, port, starboard])
+        return np.asarray(
+            mmg.MMG(ship).forces_of(p, rest["state"], orders, jnp.zeros(2))["propeller"]
+        )
+
+    one = thrust(c, 8.0, 0.0)[0]
+    assert one > 0.0
+    assert thrust(weaker, 8.0, 0.0)[0] == pytest.approx(0.7 * one)
+    assert thrust(weaker, 0.0, 8.0) == pytest.approx(thrust(c, 0.0, 8.0))
+    assert thrust(weaker, 8.0, 8.0)[0] == pytest.approx(1.7 * one)
+    # 0.3 of the port screw's thrust is missing 0.09 m to port: the bow goes to port
+    lost = thrust(weaker, 8.0, 8.0)[2] - thrust(c, 8.0, 8.0)[2]
+    assert lost == pytest.approx(-0.3 * one * 0.09)
+    both = replace(BY["thrust_loss"], actuator="screw_starboard").coefficients(
+        weaker, (-0.3,), 0, 0, {}
+    )
+    assert thrust(both, 8.0, -8.0) == pytest.approx(
+        thrust(BY["thrust_loss"].coefficients(c, (-0.3,), 0, 0, {}), 8.0, -8.0)
+    )
+
+
+def test_thrust_that_drifts_drifts_on_thrusters_too():
+    c = plain_coefficients(FERRY)
+    at_end = BY["thrust_drift"].coefficients(c, (-0.2,), 0, 1.0, {})
+    halfway = BY["thrust_drift"].coefficients(c, (-0.2,), 0, 0.5, {})
+    running = np.full(len(FERRY.actuators), 10.0)
+    before = parts_of(FERRY, c, running)["thruster"]
+    assert parts_of(FERRY, at_end, running)["thruster"] == pytest.approx(0.8 * before)
+    assert parts_of(FERRY, halfway, running)["thruster"] == pytest.approx(0.9 * before)
+
+
+def test_a_lost_units_words_name_it():
+    one = replace(BY["thrust_loss"], actuator="bow_1")
+    told = one.told(np.array([-0.25]), np.diag([1e-6]))
+    assert (one.name, one.label) == ("thrust_loss", "thrust_loss:bow_1")
+    assert one.sentence(told) == "The thrust of bow_1 is 0.75 times the model's."
+    assert set(told) == {"factor"}
+    assert one.beside("thrust_loss:bow_2") and one.beside("fouling")
+    assert not one.beside("thrust_loss") and not one.beside("thrust_loss:bow_1")
+    assert not BY["thrust_loss"].beside("thrust_loss:bow_1")
+    assert BY["thrust_loss"].beside("thrust_drift")
 
 
 def test_a_ship_that_stays_has_no_map_of_the_bottom():

@@ -3,6 +3,8 @@ file of your own, given with --cause), and a line in CATALOGUE."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from shiplog.causes.base import Cause, Parameter, Setting, Shown, constants_of, si
 from shiplog.causes.environment import Bank, Current, ShallowWater, WindForce
 from shiplog.causes.sensors import (
@@ -36,4 +38,42 @@ CATALOGUE: tuple[Cause, ...] = (
     AntennaOffset(), WindDirectionOffset(), WindSpeedScale(),
 )  # fmt: skip
 
-__all__ = ["CATALOGUE", "Cause", "Parameter", "Setting", "Shown", "constants_of", "si"]
+
+def testable(
+    setting: Setting, causes: Iterable[Cause] = CATALOGUE, fitted: str = ""
+) -> tuple[list[Cause], dict[str, str]]:
+    """Causes that can be tested on this ship, and label → why not of the others.
+
+    The first list has every cause as this ship has it, in the catalogue's order; a cause of one of
+    several units stands there once for each unit.
+
+    fitted   what was fitted to the very voyages in question, because no nominal campaign was there
+             before: "physics", "network", or "" for neither
+    """
+    chosen: list[Cause] = []
+    untested: dict[str, str] = {}
+    for cause in causes:
+        missing = cause.missing(setting)
+        if missing is not None:
+            untested[cause.label] = missing
+            continue
+        for one in cause.each(setting):
+            if fitted and one.absorbed:
+                untested[one.label] = "a model fitted to these voyages absorbs it"
+            elif fitted == "network" and one.renames:
+                untested[one.label] = "a network fitted to these voyages takes it in"
+            else:
+                chosen.append(one)
+    return chosen, untested
+
+
+__all__ = [
+    "CATALOGUE",
+    "Cause",
+    "Parameter",
+    "Setting",
+    "Shown",
+    "constants_of",
+    "si",
+    "testable",
+]

@@ -9,7 +9,7 @@ the model as it was, exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -48,6 +48,7 @@ class Setting:
             "moment", their product
     places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
     lacking coefficients of the forces that the model has not, as they are of such a ship
+    parts   forces that the model has (mmg.PARTS); None for all that the profile can have
     """
 
     profile: Profile
@@ -55,6 +56,14 @@ class Setting:
     places: np.ndarray
     spacing: float
     lacking: Mapping[str, float] = field(default_factory=dict)
+    parts: tuple[str, ...] | None = None
+
+    def columns(self, *kinds: str) -> list[int]:
+        """Columns of the actuators of these kinds, whose force the model has."""
+        off = () if self.parts is None else {"rudder", "propeller", "thruster"} - {*self.parts}
+        return [
+            i for i, a in enumerate(self.profile.actuators) if a.kind in kinds and a.kind not in off
+        ]
 
     def prior(self, parameter: Parameter) -> float:
         return parameter.prior * self.scale.get(parameter.of, 1.0)
@@ -65,6 +74,29 @@ class Setting:
     def bounds(self, parameter: Parameter) -> tuple[float, float]:
         by = self.scale.get(parameter.of, 1.0)
         return parameter.low * by, parameter.high * by
+
+
+def _unless(met: Callable[[Setting], bool], reason: str) -> Callable[[Setting], str | None]:
+    return lambda setting: None if met(setting) else reason
+
+
+# What a cause can need of ship and place, and why it cannot be tested where that is not there.
+NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
+    "yaw rate": _unless(
+        lambda s: s.profile.sensors.yaw_rate is not None, "no yaw rate is recorded"
+    ),
+    "wind": _unless(lambda s: s.profile.has_wind, "no wind is recorded"),
+    "wind force": _unless(lambda s: not s.lacking, "the model feels no wind"),
+    "rudder": _unless(lambda s: bool(s.columns("rudder")), "the ship has no rudder"),
+    "steering": _unless(
+        lambda s: bool(s.columns("rudder")) or bool(s.columns("thruster") and s.columns("azimuth")),
+        "the ship has no rudder",
+    ),
+    "thrust": _unless(
+        lambda s: bool(s.columns("propeller", "thruster")), "the ship has no screw or thruster"
+    ),
+    "bank": _unless(lambda s: bool(s.profile.site.banks), "the profile's [site] shows no bank"),
+}
 
 
 @dataclass(frozen=True)
@@ -89,6 +121,7 @@ class Cause:
     story: ClassVar[str]
     equation: ClassVar[str]  # what it adds to the equations of motion or of the instruments
     parameters: ClassVar[tuple[Parameter, ...]]
+    needs: ClassVar[tuple[str, ...]] = ()  # words of NEEDS, without which it cannot be tested
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
@@ -136,13 +169,17 @@ class Cause:
         """The cause as this ship has it: one rudder has one offset, two have two."""
         return self
 
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        """The cause as this ship has it, once for each unit of which it is tested on its own."""
+        return (self.on(setting),)
+
     def beside(self, label: str) -> bool:
         """Whether it may stand beside a cause that is named already."""
         return label != self.label
 
     def missing(self, setting: Setting) -> str | None:
         """Why it cannot be tested on this ship; None where it can."""
-        return None
+        return next((why for need in self.needs if (why := NEEDS[need](setting))), None)
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         """Numbers that the force needs and nobody fits."""

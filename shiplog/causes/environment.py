@@ -54,6 +54,7 @@ class WindForce(Cause):
 
     name = "wind_force"
     kind = "environment"
+    needs = ("wind",)
     story = "The wind pushes otherwise than the model has it."
     equation = "X_A·{surge_factor:.2f}, Y_A·{sway_factor:.2f}, N_A·{yaw_factor:.2f}"
     parameters = (
@@ -72,9 +73,6 @@ class WindForce(Cause):
 
     def on(self, setting: Setting) -> WindForce:
         return WindForce(tuple(n for n in setting.lacking if n.startswith("wind.")))
-
-    def missing(self, setting: Setting) -> str | None:
-        return None if setting.profile.has_wind else "no wind is recorded"
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         values = [setting.lacking[name] for name in self.lacking]
@@ -176,16 +174,12 @@ class Bank(Cause):
 
     name = "bank"
     kind = "environment"
+    needs = ("bank",)
     story = "A bank draws the ship in."
     equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/L/3)³), N bow out"
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
     rough = True
     separated_by = {"shallow_water": "the same run farther from the bank"}
-
-    def missing(self, setting: Setting) -> str | None:
-        if not setting.profile.site.banks:
-            return "the profile's [site] shows no bank"
-        return None
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         lines = [[*a, *b] for line in setting.profile.site.banks for a, b in pairwise(line)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.causes.base import Cause, Parameter, Shown
 from shiplog.record import Record, reduced
 
 
@@ -58,6 +58,7 @@ class HeadingOffset(Cause):
 class YawRateBias(Cause):
     name = "yaw_rate_bias"
     kind = "sensor"
+    needs = ("yaw rate",)
     story = "The gyro shows a turn where there is none."
     equation = "r_measured = r {value:+.3f} deg/s"
     parameters = (Parameter("value", "deg/s", np.radians(0.3), np.radians(0.01)),)
@@ -75,6 +76,7 @@ class YawRateBias(Cause):
 class YawRateScale(Cause):
     name = "yaw_rate_scale"
     kind = "sensor"
+    needs = ("yaw rate",)
     story = "The gyro shows more or less than the ship turns."
     equation = "r_measured = {value:.3f} r"
     parameters = (Parameter("value", "1", 0.065, 0.003, low=-0.9),)
@@ -126,12 +128,9 @@ class ClockOffset(Cause):
             return label != self.label and label not in both
         return label != self.label and not (self.label in both and label == f"{self.name}:gnss")
 
-    def missing(self, setting: Setting) -> str | None:
-        if self.channel == "wind":
-            return unfelt_wind(setting)
-        if self.channel == "yaw_rate" and setting.profile.sensors.yaw_rate is None:
-            return "no yaw rate is recorded"
-        return None
+    @property
+    def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return {"wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",)}.get(self.channel, ())
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         late = float(p[0])
@@ -186,17 +185,11 @@ class AntennaOffset(Cause):
         )
 
 
-def unfelt_wind(setting: Setting) -> str | None:
-    """Why nothing can be said of the wind's instrument."""
-    if not setting.profile.has_wind:
-        return "no wind is recorded"
-    return "the model feels no wind" if setting.lacking else None
-
-
 @dataclass(frozen=True)
 class WindDirectionOffset(Cause):
     name = "wind_direction_offset"
     kind = "sensor"
+    needs = ("wind", "wind force")
     story = "The anemometer is turned on its mast."
     equation = "γ_measured = γ_A {angle:+.1f} deg"
     parameters = (Parameter("angle", "deg", np.radians(15.0), np.radians(1.5)),)
@@ -205,9 +198,6 @@ class WindDirectionOffset(Cause):
     @property
     def renames(self) -> bool:
         return True
-
-    def missing(self, setting: Setting) -> str | None:
-        return unfelt_wind(setting)
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         c, s = np.cos(p[0]), np.sin(p[0])
@@ -223,6 +213,7 @@ class WindDirectionOffset(Cause):
 class WindSpeedScale(Cause):
     name = "wind_speed_scale"
     kind = "sensor"
+    needs = ("wind", "wind force")
     story = "The anemometer shows more or less than blows."
     equation = "U_measured = {value:.2f} U_A"
     parameters = (Parameter("value", "1", 0.22, 0.02, low=-0.9),)
@@ -231,9 +222,6 @@ class WindSpeedScale(Cause):
     @property
     def absorbed(self) -> bool:
         return True
-
-    def missing(self, setting: Setting) -> str | None:
-        return unfelt_wind(setting)
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         return replace(record, wind=record.wind / (1.0 + p[0]))

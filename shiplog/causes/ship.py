@@ -13,8 +13,24 @@ from shiplog.causes.base import Cause, Parameter, Setting, Shown
 from shiplog.profile import Profile
 from shiplog.record import Record
 
-THRUST = ("propeller.k0", "propeller.k1", "propeller.k2", "propeller.c3", "propeller.c6",
-          "propeller.c7", "thruster.ahead", "thruster.astern")  # fmt: skip
+K_T = ("k0", "k1", "k2", "c3", "c6", "c7")  # a screw's thrust is their sum of products
+
+
+def _thrust(c: dict, factor: Any, unit: str = "") -> dict:
+    """Coefficients with the thrust of all screws and thrusters, or of one unit, times a factor.
+
+    Thrusters have coefficients of their own. Screws share one set: "propeller.<name>.factor" says
+    how many times that thrust one of them has (`models.mmg.model`).
+    """
+    if unit and f"thruster.{unit}_ahead" not in c:
+        name = f"propeller.{unit}.factor"
+        return c | {name: c.get(name, 1.0) * factor} if "propeller.k0" in c else c
+    found = [f"thruster.{unit}_{way}" for way in ("ahead", "astern")] if unit else [
+        name for name in c
+        if name in {f"propeller.{key}" for key in K_T}
+        or (name.startswith("thruster.") and name.endswith(("_ahead", "_astern")))
+    ]  # fmt: skip
+    return _times(c, tuple(found), factor)
 
 
 def _times(c: dict, names: tuple[str, ...], factor: Any) -> dict:
@@ -82,63 +98,87 @@ class CrossFlowDrag(_Factor):
 @dataclass(frozen=True)
 class RudderForce(_Factor):
     name = "rudder_force"
+    needs = ("rudder",)
     story = "The rudders are stronger or weaker than the model has them."
     equation = "F_N, F_T·{factor:.2f}"
     scaled = ("rudder.f_alpha", "rudder.f_t")
     parameters = (Parameter("factor", "1", 0.2, 0.02, low=-1.0),)
     separated_by = {"thrust_loss": "steady speed on a straight course, rudders amidships"}
 
-    def missing(self, setting: Setting) -> str | None:
-        return None if _columns(setting.profile, "rudder") else "the ship has no rudder"
-
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The rudders' force is {shown['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
-class ThrustLoss(_Factor):
+class ThrustLoss(Cause):
+    """Of all screws and thrusters together, or of one of several.
+
+    actuator   the profile's name of the unit; empty for all
+    """
+
+    actuator: str = ""
+
     name = "thrust_loss"
+    kind = "ship"
+    needs = ("thrust",)
     story = "The screw pushes less than it did."
     equation = "K_T·{factor:.2f}"
-    scaled = THRUST
     parameters = (Parameter("factor", "1", 0.2, 0.02, low=-1.0),)
     separated_by = {
         "fouling": "bollard pull (high revolutions at rest) against coasting (screw stopped)",
         "payload": "step of the screw from rest (inertia) against steady speed",
         "thrust_drift": "the same run at the beginning and at the end",
+        "thrust_loss": "the same step by one unit after the other, the others stopped",
     }
 
-    def missing(self, setting: Setting) -> str | None:
-        return None if _screws(setting.profile) else "the ship has no screw or thruster"
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self.actuator}" if self.actuator else self.name
+
+    @property
+    def absorbed(self) -> bool:
+        return True
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        """All together, and where there are several units each of them."""
+        units = setting.columns("propeller", "thruster")
+        names = [setting.profile.actuators[i].name for i in units] if len(units) > 1 else []
+        return (replace(self, actuator=""), *(replace(self, actuator=name) for name in names))
+
+    def beside(self, label: str) -> bool:
+        """All together says what each unit says, and does not stand beside one."""
+        same = label.partition(":")[0] == self.name
+        return not same or (bool(self.actuator) and ":" in label and label != self.label)
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _thrust(c, 1.0 + p[0], self.actuator)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"factor": (1.0 + p[..., 0], "1")}
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The thrust is {shown['factor'].value:.2f} times the model's."
+        whose = f"thrust of {self.actuator}" if self.actuator else "thrust"
+        return f"The {whose} is {shown['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
 class ThrustDrift(Cause):
     name = "thrust_drift"
     kind = "ship"
+    needs = ("thrust",)
     story = "The screw pushes less from voyage to voyage."
     equation = "K_T·(1 {slope:+.2f} · share of the campaign)"
     parameters = (Parameter("slope", "1", 0.25, 0.025, low=-1.0),)
     separated_by = {"thrust_loss": "the same run at the beginning and at the end"}
 
-    def missing(self, setting: Setting) -> str | None:
-        return None if _screws(setting.profile) else "the ship has no screw or thruster"
-
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
-        return _times(c, THRUST, 1.0 + p[0] * share)
+        return _thrust(c, 1.0 + p[0] * share)
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return (
             f"The thrust changes by {100.0 * shown['slope'].value:+.0f} % from the beginning of "
             "the campaign to its end."
         )
-
-
-def _screws(profile: Profile) -> list[int]:
-    return _columns(profile, "propeller") + _columns(profile, "thruster")
 
 
 @dataclass(frozen=True)
@@ -193,13 +233,11 @@ class _OnRudders(Cause):
     what: str = field(default="rudders", kw_only=True)
 
     kind = "ship"
+    needs = ("steering",)
 
     def on(self, setting: Setting) -> Cause:
         rudders = _columns(setting.profile, "rudder")
         return replace(self, what="rudders" if rudders else "azimuths")
-
-    def missing(self, setting: Setting) -> str | None:
-        return None if _steering(setting.profile) else "the ship has no rudder"
 
     def _with(self, record: Record, acting: np.ndarray) -> Record:
         actuator = record.actuator.copy()

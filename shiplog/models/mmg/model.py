@@ -95,10 +95,14 @@ def total(forces: Iterable[Array]) -> Array:
 def _screw(
     p: Mapping[str, Array], g: Geometry, screw, u: Array, v: Array, r: Array, actuator: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Force, 1 - w_P, K_T and n of one screw."""
+    """Force, 1 - w_P, K_T and n of one screw. "propeller.<name>.factor" may join p: how many times
+    the thrust that the coefficients say this one of several screws has."""
     n = actuator[..., screw.column]
     arriving = propeller.inflow(p, g, screw, u, v, r)
     k_t, effective = propeller.thrust_coefficient(p, screw, u, arriving, n)
+    factor = p.get(f"propeller.{screw.name}.factor")
+    if factor is not None:
+        k_t, effective = factor * k_t, factor * effective
     return propeller.propeller(p, g, screw, u, n, effective), arriving, k_t, n
 
 
