@@ -57,7 +57,9 @@ class Comparison:
 
 
 def compare(name: str, truth: Values, said: Values) -> Comparison:
-    """The error is that of the vector: |said - true| over |true - none|."""
+    """The error is that of the vector: |said - true| over |true - none|. What a key says in words,
+    such as which unit has lost thrust, is no number and is left out."""
+    truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
     if not any(parameter in said for parameter in truth):
         return Comparison(None, ())
     if name in OTHER_FORM:  # only what both of them have
@@ -137,7 +139,7 @@ def _intervals(name: str, truth: Values, said: Values) -> Iterator[tuple[bool, f
         if not isinstance(interval, Mapping) or parameter == "channel":
             continue
         low, high, true = interval.get("low"), interval.get("high"), one["value"]
-        if low is None or high is None or not isinstance(true, int | float):
+        if low is None or high is None:
             continue
         value = _value(said, parameter, 0.5 * (low + high))
         # 359 to 361 deg contains 0, 360 and 1
@@ -157,6 +159,10 @@ def _standing(away: float, below: float, above: float) -> float:
     if width <= 0.0:
         return math.copysign(math.inf, away) if away else 0.0
     return Z_90 * away / width
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)
 
 
 def _value(parameters: Values, name: str, otherwise: Any) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]  # `python -m pipelines...` finds this source and no other
 SOURCE = ("shiplog", "pipelines", "pyproject.toml")  # changes elsewhere change no answer
+ANSWERING = ("diagnose", "rivals", "former")  # steps whose program a figure belongs to
 SHORT = 12  # characters of a commit that a page shows
 UNRECORDED = "no commit recorded"
 
@@ -39,6 +40,11 @@ def name(step: Mapping[str, Any]) -> str:
     if not step.get("commit"):
         return UNRECORDED
     return str(step["commit"])[:SHORT] + ("+changes" if step.get("dirty") else "")
+
+
+def of_answers(steps: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """The programs that answered a case; of one that failed before, that of its last step."""
+    return names(steps, ANSWERING) or tuple(name(step) for step in steps[-1:]) or (UNRECORDED,)
 
 
 def names(steps: Iterable[Mapping[str, Any]], among: Sequence[str]) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def replay(source: Path, out: Path, settings: Settings) -> Plan:
     def again(planned: Planned) -> str | None:
         return _case(source, out, planned, settings)
 
-    todo = [[one] for one in plan.cases if _left(out, one, settings)]
+    todo = [[one] for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
     run.in_turn(todo, again, settings.jobs)
     return plan
 

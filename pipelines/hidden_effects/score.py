@@ -117,7 +117,7 @@ class Answer:
 
     @cached_property
     def hidden(self) -> tuple[str, ...]:
-        return tuple(cause["name"] for cause in self.key["causes"])
+        return tuple(_name(cause["name"]) for cause in self.key["causes"])
 
     @cached_property
     def named(self) -> tuple[str, ...]:
@@ -223,11 +223,9 @@ class Answer:
         """Hidden causes that were named, whatever else was."""
         said = {_name(cause["name"]): cause for cause in reversed(self.said)}  # the first counts
         return {
-            one["name"]: parameters.compare(
-                one["name"], one["parameters"], said[one["name"]].get("parameters") or {}
-            )
-            for one in self.key["causes"]
-            if one["name"] in self.named
+            name: parameters.compare(name, one["parameters"], said[name].get("parameters") or {})
+            for name, one in zip(self.hidden, self.key["causes"], strict=True)
+            if name in self.named
         }
 
     @property

@@ -106,10 +106,15 @@ def _in_turn(
     outside: Sequence[str],
 ) -> list[str]:  # fmt: skip
     """What this row hides on this family, in an order drawn once; all of it before any twice."""
-    if rule == "two":
-        names = [f"{a}+{b}" for i, a in enumerate(offered) for b in offered[i + 1 :]]
+    if rule == "outside":  # where a family cannot hide all of them it says which
+        names = [name for name in outside if name in offered] or list(outside)
     else:
-        names = list(outside if rule == "outside" else offered)
+        names = [name for name in offered if name not in outside]
+    if rule == "two":  # `thrust_loss` and `thrust_loss:unit` are one name
+        names = [
+            f"{a}+{b}" for i, a in enumerate(names) for b in names[i + 1 :]
+            if a.partition(":")[0] != b.partition(":")[0]
+        ]  # fmt: skip
     drawn = np.random.default_rng([first, *f"{family} {rule} {size}".encode()])
     return [names[i] for i in drawn.permutation(len(names))]
 

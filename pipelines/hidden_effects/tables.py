@@ -7,6 +7,7 @@ import statistics
 from collections.abc import Sequence
 from itertools import chain
 
+from pipelines.hidden_effects import program
 from pipelines.hidden_effects.goals import (
     CALIBRATION,
     CERTAIN,
@@ -53,6 +54,11 @@ def text(score: Score) -> str:
     line += f"; {len(score.unmade)} whose logs could not be written" if score.unmade else ""
     if not score.answers:
         return f"{line}."
+    programs = dict.fromkeys(name for a in score.answers for name in program.of_answers(a.steps))
+    if len(programs) > 1:
+        line += (
+            f"; their answers are of several programs, {', '.join(programs)}, and so mean little"
+        )
     parts = [f"{line}.", report.table(HEAD, goals(score.answers)), per_cause(score.answers)]
     if any(answer.rivals for answer in score.answers):
         parts.append(methods(score.answers))
@@ -67,7 +73,7 @@ def goals(answers: Sequence[Answer]) -> list[Row]:
     away = bool(answers) and all(answer.abroad for answer in answers)
     rows = [row for rate in (*RATES, *NETWORK) if (row := _rate(rate, answers, away))]
     rows += [*_parameters(answers, away), *_gain(answers), *_calibration(answers, away)]
-    return rows + _times(answers)
+    return rows + times(answers)
 
 
 def _rate(rate: Rate, answers: Sequence[Answer], away: bool) -> Row | None:
@@ -142,7 +148,7 @@ def _calibration(answers: Sequence[Answer], away: bool) -> list[Row]:
     return rows
 
 
-def _times(answers: Sequence[Answer]) -> list[Row]:
+def times(answers: Sequence[Answer]) -> list[Row]:
     """Of diagnoses of whole trials that came to an end. CPU time is what one core would take."""
     rows: list[Row] = []
     for model, limit in (("mmg", 10.0), ("feedforward", 60.0)):

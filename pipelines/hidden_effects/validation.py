@@ -15,7 +15,6 @@ from pipelines.hidden_effects.score import FAILED, LEVEL, Answer, Score
 from shiplog import report
 from shiplog.exceptions import ShiplogError
 
-ANSWERING = ("diagnose", "rivals", "former")  # steps whose program a figure belongs to
 PLACES = ("home", "abroad")
 
 
@@ -71,6 +70,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         PARAMETERS,
         ranks.coverage_table(standing),
         ranks.rank_table(standing),
+        *(part for place, given in there.items() for part in _cost(place, given)),
     ]  # fmt: skip
     return Page("\n\n".join(parts), reliability.svg(beliefs))
 
@@ -88,7 +88,7 @@ PARAMETERS = (
 
 def one_program(answers: Sequence[Answer]) -> str:
     """The program of all verdicts. Raises Mixed where there are several."""
-    counts = Counter(name for answer in answers for name in _programs(answer))
+    counts = Counter(name for answer in answers for name in program.of_answers(answer.steps))
     if len(counts) > 1:
         said = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
         raise Mixed(
@@ -96,11 +96,6 @@ def one_program(answers: Sequence[Answer]) -> str:
             hint="replay the cases with one commit, or give the folders of one.",
         )
     return next(iter(counts))
-
-
-def _programs(answer: Answer) -> tuple[str, ...]:
-    """Of a case that failed before its diagnosis, that of its last step."""
-    return program.names(answer.steps, ANSWERING) or (program.name(answer.steps[-1]),)
 
 
 def _once(answers: Sequence[Answer]) -> None:
@@ -147,6 +142,11 @@ def _methods(place: str, given: Sequence[Answer]) -> list[str]:
         goals.by_method(by, place == "abroad"),
         scores.table(by),
     ]
+
+
+def _cost(place: str, given: Sequence[Answer]) -> list[str]:
+    rows = tables.times(given)
+    return [f"## Cost, {place}", report.table(tables.HEAD, rows)] if rows else []
 
 
 # --- misses ---------------------------------------------------------------------------------------
