@@ -146,8 +146,8 @@ def test_the_rows_of_the_goals_count_by_hand():
     assert found["outside, size 1: unknown or undecided, right family"] == pytest.approx(2 / 3)
     assert found["two at once, size 1: both, no third"] == 0.0
     assert found["traceback, or no verdict in time"] == pytest.approx(1 / 10)
-    # said with 0.9 and more: current (right), fouling, unknown outside (by word), bank of two
-    assert found[goals.CERTAIN] == pytest.approx(3 / 4)
+    # said with 0.9 and more: current and one of two (right), fouling, and another family
+    assert found[goals.CERTAIN] == pytest.approx(2 / 4)
     assert goals.cell([True, False]) == "50 % (1/2) [2.5, 97.5]"  # 1 - √0.95 = 2.5 %
 
 

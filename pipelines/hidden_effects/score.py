@@ -233,14 +233,17 @@ class Answer:
         """The probability of the answer given, and whether that is right.
 
         Of a named verdict its first cause; otherwise the first of the ranking, which may be a
-        cause, `none` or `unknown`. None where no probability was given.
+        cause, `none` or `unknown` with its family. None where no probability was given.
         """
         first = next(iter(self.said if self.named else self.verdict.get("ranking") or ()), {})
         if first.get("probability") is None:
             return None
-        name = _name(first["name"])
-        truths = ("unknown",) if self.kind == "outside" else self.sought or ("none",)
-        return float(first["probability"]), name in truths
+        name = first["name"]
+        if self.kind == "outside" and name == "unknown":
+            right = self.family == self.key["structure"]["family"]
+        else:
+            right = (name if name.startswith("unknown") else _name(name)) in self.truths
+        return float(first["probability"]), right
 
     @property
     def recovered(self) -> float | None:

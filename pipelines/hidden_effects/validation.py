@@ -76,7 +76,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
 
 
 INTERVAL = (
-    f"Shares with counts and, in brackets, their Clopper-Pearson interval in %, at {LEVEL:.0%}. "
+    f"Shares with counts and, in brackets, their Clopper-Pearson interval in %, at {100 * LEVEL:.0f} %. "
     "Home is the simulator's MMG ship; abroad are ships of other equations."
 )
 PARAMETERS = (
