@@ -1,7 +1,8 @@
 """Which program gave an answer: the commit of this source when a step began.
 
 A figure belongs to one program, so every step of a case records the commit, and whether the source
-had changes that no commit holds.
+had changes that no commit holds. A commit under way splits a test in two: run a long one from a
+checkout of its own.
 """
 
 from __future__ import annotations

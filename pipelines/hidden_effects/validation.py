@@ -76,8 +76,8 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
 
 
 INTERVAL = (
-    f"Shares with counts and, in brackets, their Clopper-Pearson interval in %, at {100 * LEVEL:.0f} %. "
-    "Home is the simulator's MMG ship; abroad are ships of other equations."
+    "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
+    f"at {100 * LEVEL:.0f} %. Home is the simulator's MMG ship; abroad are ships of other equations."
 )
 PARAMETERS = (
     "Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; "
