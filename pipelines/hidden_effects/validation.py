@@ -77,7 +77,8 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
 
 INTERVAL = (
     "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
-    f"at {100 * LEVEL:.0f} %. Home is the simulator's MMG ship; abroad are ships of other equations."
+    f"at {100 * LEVEL:.0f} %. Home is the simulator's MMG ship; abroad are ships of other "
+    "equations."
 )
 PARAMETERS = (
     "Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; "
