@@ -123,10 +123,10 @@ def _simulator() -> tuple[Callable[[str], tuple[str, ...]], tuple[str, ...]]:
     """Family → causes that it can hide, and what it can hide that is in no catalogue."""
     try:
         simulator = import_module("pipelines.experiments.other_families")
-    except ImportError as error:
+        return simulator.offered, tuple(simulator.OUTSIDE)
+    except (ImportError, AttributeError) as error:
         raise ShiplogError(
             "The simulator of other families, pipelines.experiments.other_families, is not here "
             f"({error}).",
             hint="run the suite `abroad` from a checkout that has it.",
         ) from error
-    return simulator.offered, tuple(simulator.OUTSIDE)
