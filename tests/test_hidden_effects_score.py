@@ -15,7 +15,7 @@ from pipelines.hidden_effects import oracle, parameters, plan, run, score, suite
 from pipelines.hidden_effects.__main__ import main
 from pipelines.hidden_effects.parameters import compare
 from pipelines.hidden_effects.plan import Plan, Planned
-from pipelines.hidden_effects.score import Answer, Sealed, calibration, open_key, wilson
+from pipelines.hidden_effects.score import Answer, Sealed, calibration, open_key
 from pipelines.known_ship.cases import CATALOGUE, OUTSIDE, draw
 from shiplog import profile as profiles
 from shiplog.causes import Setting
@@ -107,16 +107,16 @@ def test_the_goals_table_counts_by_hand():
     ]
     rows = measured(answers)
     assert rows["one cause, size 1, 7000 s: named right"] == (
-        "95 %", "19/20", "80.4 % to 98.9 %", ">= 97 %", "no"
+        "95 %", "19/20", "78.4 % to 99.7 %", ">= 96 %", "no"
     )  # fmt: skip
     counts = {
         "one cause, size 0.3 to 1, 7000 s": ("0/1", "no"),
         "one cause, size below 0.3, 7000 s": ("0/1", ""),
         "one cause, size 1, 500 s": ("1/1", "yes"),
-        "nothing hidden: a cause named": ("0/5", "yes"),
+        "nothing hidden: a cause named": ("0/5", ""),
         "nothing hidden: any alarm": ("2/5", "no"),  # what failed did not say `none`
         "named but wrong, any size": ("1/31", "no"),
-        "outside, size 1: unknown, right family": ("1/1", "yes"),
+        "outside, size 1: unknown or undecided, right family": ("1/1", "yes"),
         "two at once, size 1: both, no third": ("1/2", "no"),
     }
     assert {what: (rows[what][1], rows[what][-1]) for what in counts} == counts
@@ -150,13 +150,6 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
     assert "one cause, size 1, 7000 s: named right" not in rows
     assert "named but wrong, any size" not in rows
     assert rows["diagnose 7000 s, feedforward: CPU time, median (worst)"][3] == "<= 60 s"
-
-
-def test_wilsons_interval_of_19_in_20():
-    """Wilson's formula by hand with z = 1.645; at the ends it stays inside [0, 1]."""
-    assert wilson(19, 20) == pytest.approx((0.8040, 0.9888), abs=2e-4)
-    assert wilson(0, 10) == pytest.approx((0.0, 1.6449**2 / (10 + 1.6449**2)))
-    assert wilson(10, 10)[1] == 1.0
 
 
 def test_the_gain_is_set_against_the_oracles_where_there_is_one():
@@ -283,7 +276,7 @@ def test_medians_and_coverage_are_of_named_causes_by_group():
     row = rows[what + "zeros, clocks, current, median error"]
     assert row == ("2 %", "3", "", "<= 3 %", "yes")
     assert rows[what + "rest, median error"][:2] == ("20 %", "1")
-    covered = rows[what + "90 % intervals right"]
+    covered = rows[what + "90 % intervals that hold the truth"]
     assert (covered[0], covered[1], *covered[3:]) == ("75 %", "3/4", ">= 85 % and <= 95 %", "no")
     assert answer(key, named("payload")).compared == {}
 

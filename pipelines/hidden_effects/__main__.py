@@ -11,13 +11,20 @@ python -m pipelines.hidden_effects network --out DIR [--count 15] [--first-seed 
     named, and what it has taken in never
 python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
-    each with --rivals: what simpler methods say of the same trials, too; of cases that were run
-    with --keep before, give the command again with it
+python -m pipelines.hidden_effects abroad --out DIR [--count 100] [--first-seed 70000]
+    ships whose equations are not the home ship's, from pipelines.experiments.other_families
+    each with --rivals: what simpler methods say of the same trials, too; with --former: what
+    today's decision says; of cases that were run with --keep before, give the command again
+python -m pipelines.hidden_effects replay DIR [--out NEW] [--former] [--rivals]
+    the kept cases of DIR diagnosed again by the program as it is now, into another folder
 python -m pipelines.hidden_effects score DIR
     the tables again, of what is there by now
+python -m pipelines.hidden_effects scores DIR [DIR ...] [--markdown docs/validation.md]
+    the validation page: misses first, then the scores of all methods, home and abroad apart
 
 Interrupted, give the same command again and it goes on; with a larger --count it grows. Exit
-code 3: a case has no verdict; 4: less than --least asks for.
+code 2: verdicts of several programs, which no table holds; 3: a case has no verdict; 4: less than
+--least asks for.
 """
 
 from __future__ import annotations
@@ -29,9 +36,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipelines.hidden_effects import plan, run, score, suites, tables
+from pipelines.hidden_effects import plan, replay, run, score, suites, tables, validation
 from pipelines.hidden_effects.run import Settings
 from pipelines.hidden_effects.score import Score
+from pipelines.hidden_effects.validation import Mixed
 from shiplog.exceptions import ShiplogError
 
 
@@ -39,9 +47,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.INFO)
     try:
+        if given.what == "scores":
+            return _scores(given)
         if given.what != "score":
             _run(given)
         found = score.read(given.out)
+    except Mixed as error:
+        print(error, file=sys.stderr)
+        return 2
     except ShiplogError as error:
         print(error, file=sys.stderr)
         return 1
@@ -63,12 +76,25 @@ def _short_of(found: Score, least: int) -> int:
     return 4
 
 
+def _scores(given: argparse.Namespace) -> int:
+    page = validation.page([score.read(out) for out in given.out], given.markdown)
+    if given.markdown is None:
+        print(page.text)
+    else:
+        page.write(given.markdown)
+    return 0
+
+
 def _run(given: argparse.Namespace) -> None:
     command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
     settings = Settings(
         jobs=given.jobs, keep=given.keep, share=given.share, rivals=given.rivals,
-        oracle=given.oracle, limit=given.limit, shiplog=command,
+        former=given.former, oracle=given.oracle, limit=given.limit, shiplog=command,
     )  # fmt: skip
+    if given.what == "replay":
+        given.out = given.out or replay.folder_of(given.source)
+        replay.replay(given.source, given.out, settings)
+        return
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
 
@@ -83,25 +109,41 @@ def _parser() -> argparse.ArgumentParser:
     for name, (first, count) in suites.SUITES.items():
         suite = commands.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
         suite.add_argument("--out", type=Path, required=True, help="one folder, one test")
-        suite.add_argument("--jobs", type=_positive, default=1, help="ships at a time")
-        suite.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
+        _how(suite)
         suite.add_argument(
             "--share", action="store_true", help="train once a ship, not once a case"
         )
-        suite.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
         suite.add_argument("--oracle", action="store_true", help="what the truth would gain, too")
-        suite.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
-        suite.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
         suite.set_defaults(first_seed=None, count=None)
         if name not in ("fixed", "brief"):
             suite.add_argument("--first-seed", type=int, default=first, help="of the block")
             suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
+    again = commands.add_parser("replay", help="kept cases, diagnosed again")
+    again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
+    again.add_argument("--out", type=Path, help="another folder; beside DIR unless given")
+    _how(again)
+    again.set_defaults(share=False, oracle=False)
     scored = commands.add_parser("score", help="the tables of what is there by now")
     scored.add_argument("out", type=Path)
-    for one in commands.choices.values():
+    page = commands.add_parser("scores", help="the validation page of all cases found")
+    page.add_argument("out", type=Path, nargs="+", metavar="DIR")
+    page.add_argument(
+        "--markdown", type=Path, metavar="PATH", help="write it there, its picture beside it"
+    )
+    for one in (one for name, one in commands.choices.items() if name != "scores"):
         one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "
                          "are right and none is misnamed")  # fmt: skip
     return parser
+
+
+def _how(command: argparse.ArgumentParser) -> None:
+    """What a suite and a replay have in common."""
+    command.add_argument("--jobs", type=_positive, default=1, help="ships at a time")
+    command.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
+    command.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
+    command.add_argument("--former", action="store_true", help="ask today's decision, too")
+    command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
+    command.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
 
 
 def _positive(word: str) -> int:

@@ -4,12 +4,20 @@ contain that. Names and units are the contract's, section 6."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 Values = Mapping[str, Any]  # name → {"value", "unit"} and, as said, "low" and "high"
 
+NAMES = (  # the contract's, section 6
+    "current", "wind_force", "shallow_water", "bank",
+    "fouling", "payload", "cross_flow_drag", "thrust_loss", "thrust_drift",
+    "rudder_force", "rudder_offset", "rudder_lag", "rudder_delay", "side_thrust",
+    "heading_offset", "yaw_rate_bias", "yaw_rate_scale", "clock_offset", "antenna_offset",
+    "wind_direction_offset", "wind_speed_scale",
+)  # fmt: skip
+Z_90 = 1.6448536269514722  # of a Gaussian, 90 % lie within so many standard deviations
 PRECISE = (  # median error within 3 %; of the others within 10 %
     "current", "heading_offset", "antenna_offset", "rudder_offset", "rudder_lag", "rudder_delay",
     "clock_offset",
@@ -37,21 +45,35 @@ CLOCKS = {"gnss": ("position", "velocity")}  # one clock for both; any other cha
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """error: 0.02 is 2 %, None where there is nothing to compare; covered: an entry an interval."""
+    """How a named cause's numbers compare with the key.
+
+    error      0.02 is 2 %; None where there is nothing to compare
+    covered    for each 90 % interval, whether it holds the truth
+    standings  for each interval, (truth - value) in standard deviations of a Gaussian on the
+               truth's side; infinite where the interval is of another channel
+    """
 
     error: float | None
     covered: tuple[bool, ...]
+    standings: tuple[float, ...] = ()
 
 
 def compare(name: str, truth: Values, said: Values) -> Comparison:
-    """The error is that of the vector: |said - true| over |true - none|."""
+    """The error is that of the vector: |said - true| over |true - none|. What a key says in words,
+    such as which unit has lost thrust, is no number and is left out."""
+    truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
     if not any(parameter in said for parameter in truth):
         return Comparison(None, ())
     if name in OTHER_FORM:  # only what both of them have
         truth = {parameter: value for parameter, value in truth.items() if parameter in said}
     none = 1.0 if name in FACTORS else 0.0
     away, size = VECTORS.get(name, _plain)(truth, said, none)
-    return Comparison(away / size if size > 0.0 else None, _covered(name, truth, said))
+    intervals = list(_intervals(name, truth, said))
+    return Comparison(
+        away / size if size > 0.0 else None,
+        tuple(within for within, _ in intervals),
+        tuple(standing for _, standing in intervals),
+    )
 
 
 def _plain(truth: Values, said: Values, none: float) -> tuple[float, float]:
@@ -111,23 +133,38 @@ VECTORS: dict[str, Callable[[Values, Values, float], tuple[float, float]]] = {
 }  # fmt: skip
 
 
-def _covered(name: str, truth: Values, said: Values) -> tuple[bool, ...]:
-    """For every parameter of the key that is said with an interval, whether it lies within."""
-    found = []
+def _intervals(name: str, truth: Values, said: Values) -> Iterator[tuple[bool, float]]:
+    """For every parameter of the key that is said with an interval: whether the truth lies within,
+    and where it stands."""
     for parameter, one in truth.items():
         interval = said.get(parameter)
         if not isinstance(interval, Mapping) or parameter == "channel":
             continue
         low, high, true = interval.get("low"), interval.get("high"), one["value"]
-        if low is None or high is None or not isinstance(true, int | float):
+        if low is None or high is None:
             continue
+        value = _value(said, parameter, 0.5 * (low + high))
         # 359 to 361 deg contains 0, 360 and 1
         above = (true - low) % 360.0 if one["unit"] == "deg" else true - low
         within = 0.0 <= above <= high - low
-        if name == "clock_offset":
-            within = within and _channels(said, truth) == _channels(truth, truth)
-        found.append(bool(within))
-    return tuple(found)
+        away = _wrapped(true - value) if one["unit"] == "deg" else true - value
+        standing = _standing(away, value - low, high - value)
+        if name == "clock_offset" and _channels(said, truth) != _channels(truth, truth):
+            within, standing = False, math.inf
+        yield bool(within), standing
+
+
+def _standing(away: float, below: float, above: float) -> float:
+    """`away` in standard deviations: a 90 % interval is 1.645 of them on each side, and its two
+    sides may differ."""
+    width = above if away > 0.0 else below
+    if width <= 0.0:
+        return math.copysign(math.inf, away) if away else 0.0
+    return Z_90 * away / width
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)
 
 
 def _value(parameters: Values, name: str, otherwise: Any) -> Any:

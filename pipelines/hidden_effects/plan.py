@@ -5,6 +5,7 @@ OUT/keys/LABEL.json   a key, opened by `score` alone and only after the verdict 
 OUT/cases/LABEL/      logs, store, base, d (until the case is done); verdict.json,
                       verdict.sha256, steps.json (times, memory, last words; they stay);
                       with --rivals, rivals.json and rivals.sha256: what simpler methods say;
+                      with --former, former.json and former.sha256: what today's decision says;
                       with --oracle, oracle.json: what the truth would gain
 OUT/bases/SEED/       with --share, the model of a ship's nominal campaign
 """
@@ -28,11 +29,13 @@ class Planned:
     size: float | None  # None: drawn by the seed
     seconds: int
     model: str = "mmg"  # of the nominal campaign; a network is trained on the trial itself
+    family: str = ""  # of equations, where another simulator writes the logs; empty: the home ship
 
     @property
     def options(self) -> list[str]:
-        """Of `python -m pipelines.known_ship case`, after seed, folder and key."""
-        given = [] if self.cause is None else ["--cause", self.cause]
+        """Of the simulator's command `case`, after seed, folder and key."""
+        given = [] if not self.family else ["--family", self.family]
+        given += [] if self.cause is None else ["--cause", self.cause]
         given += [] if self.size is None else ["--size", str(self.size)]
         return [*given, "--seconds", str(self.seconds)]
 

@@ -16,18 +16,20 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pipelines.hidden_effects import plan as plans
+from pipelines.hidden_effects import program
 from pipelines.hidden_effects.plan import Plan, Planned
+from pipelines.hidden_effects.program import ROOT
+from pipelines.hidden_effects.score import FAILED
 
 log = logging.getLogger(__name__)
 
-ROOT = Path(__file__).parents[2]  # `python -m pipelines...` finds this source and no other
 ONE_CORE = {  # so that "seconds, one core" is what it says
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -38,8 +40,8 @@ ONE_CORE = {  # so that "seconds, one core" is what it says
 DONE, LOST = 0, 3  # 3: done, but something in the logs was lost, and stderr says what
 STOPPED = (130, -signal.SIGINT)
 TAIL = 2000  # characters kept of what a step says on stderr
+OUR_SHIPLOG = (sys.executable, "-c", "from shiplog.cli import main; main()")
 LARGE = ("logs", "store", "base", "d")
-FAILED = "failed"  # the verdict that stands for "no verdict came"; it is sealed like any other
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,39 +52,54 @@ class Settings:
     keep: bool = False  # logs, store, base and report of each case
     share: bool = False  # one base model for all cases of a ship: her nominal campaign is the same
     rivals: bool = False  # simpler methods too, once the verdict is sealed
+    former: bool = False  # and today's decision, once the verdict is sealed
     oracle: bool = False  # and what the truth would gain, once the verdict is sealed
     limit: float = 3600.0  # s for one step
     case: tuple[str, ...] = (sys.executable, "-m", "pipelines.known_ship", "case")
-    shiplog: tuple[str, ...] = (sys.executable, "-c", "from shiplog.cli import main; main()")
+    abroad: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.other_families", "case")
+    shiplog: tuple[str, ...] = OUR_SHIPLOG
     rival: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.rivals")
+    before: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.former")
     truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.oracle")
 
 
 def run(out: Path, plan: Plan, settings: Settings) -> None:
     """Every case of the plan that has no sealed verdict yet; one that failed is tried again. Where
-    rivals are wanted, they are also asked of finished cases whose store and base were kept."""
+    rivals or today's decision are wanted, finished cases whose store and base were kept are asked,
+    too."""
     ships: dict[int, list[Planned]] = {}
     for planned in plan.cases:
-        if not finished(plans.case_folder(out, planned)) or _to_compare(out, planned, settings):
+        if not finished(plans.case_folder(out, planned)) or _to_ask(out, planned, settings):
             ships.setdefault(planned.seed, []).append(planned)
-    todo = sum(map(len, ships.values()))
-    log.info("%d of %d cases to run", todo, len(plan.cases))
+    log.info("%d of %d cases to run", sum(map(len, ships.values())), len(plan.cases))
+
+    def case(planned: Planned) -> str | None:
+        done = finished(plans.case_folder(out, planned))
+        return (compare_case if done else run_case)(out, planned, settings)
+
+    in_turn(list(ships.values()), case, settings.jobs)
+
+
+def in_turn(
+    groups: Sequence[Sequence[Planned]], case: Callable[[Planned], str | None], jobs: int
+) -> None:
+    """`case` on all: groups beside each other, the cases of one group one after another, since they
+    may share a base. Raises KeyboardInterrupt where a case was stopped (`case` gives None)."""
     stop = threading.Event()
 
-    def ship(cases: list[Planned]) -> None:  # one after another: they may share a base
+    def group(cases: Sequence[Planned]) -> None:
         for planned in cases:
             if stop.is_set():
                 return
-            compare = finished(plans.case_folder(out, planned))
-            said = (compare_case if compare else run_case)(out, planned, settings)
+            said = case(planned)
             if said is None:
                 stop.set()
             else:
                 log.info("%s: %s", planned.label, said)
 
-    with ThreadPoolExecutor(settings.jobs) as pool:
+    with ThreadPoolExecutor(jobs) as pool:
         try:
-            for future in as_completed([pool.submit(ship, cases) for cases in ships.values()]):
+            for future in as_completed([pool.submit(group, cases) for cases in groups]):
                 future.result()
         except BaseException:
             stop.set()  # the steps under way end; no other begins
@@ -106,30 +123,26 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     key = plans.key_path(out, planned).resolve()
-    logs, store, verdict = folder / "logs", folder / "store", folder / "verdict.json"
+    logs, store = folder / "logs", folder / "store"
     base = out.resolve() / "bases" / str(planned.seed) if settings.share else folder / "base"
+    simulator = settings.abroad if planned.family else settings.case
+    profile = str(logs / "ship.toml") if planned.family else "esso-vectwin"
     commands: dict[str, list[str]] = {
-        "logs": [
-            *settings.case, str(planned.seed), str(logs), "--key", str(key), *planned.options
-        ],
+        "logs": [*simulator, str(planned.seed), str(logs), "--key", str(key), *planned.options],
         "ingest": [
-            *settings.shiplog, "ingest", str(logs), "--profile", "esso-vectwin",
-            "--store", str(store),
+            *settings.shiplog, "ingest", str(logs), "--profile", profile, "--store", str(store),
         ],
         "train": [
             *settings.shiplog, "train", *_training(planned.model),
             "--store", str(store), "--out", str(base),
         ],
-        "diagnose": [
-            *settings.shiplog, "diagnose", str(base), "--voyages", "trial_*",
-            "--store", str(store), "--out", str(folder / "d"), "--json", str(verdict),
-        ],
+        "diagnose": diagnosing(settings, base, store, folder),
     }  # fmt: skip
     steps: list[dict[str, Any]] = []
     for name, command in commands.items():
         if name == "train" and not _to_train(base, logs):
             continue
-        done = _step(name, command, folder, settings.limit)
+        done = step(name, command, folder, settings)
         if done["rc"] in STOPPED:
             return None
         steps.append(done)
@@ -137,9 +150,9 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
             break
         if name == "train" and settings.share:
             _mark(base, logs)
-    said = _seal(folder, steps)
+    said = seal(folder, steps)
     compared = None
-    if settings.rivals and steps[-1]["step"] == "diagnose":  # where it failed they may not
+    if steps[-1]["step"] == "diagnose" and wanted(settings):  # where it failed they may not
         compared = compare_case(out, planned, settings)
         if compared is None:
             return None
@@ -152,58 +165,107 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
     return f"{said}; {compared}" if compared else said
 
 
+def diagnosing(settings: Settings, base: Path, store: Path, folder: Path) -> list[str]:
+    """The command that writes the verdict of a case into its folder."""
+    return [
+        *settings.shiplog, "diagnose", str(base), "--voyages", "trial_*",
+        "--store", str(store), "--out", str(folder / "d"), "--json", str(folder / "verdict.json"),
+    ]  # fmt: skip
+
+
 def _training(model: str) -> list[str]:
-    """Physics know the ship as she was; the paper's network has learned what is hidden, too."""
+    """Physics know the ship as it was; the paper's network has learned what is hidden, too."""
     if model == "mmg":
         return ["--model", model, "--voyages", "nominal_*", "--folds", "2"]
     return ["--model", model, "--voyages", "trial_*"]
 
 
+def wanted(settings: Settings) -> tuple[str, ...]:
+    """Whoever else is to answer beside the diagnosis, once its verdict is sealed."""
+    asked = {"rivals": settings.rivals, "former": settings.former}
+    return tuple(name for name, yes in asked.items() if yes)
+
+
 def compare_case(out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What simpler methods say of a case whose verdict is sealed: `rivals.json`, sealed likewise.
-    Where they fail, the case stays what it is. None where somebody stopped it."""
+    """Ask of a case whose verdict is sealed whoever else is wanted and has not answered it yet.
+    None where somebody stopped it."""
     folder = plans.case_folder(out, planned).resolve()
-    answers = folder / "rivals.json"
-    done = _step("rivals", [
-        *settings.rival, str(_base_of(out, planned)), "--voyages", "trial_*",
-        "--store", str(folder / "store"), "--json", str(answers),
-    ], folder, settings.limit)  # fmt: skip
+    base = base_of(out, planned)
+    said = [
+        ask(name, folder, base, folder / "store", settings)
+        for name in _to_ask(out, planned, settings)
+    ]
+    return None if None in said else "; ".join(one for one in said if one)
+
+
+def ask(name: str, folder: Path, base: Path, store: Path, settings: Settings) -> str | None:
+    """`rivals.json` or `former.json`, sealed as the verdict is; None where somebody stopped it.
+
+    Rivals that fail leave nothing: the case stays what it is. Where today's decision fails, that is
+    its answer, as it is the diagnosis' own.
+    """
+    command, must_have = {
+        "rivals": (settings.rival, "methods"), "former": (settings.before, "verdict"),
+    }[name]  # fmt: skip
+    answers = folder / f"{name}.json"
+    answers.unlink(missing_ok=True)
+    done = step(name, [
+        *command, str(base), "--voyages", "trial_*", "--store", str(store), "--json", str(answers),
+    ], folder, settings)  # fmt: skip
     if done["rc"] in STOPPED:
         return None
     steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
-    _write_steps(folder, [*(step for step in steps if step["step"] != "rivals"), done])
-    if done["rc"] != DONE or _object(answers, "methods") is None:
+    _write_steps(folder, [*(one for one in steps if one["step"] != name), done])
+    if done["rc"] not in (DONE, LOST) or _object(answers, must_have) is None:
         answers.unlink(missing_ok=True)
-        return f"not compared: rivals ended with {done['rc']}"
+        if name == "rivals":
+            return f"not compared: rivals ended with {done['rc']}"
+        answers.write_text(json.dumps(_failed(done)), encoding="utf-8")
     _seal_file(answers)
-    return f"compared after {done['wall_s']:.0f} s"
+    return f"{name} after {done['wall_s']:.0f} s"
 
 
 def _ask_oracle(folder: Path, base: Path, key: Path, settings: Settings) -> None:
     """`oracle.json`, where there is one; where it fails, the case stays what it is."""
     answer = folder / "oracle.json"
-    done = _step("oracle", [
+    done = step("oracle", [
         *settings.truth, str(base), "--case", str(folder), "--key", str(key),
         "--store", str(folder / "store"), "--json", str(answer),
-    ], folder, settings.limit)  # fmt: skip
+    ], folder, settings)  # fmt: skip
     if done["rc"] != DONE:
         log.info("no oracle: %s", done["stderr"])
         answer.unlink(missing_ok=True)
 
 
-def _base_of(out: Path, planned: Planned) -> Path:
+def base_of(out: Path, planned: Planned) -> Path:
     """The case's own model, or the one that it shared."""
     own = plans.case_folder(out, planned).resolve() / "base"
     return own if own.exists() else out.resolve() / "bases" / str(planned.seed)
 
 
-def _to_compare(out: Path, planned: Planned, settings: Settings) -> bool:
+def kept(out: Path, planned: Planned) -> bool:
+    """Store and base are there: the case can be asked again."""
+    store = plans.case_folder(out, planned) / "store"
+    return store.exists() and base_of(out, planned).exists()
+
+
+def _to_ask(out: Path, planned: Planned, settings: Settings) -> list[str]:
+    if not kept(out, planned):
+        return []
     folder = plans.case_folder(out, planned)
-    there = (folder / "store").exists() and _base_of(out, planned).exists()
-    return settings.rivals and there and not (folder / "rivals.sha256").exists()
+    return [name for name in wanted(settings) if not (folder / f"{name}.sha256").exists()]
 
 
-def _step(name: str, command: Sequence[str], folder: Path, limit: float) -> dict[str, Any]:
+def step(name: str, command: Sequence[str], folder: Path, settings: Settings) -> dict[str, Any]:
+    """One process: which program it was, its wall and CPU time and its peak memory."""
+    foreign = settings.shiplog != OUR_SHIPLOG and list(command[: len(settings.shiplog)]) == list(
+        settings.shiplog
+    )
+    known = program.other(settings.shiplog) if foreign else program.identity()
+    return _process(name, command, folder, settings.limit) | known
+
+
+def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> dict[str, Any]:
     """Wall and CPU time and peak memory of one process and those that it waited for."""
     path = folder / f"{name}.stderr"
     began = time.perf_counter()
@@ -255,16 +317,20 @@ def _nominal(logs: Path) -> dict[str, str]:
     return {p.name: _sha256(p.read_bytes()) for p in sorted(logs.glob("nominal_*.mcap"))}
 
 
-def _seal(folder: Path, steps: list[dict[str, Any]]) -> str:
+def seal(folder: Path, steps: list[dict[str, Any]]) -> str:
     """Keep the steps, and the verdict's SHA-256 last: once that stands, all else does."""
     verdict, last = folder / "verdict.json", steps[-1]
     _write_steps(folder, steps)
     content = _object(verdict)
     if last["rc"] not in (DONE, LOST) or content is None:
-        content = {"contract": 1, "verdict": FAILED, "step": last["step"], "rc": last["rc"]}
+        content = _failed(last)
         verdict.write_text(json.dumps(content), encoding="utf-8")
     _seal_file(verdict)
     return str(content["verdict"])
+
+
+def _failed(done: Mapping[str, Any]) -> dict[str, Any]:
+    return {"contract": 1, "verdict": FAILED, "step": done["step"], "rc": done["rc"]}
 
 
 def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:

@@ -4,6 +4,7 @@ unchanged since."""
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -12,12 +13,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from scipy.special import betaincinv  # scipy.stats takes a second to load
+
 from pipelines.hidden_effects import parameters, plan
 from pipelines.hidden_effects.parameters import Comparison
 from pipelines.hidden_effects.plan import Planned
 from shiplog.exceptions import ShiplogError
 
-Z_90 = 1.6449  # both sides of the normal distribution
+LEVEL = 0.9  # of the intervals of shares
+FAILED = "failed"  # the verdict that stands for "no verdict came"
+FIRST = 2  # places of a ranking that an undecided verdict asks to be looked at
 BINS = 10
 LEAST_GAIN = 0.05  # of the oracle's, for a share of it to mean anything
 
@@ -49,6 +54,15 @@ def open_rivals(folder: Path, key: Path) -> dict[str, Any]:
     return json.loads(_as_sealed(folder / "rivals.json", key, hint))["methods"]
 
 
+def open_former(folder: Path, key: Path) -> dict[str, Any] | None:
+    """The verdict of today's decision; None where it was not asked, or nothing was sealed. Raises
+    Sealed, and is to be called before the key is opened."""
+    if not (folder / "former.sha256").exists():
+        return None
+    hint = "remove former.json and former.sha256; a case that was kept can be asked again."
+    return json.loads(_as_sealed(folder / "former.json", key, hint))
+
+
 def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
     seal = path.with_suffix(".sha256").read_text(encoding="utf-8").split() or [""]
     content = path.read_bytes() if path.exists() else b""
@@ -61,6 +75,7 @@ def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
 class Answer:
     """What was hidden in one case, and what was said of it; by simpler methods, too, if asked.
 
+    former   what today's decision says; None where it was not asked
     oracle   share of the held-out error that exactly what was hidden would take off; None where
              it was not asked, or has no term here
     """
@@ -71,12 +86,30 @@ class Answer:
     steps: list[dict[str, Any]]
     rivals: Mapping[str, Any] = field(default_factory=dict)
     oracle: float | None = None
+    former: dict[str, Any] | None = None
 
     def by(self, method: str) -> Answer:
-        """The same case as that rival answers it."""
+        """The same case as that rival answers it, with the probabilities that its scores give."""
         name = self.rivals[method]["answer"]
-        said = {"verdict": "named" if name else "none", "causes": [{"name": name}] if name else []}
-        return Answer(self.planned, said, self.key, [])
+        ranking = weights(self.rivals[method].get("ranking") or ())
+        cause = {"name": name}
+        if name and _name(name) in ranking:
+            cause["probability"] = ranking[_name(name)]
+        said = {
+            "verdict": "named" if name else "none",
+            "causes": [cause] if name else [],
+            "ranking": [{"name": n, "probability": p} for n, p in ranking.items()],
+        }
+        return self.answered(said)
+
+    def answered(self, verdict: dict[str, Any]) -> Answer:
+        """The same case with another verdict."""
+        return Answer(self.planned, verdict, self.key, [])
+
+    @property
+    def abroad(self) -> bool:
+        """Of a ship whose equations are not the home ship's."""
+        return bool(self.planned.family)
 
     @property
     def word(self) -> str:
@@ -84,7 +117,7 @@ class Answer:
 
     @cached_property
     def hidden(self) -> tuple[str, ...]:
-        return tuple(cause["name"] for cause in self.key["causes"])
+        return tuple(_name(cause["name"]) for cause in self.key["causes"])
 
     @cached_property
     def named(self) -> tuple[str, ...]:
@@ -131,16 +164,68 @@ class Answer:
         """A cause is named that is not there."""
         return not set(self.named) <= set(self.hidden)
 
+    @property
+    def groups(self) -> tuple[frozenset[str], ...]:
+        """Of every name, with the names that the verdict cannot tell from it."""
+        if self.word != "named":
+            return ()
+        return tuple(
+            frozenset(map(_name, (c["name"], *(c.get("indistinguishable_from") or ()))))
+            for c in self.said
+        )
+
+    @property
+    def truths(self) -> tuple[str, ...]:
+        """What a ranking would have first: causes, `none`, or `unknown:` with the family."""
+        if self.kind == "outside":
+            return (f"unknown:{self.key['structure']['family']}",)
+        return self.sought or ("none",)
+
+    @property
+    def likely(self) -> tuple[str, ...]:
+        """The first two of the ranking."""
+        names = (one["name"] for one in self.verdict.get("ranking") or ())
+        labels = (n if n.startswith("unknown") else _name(n) for n in names)
+        return tuple(dict.fromkeys(labels))[:FIRST]
+
+    @property
+    def found(self) -> bool:
+        """Right; or every truth is in a group of its own that is said, and no group is left; or
+        `undecided`, with all that is true first or second in the ranking."""
+        if self.right:
+            return True
+        if self.word == "undecided":
+            return set(self.truths) <= set(self.likely)
+        return len(self.groups) == len(self.truths) and any(
+            all(true in group for true, group in zip(order, self.groups, strict=True))
+            for order in itertools.permutations(self.truths)
+        )
+
+    def probability(self, label: str) -> float | None:
+        """What the verdict gives a cause, `none` or `unknown:family`; None where it gives no
+        probability at all."""
+        said = [one for one in self.said if self.word == "named"]
+        ranking = self.verdict.get("ranking") or ()
+        given = [one for one in (*said, *ranking) if one.get("probability") is not None]
+        if not given:
+            return None
+        if label in self.named:
+            said = [one for one in said if one.get("probability") is not None]
+            if own := [float(one["probability"]) for one in said if _name(one["name"]) == label]:
+                return max(own)
+        return min(1.0, sum(
+            float(one["probability"]) for one in ranking
+            if label in (one["name"], _name(one["name"]))
+        ))  # fmt: skip
+
     @cached_property
     def compared(self) -> dict[str, Comparison]:
         """Hidden causes that were named, whatever else was."""
         said = {_name(cause["name"]): cause for cause in reversed(self.said)}  # the first counts
         return {
-            one["name"]: parameters.compare(
-                one["name"], one["parameters"], said[one["name"]].get("parameters") or {}
-            )
-            for one in self.key["causes"]
-            if one["name"] in self.named
+            name: parameters.compare(name, one["parameters"], said[name].get("parameters") or {})
+            for name, one in zip(self.hidden, self.key["causes"], strict=True)
+            if name in self.named
         }
 
     @property
@@ -148,14 +233,17 @@ class Answer:
         """The probability of the answer given, and whether that is right.
 
         Of a named verdict its first cause; otherwise the first of the ranking, which may be a
-        cause, `none` or `unknown`. None where no probability was given.
+        cause, `none` or `unknown` with its family. None where no probability was given.
         """
         first = next(iter(self.said if self.named else self.verdict.get("ranking") or ()), {})
         if first.get("probability") is None:
             return None
-        name = _name(first["name"])
-        truths = ("unknown",) if self.kind == "outside" else self.sought or ("none",)
-        return float(first["probability"]), name in truths
+        name = first["name"]
+        if self.kind == "outside" and name == "unknown":
+            right = self.family == self.key["structure"]["family"]
+        else:
+            right = (name if name.startswith("unknown") else _name(name)) in self.truths
+        return float(first["probability"]), right
 
     @property
     def recovered(self) -> float | None:
@@ -197,10 +285,9 @@ def read(out: Path) -> Score:
         if steps[0]["rc"] != 0:
             unmade.append(one)
         else:
-            rivals = open_rivals(folder, key)
-            answers.append(
-                Answer(one, *open_key(folder, key), steps, rivals, _oracle(folder / "oracle.json"))
-            )
+            rivals, former = open_rivals(folder, key), open_former(folder, key)
+            oracle = _oracle(folder / "oracle.json")
+            answers.append(Answer(one, *open_key(folder, key), steps, rivals, oracle, former))
     return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
 
 
@@ -209,13 +296,29 @@ def _oracle(path: Path) -> float | None:
     return None if found is None else float(found["reduction"])
 
 
-def wilson(hits: int, count: int) -> tuple[float, float]:
-    """90 % interval of a share (Wilson 1927)."""
-    share, z2 = hits / count, Z_90**2
-    middle = share + z2 / (2 * count)
-    half = Z_90 * math.sqrt(share * (1 - share) / count + z2 / (4 * count**2))
-    low, high = ((middle + sign * half) / (1 + z2 / count) for sign in (-1, 1))
-    return (0.0 if hits == 0 else low), (1.0 if hits == count else high)
+def clopper_pearson(hits: int, count: int, level: float = LEVEL) -> tuple[float, float]:
+    """Exact interval of a share (Clopper & Pearson 1934): the ends are the shares at which as many
+    hits, or as few, have a probability of (1 - level) / 2. count is at least 1."""
+    tail = 0.5 * (1.0 - level)
+    low = 0.0 if hits == 0 else float(betaincinv(hits, count - hits + 1, tail))
+    high = 1.0 if hits == count else float(betaincinv(hits + 1, count - hits, 1.0 - tail))
+    return low, high
+
+
+def weights(ranking: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+    """Probabilities of scores in nats above `none`, whose own score is zero; all were as likely
+    before. The likeliest first, channels of one name together."""
+    scores = [(one["name"], float(one["score"])) for one in ranking if one["score"] is not None]
+    if not scores:
+        return {}
+    scores.append(("none", 0.0))
+    most = max(score for _, score in scores)
+    total = sum(math.exp(score - most) for _, score in scores)
+    found: dict[str, float] = {}
+    for name, score in scores:
+        label = _name(name)
+        found[label] = found.get(label, 0.0) + math.exp(score - most) / total
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
 def calibration(beliefs: Iterable[tuple[float, bool]]) -> float:

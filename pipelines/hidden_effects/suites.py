@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib import import_module
 
 import numpy as np
 
 from pipelines.hidden_effects.parameters import ABSORBED, SURVIVE
 from pipelines.hidden_effects.plan import Plan, Planned
 from pipelines.known_ship.cases import CATALOGUE, OUTSIDE
+from shiplog.exceptions import ShiplogError
 
 Rule = Callable[[int, int], str]  # seed, number in the row → cause
 
@@ -42,7 +44,13 @@ SUITES = {  # name → (first seed, cases; of `goals`: of each row)
     "nightly": (30000, 200),  # never tuned on: shift the block monthly
     "goals": (20000, 20),
     "network": (25000, len(SURVIVE) + len(ABSORBED)),
+    "abroad": (70000, 100),
 }
+# Ships whose equations are not the home ship's, in turn.
+FAMILIES = ("abkowitz", "linear_dp", "catamaran", "azimuth_ferry", "shipmmg")
+SHARES: tuple[tuple[str, float | None, int], ...] = (  # rule, size, cases of twenty
+    ("one", 1.0, 6), ("none", None, 5), ("outside", 1.0, 5), ("one", 0.3, 2), ("two", 1.0, 2),
+)  # fmt: skip
 
 
 def plan(suite: str, first_seed: int | None = None, count: int | None = None) -> Plan:
@@ -51,6 +59,8 @@ def plan(suite: str, first_seed: int | None = None, count: int | None = None) ->
     first = first if first_seed is None else first_seed
     number = number if count is None else count
     seeds = range(first, first + number)
+    if suite == "abroad":
+        return Plan(suite, first, abroad(seeds))
     if suite == "network":
         causes = (*SURVIVE, *ABSORBED)
         return Plan(suite, first, tuple(
@@ -65,3 +75,58 @@ def plan(suite: str, first_seed: int | None = None, count: int | None = None) ->
         for seed in seeds
         for row, (rule, size, seconds) in enumerate(GOALS, 1)
     ))  # fmt: skip
+
+
+def abroad(seeds: Sequence[int]) -> tuple[Planned, ...]:
+    """Cases of other families, a seed each; its label, the seed, does not say the row.
+
+    Every twenty cases, counted from the first seed, have the shares of `SHARES`, and every hundred
+    have them within each family. Which case has which row is drawn by the first seed. Raises
+    ShiplogError where the simulator of these families is not installed.
+    """
+    offered, outside = _simulator()
+    rows = [(rule, size) for rule, size, cases in SHARES for _ in range(cases)]
+    order = np.random.default_rng([seeds[0], *b"abroad"]).permutation(len(rows))
+    step = len(rows) // len(FAMILIES)
+    met: dict[tuple[str, str, float | None], int] = {}  # cases so far of family, rule and size
+    cases = []
+    for number, seed in enumerate(seeds):
+        turn, which = divmod(number, len(FAMILIES))
+        family = FAMILIES[which]
+        rule, size = rows[order[(turn + which * step) % len(rows)]]
+        count = met[family, rule, size] = met.get((family, rule, size), -1) + 1
+        causes = _in_turn(seeds[0], family, rule, size, offered(family), outside)
+        cause = "none" if rule == "none" else causes[count % len(causes)]
+        cases.append(Planned(str(seed), seed, cause, size, 7000, family=family))
+    return tuple(cases)
+
+
+def _in_turn(
+    first: int, family: str, rule: str, size: float | None, offered: Sequence[str],
+    outside: Sequence[str],
+) -> list[str]:  # fmt: skip
+    """What this row hides on this family, in an order drawn once; all of it before any twice."""
+    if rule == "outside":  # where a family cannot hide all of them it says which
+        names = [name for name in outside if name in offered] or list(outside)
+    else:
+        names = [name for name in offered if name not in outside]
+    if rule == "two":  # `thrust_loss` and `thrust_loss:unit` are one name
+        names = [
+            f"{a}+{b}" for i, a in enumerate(names) for b in names[i + 1 :]
+            if a.partition(":")[0] != b.partition(":")[0]
+        ]  # fmt: skip
+    drawn = np.random.default_rng([first, *f"{family} {rule} {size}".encode()])
+    return [names[i] for i in drawn.permutation(len(names))]
+
+
+def _simulator() -> tuple[Callable[[str], tuple[str, ...]], tuple[str, ...]]:
+    """Family → causes that it can hide, and what it can hide that is in no catalogue."""
+    try:
+        simulator = import_module("pipelines.experiments.other_families")
+        return simulator.offered, tuple(simulator.OUTSIDE)
+    except (ImportError, AttributeError) as error:
+        raise ShiplogError(
+            "The simulator of other families, pipelines.experiments.other_families, is not here "
+            f"({error}).",
+            hint="run the suite `abroad` from a checkout that has it.",
+        ) from error

@@ -1,0 +1,262 @@
+"""What the blind test runs: other families, today's decision beside, replays, one commit a table;
+with a simulator and a program that do nothing."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict
+from types import SimpleNamespace
+
+import pytest
+
+from pipelines.hidden_effects import (
+    former,
+    methods,
+    plan,
+    program,
+    replay,
+    run,
+    score,
+    suites,
+    tables,
+)
+from pipelines.hidden_effects.__main__ import main
+from pipelines.hidden_effects.plan import Plan, Planned
+from pipelines.hidden_effects.score import Sealed
+from shiplog.exceptions import ShiplogError
+
+# --- ships of other families ----------------------------------------------------------------------
+
+SIMULATED = SimpleNamespace(
+    OUTSIDE={"tether": 0, "tow": 0, "rudder_limit": 0},
+    offered=lambda family: (
+        ("current", "fouling", "thrust_loss", "thrust_loss:unit", "tether", "tow")
+        if family == "catamaran" else ("current", "fouling", "bank", "payload")
+    ),
+)  # fmt: skip
+
+
+@pytest.fixture
+def simulator(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pipelines.experiments", SimpleNamespace(__path__=[]))
+    monkeypatch.setitem(sys.modules, "pipelines.experiments.other_families", SIMULATED)
+
+
+def test_every_family_meets_every_row_in_its_share(simulator):
+    cases = suites.plan("abroad", 70000, 100).cases
+    for family in suites.FAMILIES:
+        mine = [p for p in cases if p.family == family]
+        kinds = [
+            "none" if p.cause == "none" else "two" if "+" in str(p.cause)
+            else "outside" if p.cause in SIMULATED.OUTSIDE else p.size
+            for p in mine
+        ]  # fmt: skip
+        counts = {kind: kinds.count(kind) for kind in kinds}
+        assert counts == {1.0: 6, "none": 5, "outside": 5, 0.3: 2, "two": 2}
+    for first in range(0, 100, 20):
+        assert sum(p.cause == "none" for p in cases[first : first + 20]) == 5
+    outside = {p.cause for p in cases if p.family == "catamaran"} & set(SIMULATED.OUTSIDE)
+    assert outside == {"tether", "tow"}  # it says that it has no rudder
+    assert not any(p.cause == "thrust_loss+thrust_loss:unit" for p in cases)
+    assert all(p.label == str(p.seed) for p in cases) and len({p.seed for p in cases}) == 100
+    assert suites.plan("abroad", 70000, 33).cases == cases[:33]
+    assert [p.cause for p in suites.plan("abroad", 70100, 100).cases] != [p.cause for p in cases]
+    assert cases[0].options[:2] == ["--family", "abkowitz"]
+
+
+def test_without_that_simulator_it_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pipelines.experiments.other_families", None)
+    with pytest.raises(ShiplogError, match="other_families, is not here"):
+        suites.plan("abroad")
+
+
+def test_a_plan_from_before_there_were_families_still_loads(tmp_path):
+    cases = [Planned("5", 5, "none", None, 7000)]
+    old = [{k: v for k, v in asdict(p).items() if k != "family"} for p in cases]
+    (tmp_path / "keys").mkdir()
+    content = {"contract": 1, "suite": "nightly", "first_seed": 5, "cases": old}
+    (tmp_path / "keys" / "plan.json").write_text(json.dumps(content))
+    assert plan.load(tmp_path) == Plan("nightly", 5, tuple(cases))
+
+
+# --- the runner, with programs that do nothing ----------------------------------------------------
+
+SIMULATOR = """
+import json, pathlib, sys
+seed, logs, _, key, *options = sys.argv[1:]
+pathlib.Path(logs).mkdir()
+if "--family" in options:
+    (pathlib.Path(logs) / "ship.toml").write_text("")
+pathlib.Path(key).write_text(json.dumps({"verdict": "none", "causes": [], "structure": None}))
+"""
+SHIPLOG = """
+import json, os, pathlib, sys
+command, first, *options = sys.argv[1:]
+given = {k: v for k, v in zip(options, options[1:])}
+made = {"ingest": "--store", "train": "--out"}.get(command)
+if command == "ingest":
+    own = pathlib.Path(first, "ship.toml").exists()
+    assert given["--profile"] == (str(pathlib.Path(first, "ship.toml")) if own else "esso-vectwin")
+if made:
+    pathlib.Path(given[made]).mkdir()
+else:
+    assert pathlib.Path(first).is_dir() and pathlib.Path(given["--store"]).is_dir()
+    pathlib.Path(given["--json"]).write_text(json.dumps({"verdict": os.environ["SAYS"]}))
+"""
+BEFORE = """
+import json, os, pathlib, sys
+base, *options = sys.argv[1:]
+given = {k: v for k, v in zip(options, options[1:])}
+json_ = pathlib.Path(given["--json"])
+assert "keys" not in " ".join(sys.argv) and given["--voyages"] == "trial_*"
+assert pathlib.Path(base).is_dir() and pathlib.Path(given["--store"]).is_dir()
+assert (json_.parent / "verdict.sha256").exists()  # it comes last
+json_.write_text(json.dumps({"verdict": "none", "causes": [], "decision": "only"}))
+sys.exit(os.environ["SAYS"] == "undecided")
+"""
+
+
+@pytest.fixture
+def stubs(tmp_path, monkeypatch):
+    monkeypatch.setenv("SAYS", "none")
+    commands = {}
+    for name, source in (("case", SIMULATOR), ("shiplog", SHIPLOG), ("before", BEFORE)):
+        (tmp_path / f"{name}.py").write_text(source)
+        commands[name] = (sys.executable, str(tmp_path / f"{name}.py"))
+    return lambda **more: run.Settings(**commands, abroad=commands["case"], **more)
+
+
+def names_in(out, label="5"):
+    return {p.name for p in (out / "cases" / label).iterdir()}
+
+
+def test_todays_decision_answers_once_the_verdict_is_sealed(tmp_path, stubs, monkeypatch):
+    out = tmp_path / "out"
+    planned = plan.save(out, suites.plan("nightly", 5, 1))
+    run.run(out, planned, stubs(keep=True))
+    run.run(out, planned, stubs(former=True))  # a kept case can be asked later
+    assert {"former.json", "former.sha256", "store"} <= names_in(out)
+    steps = json.loads((out / "cases" / "5" / "steps.json").read_text())
+    assert [s["step"] for s in steps] == ["logs", "ingest", "train", "diagnose", "former"]
+    assert {s.get("commit") for s in steps if s["step"] == "former"} == {
+        program.identity()["commit"]
+    }
+    assert program.name(steps[3]).startswith(sys.executable)  # not this source's shiplog
+    (one,) = score.read(out).answers
+    assert one.former is not None and one.former["decision"] == "only"
+    assert methods.answers([one])[methods.FORMER][0].right
+    # a traceback of it is its answer, as it is the diagnosis' own
+    monkeypatch.setenv("SAYS", "undecided")
+    other = tmp_path / "other"
+    run.run(other, plan.save(other, planned), stubs(former=True))
+    (one,) = score.read(other).answers
+    assert one.word == "undecided" and one.former is not None and one.former["verdict"] == "failed"
+    assert "undecided" in tables.text(score.read(other))
+
+
+def test_todays_decision_counts_only_as_it_was_sealed(tmp_path, stubs):
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(former=True))
+    folder = out / "cases" / "5"
+    (folder / "former.json").write_text(json.dumps({"verdict": "named"}))
+    (out / "keys" / "5.json").unlink()  # whoever tried to open it would raise something else
+    with pytest.raises(Sealed, match=r"former\.json is not what was sealed: the key .* not opened"):
+        score.read(out)
+    (folder / "former.sha256").unlink()
+    assert score.open_former(folder, out / "keys" / "5.json") is None
+
+
+def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeypatch):
+    out, new = tmp_path / "out", tmp_path / "new"
+    planned = plan.save(out, suites.plan("nightly", 5, 2))
+    run.run(out, planned, stubs(keep=True))
+    for name in ("store", "base"):  # case 6 was not kept
+        (out / "cases" / "6" / name).rmdir()
+    before = hashlib.sha256((out / "cases" / "5" / "verdict.json").read_bytes()).hexdigest()
+    monkeypatch.setenv("SAYS", "coverage")
+    again = replay.replay(out, new, stubs(former=True))
+    assert [p.label for p in again.cases] == ["5"]
+    assert names_in(new) == {
+        "verdict.json", "verdict.sha256", "steps.json", "former.json", "former.sha256"
+    }  # fmt: skip
+    (one,) = score.read(new).answers
+    assert one.word == "coverage" and [s["step"] for s in one.steps] == [
+        "logs", "ingest", "train", "diagnose", "former",
+    ]  # fmt: skip
+    assert hashlib.sha256((out / "cases" / "5" / "verdict.json").read_bytes()).hexdigest() == before
+    monkeypatch.setenv("SAYS", "none")
+    replay.replay(out, new, stubs(former=True))  # nothing is left to do
+    assert score.read(new).answers[0].word == "coverage"
+    with pytest.raises(ShiplogError, match="cannot hold its own replay"):
+        replay.replay(out, out, stubs())
+    with pytest.raises(ShiplogError, match="no case with store and base"):
+        replay.replay(new, tmp_path / "third", stubs())
+
+
+def test_logs_of_another_family_come_with_their_own_profile(tmp_path, stubs, simulator):
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("abroad", 70000, 1)), stubs())
+    (one,) = score.read(out).answers
+    assert one.abroad and one.word == "none"
+
+
+def test_the_page_is_written_with_its_picture_or_refused(tmp_path, stubs, capsys):
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
+    page = tmp_path / "docs" / "validation.md"
+    assert main(["scores", str(out), "--markdown", str(page)]) == 0
+    text = page.read_text()
+    assert "![Share right over the probability said](validation-reliability.svg)" in text
+    assert ElementTree.parse(page.with_name("validation-reliability.svg")).getroot() is not None
+    assert main(["scores", str(out)]) == 0 and "# Validation" in capsys.readouterr().out
+    steps = out / "cases" / "6" / "steps.json"
+    content = json.loads(steps.read_text())
+    content[-1] |= {"program": None, "commit": "c" * 40}
+    steps.write_text(json.dumps(content))
+    assert main(["scores", str(out)]) == 2
+    assert "several programs" in capsys.readouterr().err
+
+
+def test_the_former_decision_is_asked_for_where_there_are_two(tmp_path):
+    verdict = SimpleNamespace(as_json=lambda: {"verdict": "none"})
+    asked = {}
+
+    def two(base, store, voyages, out, *, extend=None, former=False):
+        asked["former"] = former
+        return SimpleNamespace(verdict=verdict)
+
+    def one(base, store, voyages, out, *, extend=None):
+        return SimpleNamespace(verdict=verdict)
+
+    store: object = None
+    assert former.answer(tmp_path, store, ["trial_*"], two)["decision"] == "former"  # type: ignore[arg-type]
+    assert asked == {"former": True}
+    assert former.answer(tmp_path, store, ["trial_*"], one)["decision"] == "only"  # type: ignore[arg-type]
+
+
+# --- the commit
+
+
+def test_a_checkout_says_its_commit_and_whether_the_source_was_changed(tmp_path):
+    def git(*arguments):
+        who = ("-c", "user.name=a", "-c", "user.email=a@b")
+        done = subprocess.run(
+            ["git", "-C", str(tmp_path), *who, *arguments], check=True, capture_output=True
+        )
+        return done.stdout.decode().strip()
+
+    assert program.identity(tmp_path) == {"commit": None, "dirty": None}
+    git("init", "-q")
+    (tmp_path / "shiplog").mkdir()
+    (tmp_path / "shiplog" / "a.py").write_text("1\n")
+    git("add", "-A")
+    git("commit", "-qm", "first")
+    head = git("rev-parse", "HEAD")
+    (tmp_path / "notes.md").write_text("no source")
+    assert program.identity(tmp_path) == {"commit": head, "dirty": False}
+    (tmp_path / "shiplog" / "a.py").write_text("2\n")
+    assert program.identity(tmp_path) == {"commit": head, "dirty": True}
+    assert program.name({"commit": head, "dirty": True}) == f"{head[:12]}+changes"
+    assert program.name(program.other(("shiplog", "--x"))) == "shiplog --x"
