@@ -7,13 +7,15 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipelines.diagnosis import answer, own, pictures, trial, where
+from pipelines.diagnosis import answer, baseline, own, pictures, setup, trial, where
 from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
 from shiplog import diagnose, page, runs, segments
 from shiplog.decision import Decision
+from shiplog.diagnosis import placebo, refutation, search
+from shiplog.diagnosis import trial as diagnosis_trial
 from shiplog.exceptions import RunError, listed
 from shiplog.gain import Gain
 from shiplog.hypotheses import Point, Trial
@@ -36,8 +38,12 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
+    former: bool = False,
 ) -> Diagnosis:
-    """The whole way. Raises ShiplogError."""
+    """The whole way. Raises ShiplogError.
+
+    former   decide as the program did before hypotheses were weighed by one posterior
+    """
     began = time.time()
     run = runs.load(run_path)
     names = trial.voyages_of(run, store, voyages)
@@ -61,18 +67,28 @@ def diagnose_run(
             f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
-    tried, untested = trial.trial_of(run, nominal, recorded, cause_files)
+    if former:
+        tried, untested = trial.trial_of(run, nominal, recorded, cause_files)
+    else:
+        lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
+        made = setup.trial_of(run, nominal, recorded, cause_files, lacking)
+        tried, untested = made.trial, dict(made.untested)
+        notes += [lacking] if lacking else []
     log.info(
-        "%s against %s: %d segments of %d s, κ %.0f",
-        listed(names, most=4), run.name, len(tried.rows), segments.SECONDS,
-        tried.reference.kappa,
+        "%s against %s: %d segments of %d s, of which a share of %.2f counts",
+        listed(names, most=4), run.name, len(tried.rows), segments.SECONDS, tried.reference.counts,
     )  # fmt: skip
     point = tried.begin(run.extension_numbers())
     whole = tried.covering(point)
     pushed = where.pushed(tried, point, whole)
     cut = trial.windows_of(run, store, names, profile)
     judge = None if cut is None else HeldOut(cut, trial.simulator(run, tried), tried)
-    decision, found, dropped = _decided(run, tried, point, judge)
+    if isinstance(tried, diagnosis_trial.Trial):
+        weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
+        weighed.run()
+        decision, _, found, dropped = refutation.judged(weighed, judge)
+    else:
+        decision, found, dropped = _decided(run, tried, point, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:
         notes += answer.of_physics(run, tried, found)

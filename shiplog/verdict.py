@@ -65,6 +65,7 @@ class Verdict:
     without: str = "its voyage"
     unseen: tuple[dict, ...] = ()
     limits: tuple[dict, ...] = ()
+    unavailable: tuple[dict, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
     def as_json(self) -> dict:
@@ -80,6 +81,8 @@ class Verdict:
             "intervals": [i.as_json() for i in self.intervals],
             "unseen": list(self.unseen),
             "limits": list(self.limits),
+            "unavailable": list(self.unavailable),
+            "explained": max(self.gain.reduction, 0.0) if self.gain and self.causes else 0.0,
             "notes": list(self.notes),
             "base": {"run": self.run, "before_effect": self.before_effect},
         }
@@ -97,6 +100,7 @@ DEPENDS = {
     "motion": ("surge", "sway", "yaw_rate"),
     "wind": ("wind_speed", "wind_angle"),
     "stochastic": (),
+    "intermittent": ("time",),
 }
 
 
@@ -212,6 +216,14 @@ def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> 
     return tuple({"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1]))
 
 
+def probabilities_json(ranking: Mapping[str, float]) -> tuple[dict, ...]:
+    """Every answer that has a share worth stating, likeliest first."""
+    kept = [(n, p) for n, p in ranking.items() if p >= SHARE_SAID]
+    return tuple(
+        {"name": n, "probability": min(p, 1.0)} for n, p in sorted(kept, key=lambda pair: -pair[1])
+    )
+
+
 def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
     """The smallest size of each cause that these data would show, best known first: of each number
     alone, and as a share of the realistic size. Numbers that no size would show are left out."""
@@ -242,6 +254,7 @@ def sentence(
     gain: Gain | None,
     louder: float,
     alone: float | None = None,
+    ranking: Sequence[dict] = (),
 ) -> str:
     """The verdict in a sentence. `alone`: share of the error that the model takes off when it is
     fitted again with nothing named; None where it is not fitted again."""
@@ -262,8 +275,16 @@ def sentence(
         if alone is None:
             return said
         return f"{said} Fitted again with nothing named, the model has an error {less(alone)}."
+    if verdict == "undecided":
+        said = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
+        return f"Undecided: {' or '.join(said)}. No answer has a probability of {SURELY:.0%}."
     if verdict == "unknown":
         assert structure is not None
+        if structure["family"] == "intermittent":
+            return (
+                "Outside the catalogue: a force that comes and goes pushes the ship sideways, and "
+                "no device whose place and pattern are known does that."
+            )
         if structure["family"] == "stochastic":
             return (
                 f"The ship is pushed about at random {louder:.1f} times as hard as when the model "
@@ -274,10 +295,21 @@ def sentence(
             f"{listed(structure['depends_on'])}."
         )
     if verdict == "coverage":
-        return "The model was never there: collect data in these conditions before asking why."
+        return "Not trained in these conditions: record data there first, then ask again."
     if verdict == "external":
         return "The ship was pushed, held or towed: no force of her own explains these stretches."
-    return "Nothing is wrong beyond what the model got wrong where it was made."
+    return (
+        "No change found: the errors are those that the model already had in its nominal voyages."
+    )
+
+
+def _answer(name: str) -> str:
+    """One entry of the ranking, in words."""
+    if name == "none":
+        return "no change"
+    if name.startswith("unknown:"):
+        return f"something outside the catalogue ({name.partition(':')[2]})"
+    return name.replace("_", " ")
 
 
 def unseen_json(row: Dependence) -> dict:

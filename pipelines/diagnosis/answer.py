@@ -11,6 +11,7 @@ from pipelines.diagnosis.held_out import HeldOut
 from shiplog import advise, diagnose, segments
 from shiplog import verdict as verdicts
 from shiplog.decision import Decision
+from shiplog.diagnosis.trial import Trial as DiagnosisTrial
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain
 from shiplog.hypotheses import Trial
@@ -82,6 +83,7 @@ def verdict(
     found   the gain of what is named; None where nothing is, or there are no windows
     held    the windows it was measured on
     """
+    weighed = isinstance(trial, DiagnosisTrial)
     rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
     if context.lost and decision.structure is not None:
         notes.insert(
@@ -91,19 +93,26 @@ def verdict(
         )
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
-    rejected |= {k: f"not testable: {why}" for k, why in context.untested.items()}
+    unavailable = verdicts.rejected_json(context.untested)
+    if not weighed:
+        rejected |= {k: f"not testable: {why}" for k, why in context.untested.items()}
     advised = advise.advice(trial, decision.named, decision.first.numbers)
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.pulses is not None:
         times = where.pulses(trial, decision, decision.pulses)
         sure = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
+        if weighed:
+            sure = decision.ranking.get("unknown:intermittent", 0.0)
         causes.append(verdicts.pulses_json(decision, times, sure))
     said = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
+    ranking = verdicts.probabilities_json(decision.ranking) if weighed else (
+        verdicts.ranking_json(decision, said, context.dropped)
+    )  # fmt: skip
     sentence = f"{context.lost}: no cause can be told."
     if not context.lost:
         sentence = verdicts.sentence(
-            said, causes, structure, found, decision.louder, context.alone
+            said, causes, structure, found, decision.louder, context.alone, ranking
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
@@ -113,7 +122,7 @@ def verdict(
         before_effect=context.before_effect,
         made=_made(context.run, context.before_effect),
         causes=tuple(causes),
-        ranking=verdicts.ranking_json(decision, said, context.dropped),
+        ranking=ranking,
         rejected=verdicts.rejected_json(rejected),
         traces=tuple(verdicts.trace_json(n) for n in decision.traces),
         structure=structure if said == "unknown" else None,
@@ -123,8 +132,9 @@ def verdict(
         wrong=tuple(context.wrong),
         unseen=tuple(context.unseen),
         limits=verdicts.limits_json(decision, catalogue, setting)
-        if said in ("none", "unknown")
+        if weighed or said in ("none", "unknown")
         else (),
+        unavailable=unavailable,
         notes=(*notes, *verdicts.remains(decision, said)),
     )
 

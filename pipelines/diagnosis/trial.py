@@ -79,7 +79,7 @@ def trial_of(
             chosen.append(cause)
         else:
             untested[cause.label] = missing
-    model, start = _model(run, chosen, setting)
+    model, start = model_of(run, chosen, setting)
     if nominal is None:
         inputs = None if run.config.physical else run.base()[0]
         known = reference.assume(model, setting, start, recorded, run.given, inputs)
@@ -87,7 +87,7 @@ def trial_of(
     # where the nominal voyages settle depends on them alone, so that it can be kept
     before = setting_of(run, nominal, nominal)
     testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
-    at = remembered.settled(_model(run, testable, before)[0], before, start, nominal)
+    at = remembered.settled(model_of(run, testable, before)[0], before, start, nominal)
     known = reference.learn(model, setting, start, nominal, at)
     return Trial(known, recorded, tuple(held)), untested
 
@@ -109,7 +109,7 @@ def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
     )
 
 
-def _model(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
+def model_of(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
     """The run's physics with room for these causes, and where its coefficients stand."""
     if run.config.physical:
         base, start, stand_in, values = run.base()

@@ -16,13 +16,14 @@ import numpy as np
 
 from shiplog import evidence, linearise, reference, segments, structure
 from shiplog.causes import Setting
-from shiplog.columns import Columns
+from shiplog.columns import HELD, Columns
 from shiplog.diagnosis import discrepancy, voyage_effects
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.evidence import Modes, Unrest
 from shiplog.linearise import Linear
 from shiplog.models.extended import Extended
+from shiplog.models.network import Network
 from shiplog.reading import read
 from shiplog.record import Record
 from shiplog.reference import Reference, Settled, Start
@@ -230,3 +231,35 @@ def _noise(modes, rows, columns, effects, information, pull) -> float:
             scores.append(reference.marginal(gram, information, pull) - 0.5 * volume)
         found.append(math.log(tried[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))
+
+
+def assumed(
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool,
+    inputs: Network | None = None,
+) -> Campaign:  # fmt: skip
+    """Where no nominal campaign shows what is usual: the voyages in question stand for it, and no
+    cause has a usual size.
+
+    given    coefficients that nobody fitted, held near their values; else a fit to these voyages
+    inputs   a network that was trained on these voyages
+    """
+    if inputs is not None:
+        made = reference.assume(model, setting, start, record, given, inputs)
+        none = Discrepancy((), made.unrest.push)
+        effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
+        return Campaign(made, effects, none, none, (), 0.0)
+    if given:
+        start = replace(start, spread=reference.GIVEN * start.spread)
+    at = reference.settled(model, setting, start, record, rounds=0 if given else reference.ROUNDS)
+    whole = learn(model, setting, start, record, at)
+    columns, deviation = whole.reference.columns, whole.effects.deviation.copy()
+    causes = slice(columns.base, columns.linearised)
+    deviation[causes] = 0.0
+    known = whole.effects.size**-2.0
+    known[causes] = HELD
+    made = replace(
+        whole.reference, information=np.diag(known), pull=whole.reference.anchor, nominal=None,
+        modes=None, adapts=not given,
+    )  # fmt: skip
+    effects = VoyageEffects(deviation, known**-0.5)
+    return replace(whole, reference=made, effects=effects, each=())

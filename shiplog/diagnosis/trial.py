@@ -63,8 +63,9 @@ class Trial(hypotheses.Trial):
     # --- products ---
 
     def _misfitting(self, modes: Modes, point: Point) -> Modes:
-        cut = point.linear.cut
-        modes = modes.beside(self.campaign.discrepancy.pushed(cut, self.grid))
+        cut, misfit = point.linear.cut, self.reference.misfit
+        if misfit is not None:
+            modes = modes.beside(misfit.pushed(cut, self.grid))
         return modes.beside(self.unseen.pushed(cut, self.grid))
 
     def total(self, point: Point, noise: float) -> tuple[np.ndarray, float]:
@@ -195,6 +196,17 @@ class Trial(hypotheses.Trial):
             at += len(unit)
         whole = np.concatenate(units or [np.zeros(0)])
         return found, level.inverse[first:at, first:at] * np.outer(whole, whole)
+
+    def without(self, point, included, louder, left_out):
+        """Numbers of the included causes and coefficients [P], from the other segments alone."""
+        kept, ref = self.weight, self.reference
+        self.weight = np.where(left_out, 0.0, kept)
+        try:
+            total, _ = self.total(point, louder)
+        finally:
+            self.weight = kept
+        level = self.solve(total, 0.0, louder, point, included, ref.information, ref.pull)
+        return self._numbers(level, point, included)[0], self._coefficients(level)
 
     # --- remainders ---
 

@@ -1,0 +1,55 @@
+"""Held-out voyages may refute a name: one rule, for every cause alike.
+
+The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted where the
+held-out error with it is surely greater than without it; then every hypothesis that contains it is
+dropped, and the others' probabilities are renormalised.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from shiplog import decision as decisions
+from shiplog.decision import Decision
+from shiplog.diagnosis.decide import decide
+from shiplog.diagnosis.posterior import Posterior
+from shiplog.diagnosis.search import Search
+from shiplog.gain import Gain
+
+
+class HeldOut(Protocol):
+    """Windows on which a decision is judged, its numbers fitted without each fold."""
+
+    def gain(self, decision: Decision) -> Gain:
+        """Of what is named over nothing."""
+        ...
+
+    def worth(self, rest: Decision, decision: Decision) -> Gain:
+        """Of a decision over one with a cause less."""
+        ...
+
+
+def judged(
+    search: Search, held: HeldOut | None
+) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
+    """The decision that held-out voyages leave, its posterior and gain, and name → why refuted."""
+    refuted: dict[str, str] = {}
+    while True:
+        decision, found = decide(search, refuted)
+        if held is None or not decision.named:
+            return decision, found, None, refuted
+        gain = held.gain(decision)
+        worst = None
+        for one in decision.named:
+            worth = gain
+            if len(decision.named) > 1:
+                worth = held.worth(decisions.without(search.trial, decision, one), decision)
+            if worth.high < 0.0 and (worst is None or worth.high < worst[1].high):
+                worst = one, worth
+        if worst is None:
+            return decision, found, gain, refuted
+        one, worth = worst
+        refuted[one.cause.name] = (
+            f"held-out voyages refute it: with it the error is {-worth.high:.1%} to "
+            f"{-worth.low:.1%} greater"
+        )
