@@ -374,7 +374,7 @@ def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
     along, off = np.exp(0.6j), 1j * np.exp(0.6j)
     for where, share in ((0, 1.0), (20 * along, 1.0), (4 * off, 0.5), (-12 * off, 0.1)):
         at = complex(5, -3) + where
-        assert physics.shoal(hidden, at.real, at.imag) == pytest.approx(share)
+        assert physics.shoal(numbers, hidden, at.real, at.imag) == pytest.approx(share)
     plain, crest = (physics.hull(numbers, hidden, 0.0, 0.2, 0.0, s) for s in (0.0, 1.0))
     assert crest[1] == pytest.approx(plain[1] * (1 + 1.2 * 0.8))  # cross-flow
     plain, crest = (physics.hull(numbers, hidden, 0.4, 0.0, 0.0, s) for s in (0.0, 1.0))
@@ -709,9 +709,9 @@ def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
     said = full.causes[0].parameters
     assert {p: said[p]["unit"] for p in SAID.get(name, {})} == SAID.get(name, {})
     assert full.verdict == ("named" if name in cases.CATALOGUE else "unknown")
-    assert (full.ship, full.nominal, full.trial, full.ordinary) == (
-        half.ship, half.nominal, half.trial, half.ordinary
-    ) == (none.ship, none.nominal, none.trial, none.ordinary)  # fmt: skip
+    assert (full.ship, full.laws, full.nominal, full.trial, full.ordinary) == (
+        half.ship, half.laws, half.nominal, half.trial, half.ordinary
+    ) == (none.ship, none.laws, none.nominal, none.trial, none.ordinary)  # fmt: skip
     assert none.effects == none.ordinary == full.ordinary != half.effects != full.effects
 
     columns = []

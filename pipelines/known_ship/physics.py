@@ -207,9 +207,10 @@ def wind_force(c, h, ahead, starboard):
     n = -q * c.lateral_area * c.length * (
         c.wind_yaw * math.sin(angle) + c.wind_yaw_2 * math.sin(2.0 * angle)
     )  # fmt: skip
-    ratio = c.wind_surge * c.frontal_area / (c.wind_sway * c.lateral_area)
-    oblique = 1.0 - 0.5 * c.air_cross_force * (1.0 - ratio) * math.sin(2.0 * angle) ** 2
-    x, y, n = x / oblique, y / oblique, n / oblique
+    if c.air_cross_force > 0.0:
+        ratio = c.wind_surge * c.frontal_area / (c.wind_sway * c.lateral_area)
+        oblique = 1.0 - 0.5 * c.air_cross_force * (1.0 - ratio) * math.sin(2.0 * angle) ** 2
+        x, y, n = x / oblique, y / oblique, n / oblique
     x -= q * c.frontal_area * (c.air_surge_0 + c.air_surge_2 * math.cos(2.0 * angle))
     y -= q * c.lateral_area * c.air_sway_2 * math.sin(2.0 * angle)
     n -= q * c.lateral_area * c.length * c.air_yaw_3 * math.sin(3.0 * angle)
