@@ -928,3 +928,39 @@ def test_two_of_three_clocks_say_it_all():
     assert by["clock_offset:position"].beside("clock_offset:velocity")
     assert by["clock_offset:wind"].beside(both.label)
     assert both.beside("current") and not both.beside(both.label)
+
+
+# --- realistic sizes ------------------------------------------------------------------------------
+
+
+def test_sizes_are_not_the_simulated_ships():
+    """The simulated ship draws each cause from a range, and a prior in its middle would be told the
+    answer. None stands there; none is so far off that its cause could not be found."""
+    middles = {
+        "fouling": 0.625, "cross_flow_drag": 0.325, "rudder_force": 0.2, "thrust_loss": 0.19,
+        "thrust_drift": 0.235, "rudder_lag": 2.5, "rudder_delay": 1.3,
+        "heading_offset": math.radians(3.75), "yaw_rate_bias": math.radians(0.3),
+        "yaw_rate_scale": 0.065, "clock_offset:gnss": 0.9, "wind_speed_scale": 0.225,
+        "wind_direction_offset": math.radians(16.5), "rudder_offset": math.radians(5.5),
+    }  # fmt: skip
+    for label, middle in middles.items():
+        for size in BY[label].on(setting()).sizes(setting()):
+            assert 0.5 < size / middle < 2.0 and abs(size / middle - 1.0) > 0.1, label
+
+
+def test_foulings_size_is_the_mean_square_of_schultzs_penalties():
+    penalties = np.array([0.11, 0.20, 0.34, 0.52, 0.80])  # of resistance at 15 kn, Schultz 2007
+    size = BY["fouling"].sizes(setting())[0]
+    assert size == pytest.approx(np.sqrt((penalties**2).mean()), rel=0.05)
+
+
+def test_clocks_size_is_that_of_delays_up_to_a_second():
+    assert BY["clock_offset:gnss"].sizes(setting())[0] == pytest.approx(
+        1.0 / math.sqrt(3), rel=0.05
+    )
+
+
+@EVERY
+def test_every_size_has_its_source(cause):
+    """The docstring says where a size is from, or the class it is a part of."""
+    assert "Size: " in (type(cause).__doc__ or "")

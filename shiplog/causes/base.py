@@ -25,7 +25,8 @@ DEGREE = math.pi / 180.0
 class Parameter:
     """One number of a cause, in SI; zero where the cause is absent.
 
-    prior      its realistic size
+    prior      its realistic size: the standard deviation of a change that is found between two
+               campaigns, from the literature that its cause's docstring names
     least      below this it is there but does not matter: a trace
     of         "speed", "length", "mass": prior and least are shares of the ship's
     low, high  beyond, it means nothing

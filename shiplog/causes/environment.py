@@ -15,13 +15,16 @@ from shiplog.causes.base import Cause, Parameter, Setting, Shown
 
 @dataclass(frozen=True)
 class Current(Cause):
+    """Size: PIANC 2014 (report 121) designs channels for cross-currents of 0.5 to 1.5 kn and more
+    along the channel, passed at 5 to 8 kn: 0.1 to 0.4 of the ship's speed, each way."""
+
     name = "current"
     kind = "environment"
     story = "The water moves, and the ship with it."
     equation = "ν̇ = f(ν - RᵀV, u, ω) + d(RᵀV)/dt,  V = ({north:+.3f}, {east:+.3f}) m/s"
     parameters = (
-        Parameter("north", "m/s", 0.3, 0.015, of="speed"),
-        Parameter("east", "m/s", 0.3, 0.015, of="speed"),
+        Parameter("north", "m/s", 0.25, 0.015, of="speed"),
+        Parameter("east", "m/s", 0.25, 0.015, of="speed"),
     )
     separated_by = {
         "heading_offset": "one full slow turn, or the same course out and back",
@@ -47,6 +50,9 @@ class Current(Cause):
 class WindForce(Cause):
     """Of a model that has no wind force, that of such a ship times its numbers.
 
+    Size: coefficients ahead of ship types differ by a quarter from their mean (Blendermann 1994, as
+    in Fossen 2011, Table 8.1), and areas above water by as much with the load on deck.
+
     lacking   the coefficients that the model has not
     """
 
@@ -58,9 +64,9 @@ class WindForce(Cause):
     story = "The wind pushes otherwise than the model has it."
     equation = "X_A·{surge_factor:.2f}, Y_A·{sway_factor:.2f}, N_A·{yaw_factor:.2f}"
     parameters = (
-        Parameter("surge_factor", "1", 0.35, 0.03, low=-1.0),
-        Parameter("sway_factor", "1", 0.35, 0.03, low=-1.0),
-        Parameter("yaw_factor", "1", 0.35, 0.03, low=-1.0),
+        Parameter("surge_factor", "1", 0.3, 0.03, low=-1.0),
+        Parameter("sway_factor", "1", 0.3, 0.03, low=-1.0),
+        Parameter("yaw_factor", "1", 0.3, 0.03, low=-1.0),
     )
     separated_by = {
         "wind_speed_scale": "a second anemometer, or fast straight runs in calm",
@@ -110,7 +116,10 @@ class WindForce(Cause):
 @dataclass(frozen=True)
 class ShallowWater(Cause):
     """Hull forces and added masses grow where the water is shallow; a map of how much, since no
-    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990."""
+    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990.
+
+    Size: theirs has a full ship's sway damping a quarter larger at a depth of twice the draught,
+    which is 0.3 here; PIANC 2014 begins to count shallow water at 3 draughts, and ends at 1.1."""
 
     places: int = 12
 
@@ -133,7 +142,7 @@ class ShallowWater(Cause):
         return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.full(self.places, 0.4)
+        return np.full(self.places, 0.3)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.full(self.places, -0.5), np.full(self.places, 5.0)
@@ -170,7 +179,10 @@ def _bumps(state: Any, places: Any, spacing: Any) -> Any:
 
 @dataclass(frozen=True)
 class Bank(Cause):
-    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974)."""
+    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974).
+
+    Size: all of it. The profile shows the bank and the model has none; published formulas differ
+    from each other by about a factor of two (Vantorre, Delefortrie et al. 2003)."""
 
     name = "bank"
     kind = "environment"

@@ -15,6 +15,9 @@ from shiplog.record import Record, reduced
 class HeadingOffset(Cause):
     """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which knows
     no heading, or from GNSS velocity that the recorder has turned by the compass: `turned`.
+
+    Size: a gyro may settle 0.75 deg · sec(latitude) off (ISO 8728), up to 2.2 deg at 70 deg, and
+    a corrected magnetic compass keeps a deviation of up to 3 deg (ISO 25862).
     """
 
     turned: bool = False
@@ -23,7 +26,7 @@ class HeadingOffset(Cause):
     kind = "sensor"
     story = "The compass stands beside the ship's axis."
     equation = "ψ_measured = ψ {angle:+.2f} deg"
-    parameters = (Parameter("angle", "deg", np.radians(3.5), np.radians(0.25)),)
+    parameters = (Parameter("angle", "deg", np.radians(2.5), np.radians(0.25)),)
     separated_by = {
         "current": "one full slow turn, or the same course out and back",
         "rudder_offset": "hover and coasting with the screw stopped: the rudders' offset vanishes",
@@ -56,12 +59,15 @@ class HeadingOffset(Cause):
 
 @dataclass(frozen=True)
 class YawRateBias(Cause):
+    """Size: a rate-of-turn indicator may be 0.5 deg/min off (IMO A.526(13)), a small gyro of the
+    micromechanical kind tenths of a degree a second when switched on (Titterton & Weston 2004)."""
+
     name = "yaw_rate_bias"
     kind = "sensor"
     needs = ("yaw rate",)
     story = "The gyro shows a turn where there is none."
     equation = "r_measured = r {value:+.3f} deg/s"
-    parameters = (Parameter("value", "deg/s", np.radians(0.3), np.radians(0.01)),)
+    parameters = (Parameter("value", "deg/s", np.radians(0.2), np.radians(0.01)),)
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
@@ -74,12 +80,14 @@ class YawRateBias(Cause):
 
 @dataclass(frozen=True)
 class YawRateScale(Cause):
+    """Size: a rate-of-turn indicator may show 5 % of the rate too much (IMO A.526(13))."""
+
     name = "yaw_rate_scale"
     kind = "sensor"
     needs = ("yaw rate",)
     story = "The gyro shows more or less than the ship turns."
     equation = "r_measured = {value:.3f} r"
-    parameters = (Parameter("value", "1", 0.065, 0.003, low=-0.9),)
+    parameters = (Parameter("value", "1", 0.05, 0.003, low=-0.9),)
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
@@ -98,7 +106,10 @@ class YawRateScale(Cause):
 
 @dataclass(frozen=True)
 class ClockOffset(Cause):
-    """One channel is late against the heading; `gnss` is position and velocity together."""
+    """One channel is late against the heading; `gnss` is position and velocity together.
+
+    Size: a receiver that reports each second and stamps what arrives is up to a second late (IMO
+    MSC.112(73)): 0.58 s in the mean square of such delays."""
 
     channel: str = "gnss"
 
@@ -107,7 +118,7 @@ class ClockOffset(Cause):
     story = "A channel's clock is off."
     shifts = True
     equation = "measured(t) = true(t - {time:.2f} s)"
-    parameters = (Parameter("time", "s", 0.8, 0.04, low=-5.0, high=5.0),)
+    parameters = (Parameter("time", "s", 0.6, 0.04, low=-5.0, high=5.0),)
     separated_by = {
         "antenna_offset": "spin on the spot against straight acceleration",
         "clock_offset": "hard acceleration on a straight course",
@@ -160,13 +171,17 @@ class ClockOffset(Cause):
 
 @dataclass(frozen=True)
 class AntennaOffset(Cause):
+    """Size: an arm that nobody entered. A merchant ship's mast stands on the bridge, some 0.3 L
+    abaft midship, and off the centreline by up to half the breadth, 0.07 L (IMO SN.1/Circ.227 asks
+    for both)."""
+
     name = "antenna_offset"
     kind = "sensor"
     story = "The antenna stands elsewhere than the profile has it."
     equation = "antenna at profile + ({x:+.2f}, {y:+.2f}) m"
     parameters = (
-        Parameter("x", "m", 0.25, 0.015, of="length"),
-        Parameter("y", "m", 0.1, 0.015, of="length"),
+        Parameter("x", "m", 0.3, 0.015, of="length"),
+        Parameter("y", "m", 0.07, 0.015, of="length"),
     )
     separated_by = {"clock_offset": "spin on the spot against straight acceleration"}
 
@@ -187,12 +202,15 @@ class AntennaOffset(Cause):
 
 @dataclass(frozen=True)
 class WindDirectionOffset(Cause):
+    """Size: 5 deg is what is asked of an instrument (WMO-No. 8, Chap. 5); a vane's zero on its mast
+    and the flow about the ship make it twice that (Smith, Bourassa & Sharp 1999)."""
+
     name = "wind_direction_offset"
     kind = "sensor"
     needs = ("wind", "wind force")
     story = "The anemometer is turned on its mast."
     equation = "γ_measured = γ_A {angle:+.1f} deg"
-    parameters = (Parameter("angle", "deg", np.radians(15.0), np.radians(1.5)),)
+    parameters = (Parameter("angle", "deg", np.radians(10.0), np.radians(1.5)),)
     separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
 
     @property
@@ -211,12 +229,15 @@ class WindDirectionOffset(Cause):
 
 @dataclass(frozen=True)
 class WindSpeedScale(Cause):
+    """Size: 10 % is what is asked of an instrument (WMO-No. 8, Chap. 5); the flow about a bridge is
+    faster by 10 % or more (Moat, Yelland, Pascal & Molland 2005): both, and the height's share."""
+
     name = "wind_speed_scale"
     kind = "sensor"
     needs = ("wind", "wind force")
     story = "The anemometer shows more or less than blows."
     equation = "U_measured = {value:.2f} U_A"
-    parameters = (Parameter("value", "1", 0.22, 0.02, low=-0.9),)
+    parameters = (Parameter("value", "1", 0.18, 0.02, low=-0.9),)
     separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
 
     @property

@@ -9,8 +9,8 @@ from __future__ import annotations
 # statements have to be right, which the calibration table checks.
 STATED = 0.9
 
-# Share of trials without any change: somebody who asks for a diagnosis has a reason to.
-NO_CHANGE = 1.0 / 3.0
+# Share of trials without any change, before any data.
+NO_CHANGE = 0.5
 
 # Share. How much rarer each further cause is than the one before it.
 ANOTHER_CAUSE = 0.1
