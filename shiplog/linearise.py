@@ -4,12 +4,16 @@ A free rollout of a minute loses the path of a ship that turns easily, and its d
 then of another voyage. So each segment of 30 s is first pulled onto what was measured, by its
 initial state and a slowly varying acceleration; around that path the simulation is linear in all
 that follows: y ≈ y* + Z (z - z*) + J d.
+
+Of a model that training cut into several steps a second, so is the time between two nodes. A
+segment in which the model runs away all the same is left out and counted (`Linear.lost`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import jax
@@ -25,6 +29,9 @@ from shiplog.traced import traced
 jax.config.update("jax_enable_x64", True)
 
 CHUNK = 64  # segments at a time
+LEAST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
+KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
+FAR = 10.0  # times what a path may be off its measurement, beyond which the model has run away
 
 
 class Smooth(Physical, Protocol):
@@ -37,6 +44,27 @@ class Smooth(Physical, Protocol):
 
 
 # --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
+
+
+def finer(model: Smooth, step: float) -> int:
+    """Steps between two nodes with which the integration is as stable as in training.
+
+    On the negative real axis the explicit Euler method is stable for |λ| h up to 2, two-step
+    Adams-Bashforth up to 1 (Hairer, Nørsett & Wanner 1993, Sec. III.1 and V.1): of a model that
+    training cut into n steps a second, |λ| may reach 2n, and a step must not exceed 1/(2n).
+    """
+    return max(1, math.ceil(2.0 * model.substeps * step - 1e-9))
+
+
+def _between(values: np.ndarray, many: int) -> np.ndarray:
+    """Of values [S, K, ...] at nodes those at [S, (K - 1) many + 1, ...], straight in between."""
+    if many == 1:
+        return values
+    part = np.arange(many).reshape(1, 1, many, *[1] * (values.ndim - 2)) / many
+    left, right = values[:, :-1, None], values[:, 1:, None]
+    fine = (len(values), (values.shape[1] - 1) * many, *values.shape[2:])
+    inside = (left + part * (right - left)).reshape(fine)
+    return np.concatenate((inside, values[:, -1:]), axis=1)
 
 
 def _ab2(values: Array, before: Array, first) -> Array:
@@ -113,6 +141,7 @@ class Linear:
     e   [S, B, 6]       measured less simulated, with the path's own z put back
     z   [S, B, 6, Z]    by initial state (6) and knots (3J)
     j   [S, B, 6, C]    by θ
+    lost [S]            bool: the model runs away there; rows of zeros, nothing of it is used
     """
 
     cut: Cut
@@ -120,11 +149,27 @@ class Linear:
     e: np.ndarray
     z: np.ndarray
     j: np.ndarray
+    lost: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if len(self.lost) != len(self.cut):
+            object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
+
+    @property
+    def said(self) -> str:
+        """How many segments were left out; empty where none was."""
+        if not self.lost.any():
+            return ""
+        return (
+            f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
+            "the model runs away there."
+        )
 
     def pick(self, keep: np.ndarray) -> Linear:
         """Some of the segments."""
         path = Path(self.path.start[keep], self.path.push[keep])
-        return Linear(self.cut.pick(keep), path, self.e[keep], self.z[keep], self.j[keep])
+        parts = (getattr(self, name)[keep] for name in ("e", "z", "j", "lost"))
+        return Linear(self.cut.pick(keep), path, *parts)
 
     def less(self, pushed: np.ndarray) -> Linear:
         """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
@@ -133,7 +178,8 @@ class Linear:
     def beside(self, other: Linear) -> Linear:
         """These segments and others of the same record."""
         path = Path(*(_both(self.path, other.path, name) for name in ("start", "push")))
-        return Linear(self.cut.beside(other.cut), path, *(_both(self, other, n) for n in "ezj"))
+        parts = (_both(self, other, name) for name in ("e", "z", "j", "lost"))
+        return Linear(self.cut.beside(other.cut), path, *parts)
 
 
 def _both(one: object, other: object, name: str) -> np.ndarray:
@@ -215,8 +261,13 @@ def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
 
 
 def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
-    """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated."""
+    """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
+    that ran away stays where it was."""
     count, _, _, size = z.shape
+    away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
+    if away.any():
+        gap, z, used = gap.copy(), z.copy(), used & ~away[:, None, None]
+        gap[away], z[away] = 0.0, 0.0
     prior = np.concatenate((wide.start, np.repeat(wide.push, path.push.shape[-1])))
     weight = np.where(used, 1.0 / wide.noise, 0.0)
     scaled = (z * weight[..., None]).reshape(count, -1, size)
@@ -225,6 +276,7 @@ def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: 
     normal = turned @ scaled + np.diag(prior**-2.0)
     pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - path.known * prior**-2.0
     step = np.linalg.solve(normal, pull[..., None])[..., 0]
+    step[away] = 0.0
     return Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(path.push.shape))
 
 
@@ -236,19 +288,45 @@ def linear(
     path: Path,
     moved: np.ndarray,
     shown: np.ndarray,
+    wide: Wide | None = None,
 ) -> Linear:
     """Around a path, by all of θ, of which the last Q are causes' numbers.
 
     moved   [S, K, D, Q]  how those change what drives, where a cause reads otherwise
     shown   [S, B, 6, Q]  how they change what was measured
+    wide    how freely the path was pulled: what is FAR times that from its measurement has run
+            away; FAR times what the segments span where it is not given
     """
     y, columns = _run(model, theta, segments, path, g, moved)
+    lost = _lost(segments, y, columns, wide)
+    if lost.any():
+        used = segments.used & ~lost[:, None, None]
+        segments = replace(segments, used=used)
+        y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
+        columns[lost], shown = 0.0, np.where(lost[:, None, None, None], 0.0, shown)
     size = 6 + 3 * g.knots
     read = moved.shape[-1]
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= shown
     e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
-    return Linear(segments, path, e, z, j)
+    return Linear(segments, path, e, z, j, lost)
+
+
+def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
+    """[S] bool: where path or columns are not finite, or the path is nowhere near its measurement.
+
+    Only bins that were seen count, and channels of one kind (both of position, both of velocity)
+    have one width: that of `wide`, or the root mean square of what all segments span.
+    """
+    if wide is None:
+        span = np.ptp(segments.y, axis=1)[:, KIND].max(-1)
+        width = np.sqrt((span**2).mean(0))
+    else:
+        width = np.hypot(wide.start, wide.noise)[KIND].max(-1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        off = np.where(segments.used, np.abs(segments.y - y), 0.0).max(1)
+        near = (off <= FAR * np.maximum(width, LEAST)).all(-1)
+    return ~(near & np.isfinite(y).all((1, 2)) & np.isfinite(columns).all((1, 2, 3)))
 
 
 def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
@@ -285,26 +363,32 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
 
 
 def _run(model, theta, segments, path, g, moved=None):
-    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ."""
-    push = path.at_nodes(g)
-    per = (g.nodes - 1) // g.bins
+    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
+    model runs away."""
+    with np.errstate(all="ignore"):
+        return _every(model, theta, segments, path, g, moved)
+
+
+def _every(model, theta, segments, path, g, moved):
+    many = finer(model, segments.step)
+    step = segments.step / many
+    push, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
+    per = many * (g.nodes - 1) // g.bins
     ys, columns = [], []
     for part, filled in _chunks(len(segments)):
-        driven = filled(segments.driven)
+        driven = _between(filled(segments.driven), many)
         states = np.asarray(
-            _path(model, theta, filled(path.start), filled(push), driven, segments.step)
+            _path(model, theta, filled(path.start), _between(filled(push), many), driven, step)
         )
         keep = slice(part.stop - part.start)
         by_state, by_driven, by_theta = _along(
-            model, theta, states, driven, segments.step, coefficients=moved is not None
+            model, theta, states, driven, step, coefficients=moved is not None
         )
         states = states[keep]
-        how = moved[part] if moved is not None else np.zeros((*driven[keep].shape, 0))
+        how = np.zeros((*driven[keep].shape, 0)) if moved is None else _between(moved[part], many)
         pairs = 0.5 * (states[:, 1:] + states[:, :-1])
         ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
         columns.append(
-            variational.columns(
-                states, by_state, by_driven, by_theta, how, g.weights, segments.step, g.bins
-            )
+            variational.columns(states, by_state, by_driven, by_theta, how, hats, step, g.bins)
         )
     return np.concatenate(ys), np.concatenate(columns)
