@@ -1,6 +1,6 @@
 """Ships of other families: simulators that share nothing with shiplog but the writer of logs.
 
-    ship       what a ship is to the rest: body, actuators, coefficients, one compiled force function
+    ship       what a ship is to the rest: body, actuators, coefficients, a compiled force function
     abkowitz linear_dp catamaran azimuth_ferry shipmmg_kvlcc2      one family a file
     water disturbance      shallow water, bank, wind; gusts and process noise
     effects    what can be hidden, and its realistic size in units of the ship

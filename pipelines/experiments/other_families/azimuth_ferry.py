@@ -102,10 +102,10 @@ def draw(seed: int) -> Ship:
     full, harbour = FULL_REVOLUTIONS / root, rng.uniform(0.9, 1.2) * root
     thrust = about(rng, FULL_THRUST) * s**3 * (0.5 if four else 1.0)
     c = Coefficients(
-        power=rng.uniform(1.8, 2.05), scale=harbour, half=0.5 * length, units=float(len(ahead)), thrust=thrust,
-        thrust_power=rng.uniform(1.7, 2.0), reverse=rng.uniform(0.6, 0.9),
-        inflow=rng.uniform(0.08, 0.2) * thrust / harbour, full=full, ahead=np.array(ahead),
-        starboard=np.array(starboard), **damping,
+        power=rng.uniform(1.8, 2.05), scale=harbour, half=0.5 * length,
+        units=float(len(ahead)), thrust=thrust, thrust_power=rng.uniform(1.7, 2.0),
+        reverse=rng.uniform(0.6, 0.9), inflow=rng.uniform(0.08, 0.2) * thrust / harbour,
+        full=full, ahead=np.array(ahead), starboard=np.array(starboard), **damping,
     )  # fmt: skip
     lateral = rng.uniform(1.4, 2.2) * length * 1.0 * s
     windage = Windage(

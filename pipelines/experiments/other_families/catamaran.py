@@ -52,9 +52,11 @@ def forces(c, u, v, r, acting, gain, grow, cross, aside, out):
         xi = ((i + 0.5) / 12.0 - 0.5) * c.length
         across = v + xi * r
         one = drag * (1.0 - c.ends * (2.0 * xi / c.length) ** 4)
-        one *= (abs(across) / c.scale) ** (c.drag_power - 2.0) * abs(across) * across if (
-            across != 0.0
-        ) else 0.0
+        one *= (
+            (abs(across) / c.scale) ** (c.drag_power - 2.0) * abs(across) * across
+            if (across != 0.0)
+            else 0.0
+        )
         y -= one
         n -= one * xi
     for i in range(2):
@@ -84,7 +86,7 @@ def draw(seed: int) -> Ship:
     body = Body(
         mass=mass, gravity=gravity, inertia=inertia + mass * gravity**2,
         m_x=about(rng, ADDED["m_x"]) * mass, m_y=about(rng, ADDED["m_y"]) * mass, m_yr=0.0,
-        j_z=about(rng, ADDED["j_z"]) * inertia, added=1.0, munk=rng.uniform(0.0, 0.15),
+        j_z=about(rng, ADDED["j_z"]) * inertia, added=1.0, munk=rng.uniform(0.0, 0.05),
         length=length, breadth=breadth, draught=draught,
     )  # fmt: skip
     top, pull = FULL_SPEED * math.sqrt(scale), PULL * scale**3
@@ -96,7 +98,7 @@ def draw(seed: int) -> Ship:
     c = Coefficients(
         length=length, draught=draught, surge=linear * pull / top,
         surge_quadratic=(1.0 - linear) * pull / top**power, surge_power=power,
-        sway=rng.uniform(0.05, 0.2) * pull / top, yaw=yaw,
+        sway=rng.uniform(0.4, 0.9) * pull / top, yaw=yaw,
         yaw_quadratic=about(rng, QUADRATIC_YAW) * yaw * math.sqrt(scale) * 0.3,
         drag=rng.uniform(0.5, 1.0), drag_power=rng.uniform(1.7, 2.0), ends=rng.uniform(0.0, 0.4),
         scale=harbour, pull=0.6 * pull, power=rng.uniform(1.7, 2.1), reverse=about(rng, REVERSE),

@@ -65,7 +65,7 @@ def bursts(rng: np.random.Generator, times: np.ndarray, noise: Noise) -> np.ndar
     pole = np.exp((-noise.damping + 1j * math.sqrt(1.0 - noise.damping**2)) * omega * step)
     warm = int(3.0 / (noise.damping * omega * step)) + 1
     white = rng.standard_normal(warm + len(times))
-    value = lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], white)
+    value = np.asarray(lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], white))
     # variance of an AR(2) process with these coefficients
     a1, a2 = 2.0 * pole.real, -(abs(pole) ** 2)
     variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) ** 2 - a1**2))
@@ -100,6 +100,8 @@ def blow(wind: Wind, duration: float, times: np.ndarray, rng: np.random.Generato
     share = np.minimum(grid / duration, 1.0)
     gusts = sines(rng, grid, 0.002, 0.5, kaimal)
     speed = wind.speed * (1.0 + wind.freshen * share) * np.maximum(1.0 + wind.gust * gusts, 0.1)
-    direction = wind.direction + wind.turn * share + wind.veer * sines(rng, grid, 0.002, 0.3, kaimal)
+    direction = (
+        wind.direction + wind.turn * share + wind.veer * sines(rng, grid, 0.002, 0.3, kaimal)
+    )
     north, east = speed * np.cos(direction), speed * np.sin(direction)
     return np.column_stack((np.interp(times, grid, north), np.interp(times, grid, east)))

@@ -251,7 +251,5 @@ def geodetic(north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarra
     p = np.hypot(outward, east)
     theta = np.arctan2(up * a, p * b)
     ep2 = e2 / (1.0 - e2)
-    latitude = np.arctan2(
-        up + ep2 * b * np.sin(theta) ** 3, p - e2 * a * np.cos(theta) ** 3
-    )
+    latitude = np.arctan2(up + ep2 * b * np.sin(theta) ** 3, p - e2 * a * np.cos(theta) ** 3)
     return np.rad2deg(latitude), np.rad2deg(lon + np.arctan2(east, outward))

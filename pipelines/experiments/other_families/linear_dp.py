@@ -47,7 +47,9 @@ def forces(c, u, v, r, acting, gain, grow, cross, aside, out):
     y = -grow[1] * (c.d22 * v + c.d23 * r)
     n = -grow[2] * (c.d32 * v + c.d33 * r)
     bow = acting[0] / c.full
-    tunnel = c.bow * abs(bow) ** (c.power - 1.0) * bow * gain[0] * math.exp(-((u / c.bow_fades) ** 2))
+    tunnel = (
+        c.bow * abs(bow) ** (c.power - 1.0) * bow * gain[0] * math.exp(-((u / c.bow_fades) ** 2))
+    )
     y += tunnel
     n += tunnel * c.bow_at
     for i in range(2):
@@ -112,7 +114,7 @@ def draw(seed: int) -> Ship:
             rng.uniform(0.85, 1.0), rng.uniform(0.5, 0.8), rng.uniform(0.0, 0.12) * length, length,
         )  # fmt: skip
     return Ship(
-        family="linear_dp", name="Supply vessel", body=body, speed=speed, radius=8.0 * length,
+        family="linear_dp", name="Supply vessel", body=body, speed=speed, radius=12.0 * length,
         step=0.1, actuators=_actuators(c, length, rng), mixer=_mixer(full, rudders),
         noise=draw_noise(rng, length, speed), sensors=draw_sensors(rng, length), forces=forces,
         c=c, windage=windage, crabs=True, spins=True,
@@ -132,11 +134,20 @@ def _actuators(c: Coefficients, length: float, rng: np.random.Generator) -> tupl
     for side, athwart, drive in sides:
         # a ship without rudders has its screws written down as thrusters, like the bow one
         kind, particulars = (
-            ("propeller", {"diameter_m": round(0.04 * length, 2)}) if c.rudders else ("thruster", {})
+            ("propeller", {"diameter_m": round(0.04 * length, 2)})
+            if c.rudders
+            else ("thruster", {})
         )
         found.append(
             Actuator(
-                f"screw_{side}", kind, -c.full, c.full, (at, athwart), slow, 0.3 * c.full, drive,
+                f"screw_{side}",
+                kind,
+                -c.full,
+                c.full,
+                (at, athwart),
+                slow,
+                0.3 * c.full,
+                drive,
                 particulars=particulars,
             )
         )

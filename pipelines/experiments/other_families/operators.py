@@ -13,14 +13,15 @@ from pipelines.experiments.other_families.ship import Ship
 Demand = tuple[float, float, float]  # surge, turn, side in [-1, 1]
 Helm = Callable[[float, np.ndarray], np.ndarray]  # time [s], state [6 + ...] → orders [A]
 TELEGRAPH = (0.3, 0.45, 0.6, 0.8, 1.0)
-SHORTEST, LONGEST = 5.0, 240.0  # s, of one manoeuvre, whatever the ship
+SHORTEST, LONGEST = 5.0, 300.0  # s, of one manoeuvre, whatever the ship
 MIDDLE = -0.2  # of the radius: the bank makes the middle of the water lie west of the datum
+AHEAD = 3.5  # L/U that the operator looks ahead
 HAND = 0.1  # a hand turns the wheel in tenths
 
 
 @dataclass(frozen=True, slots=True)
 class Manoeuvre:
-    """Drawn with `weight`; lasts `low` to `high` times L/U. needs: what the ship must be able to."""
+    """Drawn with `weight`; lasts `low` to `high` L/U. needs: what the ship must be able to."""
 
     name: str
     weight: float
@@ -31,11 +32,11 @@ class Manoeuvre:
 
 MANOEUVRES = (
     Manoeuvre("cruise", 0.14, 1.0, 4.0),
-    Manoeuvre("turn", 0.22, 0.8, 4.0),
+    Manoeuvre("turn", 0.25, 0.8, 4.0),
     Manoeuvre("straight", 0.16, 2.5, 6.0),
     Manoeuvre("stop", 0.10, 1.0, 4.0),
     Manoeuvre("zigzag", 0.08, 3.0, 6.0),
-    Manoeuvre("astern", 0.13, 1.5, 5.0, "reverses"),
+    Manoeuvre("astern", 0.13, 3.0, 7.0, "reverses"),
     Manoeuvre("hover", 0.07, 0.8, 3.0, "spins"),
     Manoeuvre("spin", 0.06, 0.6, 2.0, "spins"),
     Manoeuvre("crab", 0.09, 0.8, 3.0, "crabs"),
@@ -62,10 +63,10 @@ class Operator:
     def __call__(self, time: float, state: np.ndarray) -> np.ndarray:
         x, y, psi, u, v, r = state[:6]
         velocity = complex(u, v) * np.exp(1j * psi)
-        look = complex(x, y) + 2.5 * self.ship.time_unit * velocity
+        look = complex(x, y) + AHEAD * self.ship.time_unit * velocity
         here = self._far(complex(x, y))
         soon = self._far(look)
-        if self.returning and here < 0.35:
+        if self.returning and (here < 0.35 or (here < 0.7 and soon < 0.5)):
             self.returning, self.until = False, time
         elif not self.returning and here > 0.4 and max(here, soon) > 0.75:
             self.returning, self.own, self.course = True, None, None
@@ -98,7 +99,9 @@ class Operator:
 
     def _orders(self, demand: Demand) -> np.ndarray:
         order = self.ship.mixer(*demand)
-        low, high = (np.array([getattr(a, k) for a in self.ship.actuators]) for k in ("low", "high"))
+        low, high = (
+            np.array([getattr(a, k) for a in self.ship.actuators]) for k in ("low", "high")
+        )
         free = np.array([a.kind == "azimuth" for a in self.ship.actuators])
         return np.where(free, order, np.clip(order, low, high))
 
@@ -116,7 +119,7 @@ class Operator:
         self.demand = {
             "cruise": (power, small, 0.0), "turn": (power, sign * some, 0.0),
             "straight": (power, 0.0, 0.0), "zigzag": (power, 0.0, 0.0), "stop": (0.0, 0.0, 0.0),
-            "astern": (-power, small * 3.0, 0.0), "hover": (0.5 * small, small, 0.0),
+            "astern": (-max(power, 0.6), small * 3.0, 0.0), "hover": (0.5 * small, small, 0.0),
             "spin": (0.0, sign * some, 0.0), "crab": (small, small, sign * some),
             "joystick": (0.0, 0.0, 0.0),
         }[chosen.name]  # fmt: skip

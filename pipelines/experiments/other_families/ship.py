@@ -176,7 +176,7 @@ def draw_noise(rng: np.random.Generator, length: float, speed: float) -> Noise:
         kind=str(rng.choice(("sea", "bursts"))),
         sigma=(share * unit, rng.uniform(0.6, 1.4) * share * unit, yaw),
         period=length / speed * math.exp(rng.uniform(math.log(0.5), math.log(5.0))),
-        damping=rng.uniform(0.2, 0.7),
+        damping=rng.uniform(0.15, 0.5),
         burst=rng.uniform(0.4, 0.9),
     )
 
@@ -191,7 +191,7 @@ def draw_sensors(rng: np.random.Generator, length: float) -> Sensors:
         antenna=(round(rng.uniform(-0.2, 0.3) * length, 2), 0.0),
         position_sigma=round(rng.uniform(0.015, 0.03) * (1.0 + 2.0 * large), 3),
         velocity_sigma=round(rng.uniform(0.01, 0.025), 3),
-        heading_sigma=round(rng.uniform(0.08, 0.25), 2) * degree,
+        heading_sigma=round(rng.uniform(0.06, 0.25) * (1.0 - 0.65 * large), 3) * degree,
         rate_sigma=round(rng.uniform(0.05, 0.15) * (1.0 - 0.8 * large), 3) * degree,
         wind_sigma=(round(rng.uniform(0.1, 0.3), 2), round(rng.uniform(1.5, 3.0), 1) * degree),
         slow=rng.uniform(0.1, 0.5),

@@ -75,8 +75,7 @@ def package():
         from shipmmg import mmg_3dof
     except ImportError as error:
         raise ValueError(
-            "The family shipmmg needs the package of that name: "
-            'pip install "shiplog[experiments]".'
+            'The family shipmmg needs the package of that name: pip install "shiplog[experiments]".'
         ) from error
     return mmg_3dof
 
@@ -85,10 +84,11 @@ def right_hand_side(basic: dict[str, float], hull: dict[str, float]) -> Callable
     """f(t, (u, v, r, x, y, ψ, δ, n)) of the package for these parameters."""
     module = package()
     still = [0.0, 0.0]
+    solver: Any = _Capture  # the package says str, and hands on what scipy takes
     try:
         module.simulate_mmg_3dof(
             module.Mmg3DofBasicParams(**basic), module.Mmg3DofManeuveringParams(**hull),
-            [0.0, 1.0], still, still, ρ=DENSITY, method=_Capture,
+            [0.0, 1.0], still, still, ρ=DENSITY, method=solver,
         )  # fmt: skip
     except _Found as found:
         return found.args[0]
@@ -138,8 +138,10 @@ def move(
             wanted = (order[j] - track[i, 6 + j]) / max(one.time, STEP)
             track[i + 1, 6 + j] = track[i, 6 + j] + STEP * min(max(wanted, -one.rate), one.rate)
         behind = _behind(track[: i + 2, 6], i + 0.5 - e.rudder_delay / STEP)
-        acting = behind if e.rudder_lag <= 0.0 else acting + (behind - acting) * (
-            1.0 - math.exp(-STEP / e.rudder_lag)
+        acting = (
+            behind
+            if e.rudder_lag <= 0.0
+            else acting + (behind - acting) * (1.0 - math.exp(-STEP / e.rudder_lag))
         )
         angle = acting + e.rudder_offset[1]
         if e.rudder_limit > 0.0:

@@ -69,10 +69,9 @@ def sail(
     steer = helm or Operator(ship, hand)
     pulses = draw_pulses(ship, effects.side_thrust, duration, pulse)
 
-    public = ship.own_motion is not None
+    public = ship.own_motion
     step = ship.step
-    rows = round(duration / PERIOD) * PERIOD / step
-    rows = math.ceil(rows - 1e-9)
+    rows = math.ceil(duration / step - 1e-9)
     times = step * np.arange(rows + 1) if public else 0.5 * step * np.arange(2 * rows + 1)
     push = np.zeros((len(times), 4))
     if not quiet:
@@ -84,7 +83,7 @@ def sail(
         air = blow(wind, duration, times, weather)
 
     if public:
-        track = ship.own_motion(
+        track = public(
             ship, effects, np.array(start, float), duration, steer, push[:, 1:], push[:, 0],
             campaign,
         )  # fmt: skip
@@ -107,7 +106,7 @@ def _at(track: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
     """The track at the log's times: its own rows, or smoothly between them."""
     every = round(PERIOD / step)
     if every >= 1 and abs(every * step - PERIOD) < 1e-9:
-        return track[:: every][: len(time)]
+        return track[::every][: len(time)]
     grid = step * np.arange(len(track))
     rate = np.gradient(track, step, axis=0)
     seen = CubicHermiteSpline(grid, track, rate)(time)
@@ -121,12 +120,12 @@ def _integrate(ship: Ship, e: Effects, start, rows, steer, air, push, campaign, 
     track = np.zeros((rows + 1, motion.STATE + 2 * count))
     track[0, :6] = start
     drive = drives_of(ship)
-    h = hidden_of(ship, e, campaign, duration)
+    h, c = hidden_of(ship, e, campaign, duration), with_rudders(ship, e.rudder_force)
     watch = round(WATCH / step)
     for first in range(0, rows, watch):
         order = np.asarray(steer(first * step, track[first].copy()), float)
         motion.advance(
-            ship.forces, with_rudders(ship, e.rudder_force), ship.body, ship.windage, drive, h, track, first,
+            ship.forces, c, ship.body, ship.windage, drive, h, track, first,
             min(watch, rows - first), step, order, air, push,
         )  # fmt: skip
     return track
