@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.experiments.other_families.ship import Ship
+from pipelines.experiments.other_families.water import DEEPEST, growth
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,8 +193,6 @@ def _wind_force(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
 
 def _shallow_water(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     """A slope through the basin. Size 0.5 leaves twice the water under the keel."""
-    from pipelines.experiments.other_families.water import DEEPEST, growth
-
     keel = min(RANGES["keel"].draw(rng, 1.0) / size, DEEPEST - 1.5)
     half, towards = rng.uniform(0.25, 0.7) * ship.radius, _bearing(rng)
     north, east = rng.uniform(-0.25, 0.25, 2) * ship.radius

@@ -52,7 +52,7 @@ REFRESH = 60.0  # s, between two sets of parameters where the thrust drifts
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Particulars:
-    """What the package's two parameter classes are made of, and the external masses [3, 3]."""
+    """Keywords of the package's two parameter classes."""
 
     basic: dict[str, float]
     hull: dict[str, float]
@@ -115,7 +115,7 @@ def move(
     ship: Ship, e: Effects, start: np.ndarray, duration: float, steer: Callable[..., np.ndarray],
     push: np.ndarray, side: np.ndarray, campaign: tuple[float, float],
 ) -> np.ndarray:  # fmt: skip
-    """[K, 6 + A] at `STEP`: x₀ y₀ ψ u v r δ n.
+    """[K, 8] at `STEP`: x₀ y₀ ψ u v r δ n. The controls act as in the middle of each step.
 
     push [K, 3]  accelerations, side [K] N of a thruster that nobody records; both at `STEP`
     """
