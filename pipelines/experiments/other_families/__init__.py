@@ -1,0 +1,13 @@
+"""Ships of other families: simulators that share nothing with shiplog but the writer of logs.
+
+    ship       what a ship is to the rest: body, actuators, coefficients, a compiled force function
+    abkowitz linear_dp catamaran azimuth_ferry shipmmg_kvlcc2      one family a file
+    water disturbance      shallow water, bank, wind; gusts and process noise
+    effects    what can be hidden, and its realistic size in units of the ship
+    operators motion voyage      who steers; equations of motion; one voyage
+    instruments profiles      the log and the ship.toml that belongs to it
+    cases      nominal and trial campaign, and the key
+
+Two families of forms must not win because one pen wrote both: laws, exponents and noise times here
+are taken from other sources than those of `shiplog.causes`, and a test compares them.
+"""
