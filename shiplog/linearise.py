@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 
 from shiplog import variational
-from shiplog.segments import BIN, KNOT, NODE_ROWS, Cut, Grid
+from shiplog.segments import NODE_ROWS, Cut, Grid
 from shiplog.sensitivity import Physical, rate
 from shiplog.traced import traced
 
@@ -199,16 +199,16 @@ class Wide:
 def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
     """From the measured path itself: its acceleration less the model's."""
     y = segments.y
-    centre = (np.arange(g.bins) + 0.5) * BIN
-    knots = np.arange(g.knots) * KNOT
+    centre = (np.arange(g.bins) + 0.5) * g.bin
+    knots = np.arange(g.knots) * g.knot
     velocity = y[..., [1, 3, 5]]
-    change = np.diff(velocity, axis=1) / BIN
+    change = np.diff(velocity, axis=1) / g.bin
     at = 0.5 * (centre[1:] + centre[:-1])
     accelerated = resampled(at, change, knots)
     states = resampled(centre, y, knots)
-    per = round(KNOT / (g.step * NODE_ROWS))
+    per = round(g.knot / (g.step * NODE_ROWS))
     said = accelerations(model, theta, states, segments.driven[:, ::per])
-    start = y[:, 0] - 0.5 * BIN * (y[:, 1] - y[:, 0]) / BIN
+    start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
     return Path(start, np.moveaxis(accelerated - said, -1, 1))
 
 

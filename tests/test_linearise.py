@@ -292,6 +292,23 @@ def test_a_path_is_pulled_onto_a_known_push():
     assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
 
 
+def test_a_path_is_pulled_on_a_longer_grid_too():
+    """Segments of 60 s with knots of 4 s: the same pushes, found through `reading` and all."""
+    g = segments.grid(SEEN, segments.Scale(60.0, 4.0, 4.0))
+    rows = segments.begins(SEEN, g)
+    t = g.knot * np.arange(g.knots)
+    push = np.stack((0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t)))
+    true = Path(SEEN.state[rows], np.tile(push, (2, 1, 1)))
+    cut, moved, shown = reading.read(Toy(), SETTING, SEEN, rows, None, g)
+    assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 301
+    y, _ = linearise._run(Toy(), THETA, cut, true, g)
+    cut = replace(cut, y=y)
+    tight = replace(WIDE, noise=0.01 * WIDE.noise)
+    found = linearise.pulled(Toy(), THETA, cut, g, tight, rounds=3)
+    assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
+    assert not linearise.linear(Toy(), THETA, cut, g, found, moved, shown, WIDE).lost.any()
+
+
 def test_what_was_not_used_does_not_pull():
     true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)

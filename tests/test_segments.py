@@ -1,0 +1,68 @@
+"""Segments in units of the ship: how long, what a bin and a knot are, and cut on a longer grid."""
+
+import closed
+import numpy as np
+import pytest
+
+from shiplog import profile as profiles
+from shiplog import segments
+from shiplog.segments import NODE_ROWS, Scale
+
+SEEN = closed.record(profiles.load("esso-osaka"))  # 120 s
+
+
+@pytest.mark.parametrize("speed", [0.31, 0.4, 0.5, 0.59])
+def test_a_three_metre_ship_keeps_half_a_minute(speed):
+    assert segments.scale(3.0, speed) == Scale(30.0, 2.0, 2.0) == Scale()
+
+
+@pytest.mark.parametrize(
+    ("length", "speed", "seconds"),
+    [
+        (2.0, 0.80, 21.0),  # a catamaran of 2.5 s
+        (3.0, 0.20, 60.0),  # 15 s
+        (76.2, 1.0, 240.0),  # a supply vessel of 76 s: the longest
+        (305.0, 3.4, 240.0),  # a tanker of 90 s
+        (30.0, 1.0, 120.0),  # 30 s
+        (3.0, 0.0, 240.0),  # at rest
+    ],
+)
+def test_larger_and_slower_ships_have_longer_segments(length, speed, seconds):
+    found = segments.scale(length, speed)
+    assert found.seconds == pytest.approx(seconds)
+    assert found.bin == found.knot == pytest.approx(seconds / 15)
+
+
+@pytest.mark.parametrize("time", np.geomspace(1.0, 200.0, 25))
+def test_every_scale_fits_the_rows(time):
+    """Bins and knots lie on nodes, of records at 10 Hz; 15 bins, 16 knots; four ship times, within
+    a factor of two where it is not at a bound."""
+    found = segments.scale(time, 1.0)
+    g = segments.grid(SEEN, found)
+    assert (g.bins, g.knots) == (15, 16)
+    assert g.rows == round(found.seconds / 0.1) == 15 * round(found.bin / 0.1)
+    assert (g.nodes - 1) % 15 == 0 and g.rows % NODE_ROWS == 0
+    assert g.weights.sum(1) == pytest.approx(1.0)  # hats add up to one everywhere
+    if 21.0 < found.seconds < 240.0:
+        assert 2.0 < found.seconds / time < 6.1
+
+
+def test_the_grid_that_nobody_scales_is_todays():
+    g = segments.grid(SEEN)
+    assert (g.seconds, g.bin, g.knot, g.nodes, g.bins, g.knots) == (30.0, 2.0, 2.0, 151, 15, 16)
+    rows = segments.begins(SEEN)
+    one, other = segments.cut(SEEN, rows), segments.cut(SEEN, rows, g)
+    assert np.array_equal(one.y, other.y) and np.array_equal(one.driven, other.driven)
+
+
+def test_on_a_longer_grid_a_bin_is_a_longer_mean():
+    """Of a ramp its middle: 4 s to a bin, 60 s to a segment, two of them in 120 s."""
+    g = segments.grid(SEEN, Scale(60.0, 4.0, 4.0))
+    rows = segments.begins(SEEN, g)
+    assert rows.tolist() == [0, 600]
+    ramp = closed.record(profiles.load("esso-osaka"))
+    ramp.state[:] = ramp.time[:, None]
+    cut = segments.cut(ramp, rows, g)
+    middle = 60.0 * np.arange(2)[:, None] + 4.0 * np.arange(15) + 2.0
+    assert cut.y == pytest.approx(np.repeat(middle[..., None], 6, -1), abs=1e-9)
+    assert cut.driven.shape[1] == g.nodes == 301
