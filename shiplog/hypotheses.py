@@ -141,7 +141,7 @@ class Trial:
             path = linearise.pulled(
                 ref.model, whole, cut, self.grid, wide, near, rounds=1 if near else 2
             )
-        linear = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        linear = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown, ref.wide)
         point = Point(numbers, path, linear, evidence.weighed(linear, self.unrest))
         if self.first is None:
             self.first = point
@@ -189,7 +189,7 @@ class Trial:
         cut, moved, shown = read(ref.model, ref.setting, self.record, rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
         path = linearise.pulled(ref.model, whole, cut, self.grid, ref.wide)
-        between = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown)
+        between = linearise.linear(ref.model, whole, cut, self.grid, path, moved, shown, ref.wide)
         return point.linear.beside(between)
 
     def robust(self, point: Point) -> None:

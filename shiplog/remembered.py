@@ -18,6 +18,8 @@ import numpy as np
 
 from shiplog import cache, reference
 from shiplog.causes import Setting
+from shiplog.diagnosis import nominal_campaign
+from shiplog.diagnosis.nominal_campaign import Characteristics
 from shiplog.evidence import Unrest
 from shiplog.linearise import Path
 from shiplog.models.extended import Extended
@@ -32,36 +34,72 @@ log = logging.getLogger(__name__)
 def settled(model: Extended, setting: Setting, start: Start, record: Record) -> Settled:
     """`reference.settled`, worked out once for a model and a campaign."""
     kept = cache.folder() / "settled" / f"{_key(model, setting, start, record)}.npz"
-    try:
-        with np.load(kept, allow_pickle=False) as arrays:
-            return _settled(arrays)
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
-        pass  # not there, or broken: worked out again
+    known = _read(kept)
+    if known is not None:
+        return _settled(known)
     log.info("where the nominal voyages settle: worked out once for a model and kept")
     found = reference.settled(model, setting, start, record)
-    try:
-        _keep(kept, found)
-    except OSError as error:
-        log.info("not kept: %s", error)
+    _keep(kept, {"theta": found.theta, "start": found.path.start, "push": found.path.push}
+          | _unrest(found.unrest))  # fmt: skip
     return found
 
 
-def _settled(arrays) -> Settled:
-    path = Path(arrays["start"], arrays["push"])
-    unrest = {name: arrays[f"unrest_{name}"] for name in UNREST}
-    return Settled(arrays["theta"], path, Unrest(time=float(arrays["time"]), **unrest))
-
-
-def _keep(kept: File, found: Settled) -> None:
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    partial = kept.with_name(f"{kept.stem}.{os.getpid()}.partial")
-    with partial.open("wb") as file:
-        np.savez(
-            file, theta=found.theta, start=found.path.start, push=found.path.push,
-            time=found.unrest.time,
-            **{f"unrest_{name}": getattr(found.unrest, name) for name in UNREST},
+def characteristics(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
+) -> Characteristics:
+    """`nominal_campaign.characteristics`, worked out once for a model and a campaign."""
+    key = _key(model, setting, start, record)
+    kept = cache.folder() / "settled" / f"{key}.characteristics.npz"
+    known = _read(kept)
+    if known is not None:
+        given = {k: dict(zip(known[f"{k}_names"].tolist(), known[f"{k}_values"].tolist(),
+                             strict=True)) for k in ("deviation", "size")}  # fmt: skip
+        return Characteristics(
+            _known_unrest(known), given["deviation"], given["size"],
+            float(known["share"]), float(known["noise"]),
         )  # fmt: skip
-    partial.replace(kept)
+    found = nominal_campaign.characteristics(model, setting, start, record, at)
+    arrays = _unrest(found.unrest) | {"share": found.share, "noise": found.noise}
+    for name in ("deviation", "size"):
+        values = getattr(found, name)
+        arrays |= {f"{name}_names": np.array(list(values)),
+                   f"{name}_values": np.array(list(values.values()))}  # fmt: skip
+    _keep(kept, arrays)
+    return found
+
+
+def _read(kept: File) -> dict | None:
+    """Arrays of a file; None where it is not there, or broken: then all is worked out again."""
+    try:
+        with np.load(kept, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _unrest(unrest: Unrest) -> dict:
+    whole = {f"unrest_{name}": getattr(unrest, name) for name in UNREST}
+    return whole | {"time": unrest.time}
+
+
+def _known_unrest(arrays: dict) -> Unrest:
+    return Unrest(time=float(arrays["time"]), **{n: arrays[f"unrest_{n}"] for n in UNREST})
+
+
+def _settled(arrays: dict) -> Settled:
+    return Settled(arrays["theta"], Path(arrays["start"], arrays["push"]), _known_unrest(arrays))
+
+
+def _keep(kept: File, arrays: dict) -> None:
+    """Whole or not at all; a cache that cannot be written is no fault."""
+    partial = kept.with_name(f"{kept.stem}.{os.getpid()}.partial")
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, **arrays)
+        partial.replace(kept)
+    except OSError as error:
+        log.info("not kept: %s", error)
 
 
 def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:

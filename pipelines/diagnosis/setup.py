@@ -52,8 +52,11 @@ def trial_of(
         # where the coefficients converge depends on the nominal voyages alone: it can be kept
         before = setting_of(run, nominal, nominal)
         usual, _ = catalogue.testable(before)
-        at = remembered.settled(model_of(run, usual, before)[0], before, start, nominal)
-        campaign = nominal_campaign.learn(model, setting, start, nominal, at)
+        plain, _ = model_of(run, usual, before)
+        start = nominal_campaign.widened(plain, before, start)
+        at = remembered.settled(plain, before, start, nominal)
+        found = remembered.characteristics(plain, before, start, nominal, at)
+        campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
     return Setup(Trial(campaign, recorded, tuple(held)), untested)
 
 

@@ -137,7 +137,7 @@ def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     }  # fmt: skip
     windless = run.profile.has_wind and not ship.wind
     lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
-    return Setting(run.profile, scale, places, spacing, lacking)
+    return Setting(run.profile, scale, places, spacing, lacking, ship.parts)
 
 
 def _places(record: Record, count: int) -> tuple[np.ndarray, float]:

@@ -8,7 +8,7 @@ trial may differ without any change: once as a campaign, and once more in each o
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -116,15 +116,45 @@ def prior(
     return information, information @ mean
 
 
-def learn(
+@dataclass(frozen=True)
+class Characteristics:
+    """What the nominal campaign alone says of model and ship; it can be kept for later trials.
+
+    unrest      sizes and correlation times of instrument and process noise
+    deviation   group of columns → standard deviation of one part's numbers, in their units
+    size        family of the discrepancy → prior size of its weights
+    share       how much of itself a trial counts
+    noise       standard deviation, over the parts, of the logarithm of the process noise
+    """
+
+    unrest: Unrest
+    deviation: Mapping[str, float]
+    size: Mapping[str, float]
+    share: float
+    noise: float
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """The nominal voyages linearised once, with the discrepancy's families."""
+
+    linear: Linear
+    columns: Columns
+    held: np.ndarray
+    families: Discrepancy
+    pushed: np.ndarray
+    rows: list[np.ndarray]
+
+
+def _pass(
     model: Extended, setting: Setting, start: Start, record: Record, at: Settled
-) -> Campaign:
-    """From the nominal voyages, linearised `at` where their coefficients converged."""
+) -> _Pass:
     columns = reference.columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
-    linear = linearise.linear(model, whole, cut, g, at.path, moved, shown)
+    wide = reference.wide_of(setting)
+    linear = linearise.linear(model, whole, cut, g, at.path, moved, shown, wide)
     held = reference.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.unrest.push, len(columns.unit), discrepancy.SEEN,
@@ -133,29 +163,80 @@ def learn(
     pushed = families.pushed(linear.cut, g)
     columns = columns.with_misfit(families.count)
     held = np.concatenate((held, np.zeros(families.count)))
-    known, rows = columns.known, parts_of(linear.cut.voyage)
-    unrest = noise_time(linear, pushed, columns, held, at.unrest)
-    modes = evidence.modes(evidence.weighed(linear, unrest), unrest).beside(pushed)
-    unseen = discrepancy.of(
-        record.profile, unrest.push, len(columns.unit), discrepancy.UNSEEN,
-        structure.at_knots(linear.cut, g),
-    )  # fmt: skip
-    whole = modes.beside(unseen.pushed(linear.cut, g))
-    every = products(whole, rows, np.append(columns.unit, np.ones(unseen.count)))
-    each = [g[: 1 + len(known), : 1 + len(known)] for g in every]
-    effects = voyage_effects.learn(
-        each, known, held, _groups(model, columns, families), [f.columns for f in families.families]
-    )
+    return _Pass(linear, columns, held, families, pushed, parts_of(linear.cut.voyage))
+
+
+def characteristics(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
+) -> Characteristics:
+    """Learned from the nominal voyages, linearised `at` where their coefficients converged."""
+    made = _pass(model, setting, start, record, at)
+    columns, held, known = made.columns, made.held, made.columns.known
+    unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)
+    modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
+    each = products(modes, made.rows, columns.unit)
+    groups = _groups(model, columns, made.families)
+    sized = [family.columns for family in made.families.families]
+    effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
     parts = [reduced(one, effects.deviation)[0] for one in each]
     share = _share(parts, effects, held)
     information, pull = prior(parts, effects.size**-2.0, held, effects.deviation, share)
-    made = Reference(
-        model, setting, at.theta, columns, unrest, reference.wide_of(setting), information, pull,
-        held, 1.0 / share, linear, modes, reference.freedom(len(rows)), misfit=families,
-        counts=share,
+    return Characteristics(
+        unrest,
+        {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
+        {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
+        share,
+        _noise(modes, made.rows, columns, effects, information, pull),
+    )
+
+
+def learn(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    found: Characteristics,
+) -> Campaign:  # fmt: skip
+    """The campaign as a trial's causes see it, which depend on where the trial was."""
+    made = _pass(model, setting, start, record, at)
+    columns, held, families = made.columns, made.held, made.families
+    unrest, known = found.unrest, made.columns.known
+    modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
+    unseen = discrepancy.of(
+        record.profile, at.unrest.push, len(columns.unit), discrepancy.UNSEEN,
+        structure.at_knots(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
-    spread = _noise(modes, rows, columns, effects, information, pull)
-    return Campaign(made, effects, families, unseen, tuple(every), spread)
+    whole = modes.beside(unseen.pushed(made.linear.cut, segments.grid(record)))
+    every = products(whole, made.rows, np.append(columns.unit, np.ones(unseen.count)))
+    deviation, size = np.zeros(len(known)), known**-0.5
+    for name, where in _groups(model, columns, families).items():
+        deviation[where] = found.deviation.get(name, voyage_effects.LEAST)
+    for family in families.families:
+        size[family.columns] = found.size[family.name]
+    effects = VoyageEffects(deviation, size)
+    count = 1 + len(known)
+    parts = [reduced(g[:count, :count], deviation)[0] for g in every]
+    information, pull = prior(parts, size**-2.0, held, deviation, found.share)
+    reference_made = Reference(
+        model, setting, at.theta, columns, unrest, reference.wide_of(setting), information, pull,
+        held, 1.0 / found.share, made.linear, modes, reference.freedom(len(made.rows)),
+        misfit=families, counts=found.share,
+    )  # fmt: skip
+    return Campaign(reference_made, effects, families, unseen, tuple(every), found.noise)
+
+
+def widened(model: Extended, setting: Setting, start: Start) -> Start:
+    """Coefficients at least as free on the nominal voyages as any cause makes them in a trial."""
+    names = model.base.names
+    values = dict(zip(names, start.values, strict=True))
+    spread = start.spread.copy()
+    still = np.zeros(6)
+    for cause in model.causes:
+        if not cause.absorbed:
+            continue
+        for size in np.diag(cause.sizes(setting)):
+            changed = cause.coefficients(dict(values), size, still, 0.5, {})
+            for i, name in enumerate(names):
+                more = abs(float(changed.get(name, values[name])) - values[name])
+                spread[i] = max(spread[i], more)
+    return replace(start, spread=spread)
 
 
 def noise_time(
@@ -191,13 +272,13 @@ def _solved(
     return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
 
 
-def _groups(model: Extended, columns: Columns, families: Discrepancy) -> list[np.ndarray]:
+def _groups(model: Extended, columns: Columns, families: Discrepancy) -> dict[str, np.ndarray]:
     """Columns that share one variance: coefficients of one part of the ship, each cause's numbers,
     each family of the discrepancy."""
     part = np.array([name.split(".")[0] for name in model.base.names])
-    found = [np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())]
-    found += [columns.of[cause.label] for cause in model.causes if cause.usual]
-    return found + [family.columns for family in families.families]
+    found = {name: np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())}
+    found |= {c.label: columns.of[c.label] for c in model.causes if c.usual}
+    return found | {family.name: family.columns for family in families.families}
 
 
 def _share(parts: Sequence[np.ndarray], effects: VoyageEffects, held: np.ndarray) -> float:
@@ -251,7 +332,8 @@ def assumed(
     if given:
         start = replace(start, spread=reference.GIVEN * start.spread)
     at = reference.settled(model, setting, start, record, rounds=0 if given else reference.ROUNDS)
-    whole = learn(model, setting, start, record, at)
+    found = characteristics(model, setting, start, record, at)
+    whole = learn(model, setting, start, record, at, found)
     columns, deviation = whole.reference.columns, whole.effects.deviation.copy()
     causes = slice(columns.base, columns.linearised)
     deviation[causes] = 0.0

@@ -19,7 +19,7 @@ from shiplog.diagnosis import discrepancy
 from shiplog.diagnosis.nominal_campaign import Campaign, parts_of, products
 from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.evidence import Modes
-from shiplog.hypotheses import Found, Level, Point
+from shiplog.hypotheses import ROBUST, Found, Level, Point
 from shiplog.record import Record
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
@@ -53,12 +53,51 @@ class Trial(hypotheses.Trial):
         self.families = {family.name: family.columns for family in both}
         self.parts = parts_of(record.voyage[self.rows])
         self.remainder = Remainder()  # that `scan` includes
+        self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model runs away
+        self._begun = False
         self._totals: list[tuple[tuple, np.ndarray, float]] = []
 
     @property
     def pulse(self) -> bytes:
         """Tells one remainder of this trial from another."""
         return super().pulse + f"{self.remainder.kind} {self.remainder.size}".encode()
+
+    # --- linearisation ---
+
+    def at(self, numbers, near=None, louder=None) -> Point:
+        """Segments on which the model runs away carry no information. Where only a hypothesis makes
+        it run away it is that hypothesis that fails: raises np.linalg.LinAlgError."""
+        point = super().at(numbers, near, louder)
+        lost = point.linear.lost
+        if lost is not None and (lost & (self.weight > 0.0)).any():
+            if point is not self.first and self._begun:
+                raise np.linalg.LinAlgError("the model runs away with these numbers")
+            self.weight = np.where(lost, 0.0, self.weight)
+            self.lost = lost
+        return point
+
+    def begin(self, numbers: Mapping[str, np.ndarray]) -> Point:
+        point = super().begin(numbers)
+        self._begun = True
+        return point
+
+    def robust(self, point: Point) -> None:
+        """Weights of the segments, the same for every hypothesis: a few must not decide."""
+        level = max(self.levels(point), key=lambda level: level.value)
+        unit = np.append(self.reference.columns.unit, np.zeros(self.unseen.count))
+        d = np.concatenate((level.solution[: len(self.reference.pull)], np.zeros(self.unseen.count)))
+        modes, noise = self.modes(point, level.louder)
+        r = np.concatenate(([1.0], -d * unit))
+        left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
+        pushed = modes.pushed @ more
+        own = modes.md @ left + modes.felt * pushed
+        square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
+        square += ((2.0 * (modes.md @ left) + modes.felt * pushed) * pushed).sum(-1)
+        chi2 = square - (own**2 / (modes.felt + noise**-2.0)).sum(-1)
+        kept = self.weight > 0.0
+        middle = np.median(chi2[kept]) if kept.any() else 1.0
+        weight = np.minimum(1.0, ROBUST * middle / np.maximum(chi2, 1e-9))
+        self.weight = np.where(kept, weight, 0.0)
 
     # --- products ---
 
@@ -178,8 +217,9 @@ class Trial(hypotheses.Trial):
             here = near
         below, middle_value, above = at(here / FINER), at(here), at(here * FINER)
         bend = below - 2.0 * middle_value + above
-        if bend < 0.0:  # the top of the parabola through them
-            at(here * FINER ** float(np.clip(0.5 * (below - above) / bend, -2.0, 2.0)))
+        top = float(np.clip(0.5 * (below - above) / bend, -3.0, 3.0)) if bend < 0.0 else 0.0
+        if abs(top) > 1.0:  # of the parabola through them, and beyond them
+            at(here * FINER**top)
         return list(tried.values())
 
     def _numbers(self, level, point, included):
