@@ -226,7 +226,7 @@ def draw(seed: int) -> Ship:
     actuators = (
         Actuator(
             "rudder", "rudder", -most, most, (round(-0.5 * length, 2), 0.0), 0.3,
-            math.radians(15.8) / root, particulars={"area_m2": round(basic["A_R"], 4)},
+            math.radians(15.8) / root, particulars={"area_m2": round(basic["A_R"], 4), "span_m": round(BASIC["height"] * s, 3)},
         ),
         Actuator(
             "propeller", "propeller", 0.0, 1.4 * turns, (round(-0.48 * length, 2), 0.0), 1.0,
