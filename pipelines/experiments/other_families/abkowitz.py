@@ -131,7 +131,10 @@ def draw(seed: int) -> Ship:
         Actuator(
             "rudder", "rudder", -most, most, (round(-0.5 * length, 1), 0.0), 2.0,
             math.radians(rng.uniform(2.3, 4.0)),
-            particulars={"area_m2": round(0.018 * length * body.draught, 1)},
+            particulars={
+                "area_m2": round(0.018 * length * body.draught, 1),
+                "span_m": round(0.75 * body.draught, 2),
+            },
         ),
         Actuator(
             "propeller", "propeller", round(-0.75 * shaft, 2), round(0.75 * shaft, 2),

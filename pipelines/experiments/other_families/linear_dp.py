@@ -123,6 +123,7 @@ def draw(seed: int) -> Ship:
 
 def _actuators(c: Coefficients, length: float, rng: np.random.Generator) -> tuple[Actuator, ...]:
     most, slow = math.radians(40.0), rng.uniform(2.0, 5.0)
+    blade = {"area_m2": round(0.0011 * length**2, 1), "span_m": round(0.042 * length, 2)}
     at, apart = round(c.screw_at, 1), round(c.apart, 1)
     found = [
         Actuator(
@@ -156,7 +157,7 @@ def _actuators(c: Coefficients, length: float, rng: np.random.Generator) -> tupl
             found.append(
                 Actuator(
                     f"rudder_{side}", "rudder", -most, most, (round(c.rudder_at, 1), athwart), 1.5,
-                    math.radians(4.0), particulars={"area_m2": round(0.0011 * length**2, 1)},
+                    math.radians(4.0), particulars=blade,
                 )
             )  # fmt: skip
     return tuple(found)

@@ -223,10 +223,11 @@ def draw(seed: int) -> Ship:
     )  # fmt: skip
     root = math.sqrt(s)
     speed, turns, most = SPEED * root, REVOLUTIONS / root, math.radians(35.0)
+    blade = {"area_m2": round(basic["A_R"], 4), "span_m": round(BASIC["height"] * s, 3)}
     actuators = (
         Actuator(
             "rudder", "rudder", -most, most, (round(-0.5 * length, 2), 0.0), 0.3,
-            math.radians(15.8) / root, particulars={"area_m2": round(basic["A_R"], 4)},
+            math.radians(15.8) / root, particulars=blade,
         ),
         Actuator(
             "propeller", "propeller", 0.0, 1.4 * turns, (round(-0.48 * length, 2), 0.0), 1.0,
