@@ -19,7 +19,7 @@ from pipelines import diagnose as pipeline
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.diagnosis.trial import record_of
 from pipelines.identify import identify_run
-from pipelines.known_ship import cases, sensors
+from pipelines.known_ship import Laws, cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split
 from shiplog import (
@@ -70,9 +70,12 @@ class Tide(Cause):
 
 
 def hidden(cause: str, size: float = 1.0, **changes) -> cases.Case:
-    """This ship with something hidden for 500 s, two voyages; `changes` to what is hidden."""
+    """This ship with something hidden for 500 s, two voyages; `changes` to what is hidden.
+
+    Under the sample logs' laws: thresholds here are of the program, with a ship that it can fit.
+    """
     case = cases.draw(SEED, cause=cause, size=size, seconds=500)
-    return replace(case, effects=replace(case.effects, **changes))
+    return replace(case, laws=Laws(), effects=replace(case.effects, **changes))
 
 
 def log(case: cases.Case, leg: cases.Leg, folder):
@@ -86,7 +89,7 @@ def sea(tmp_path_factory):
     """The whole way, once: run, store, what is usual, the diagnosis of a trial with a current."""
     work = tmp_path_factory.mktemp("sea")
     (work / "logs").mkdir()
-    case = hidden("current")
+    case = hidden("current", size=2.3)  # 0.14 m/s
     paths = [log(case, leg, work / "logs") for leg in case.nominal if leg.name in NOMINAL]
     paths += [log(case, leg, work / "logs") for leg in case.trial]
     short = replace(case.trial[0], name="short", seconds=100.0)
@@ -1116,7 +1119,7 @@ def test_half_the_data_has_the_same_name(sea):
 
 def test_reversing_the_campaign_turns_a_drift_round(sea, trials):
     """Thrust 1 + p s becomes (1 + p) (1 - p s / (1 + p)): a loss with a recovery."""
-    seen = trials("thrust_drift")
+    seen = trials("thrust_drift", size=1.5)
     _, plain = judged(sea.usual, seen)
     assert labels(plain) == ["thrust_drift"]
     back = Trial(sea.usual, replace(seen, share=1.0 - seen.share))
@@ -1133,7 +1136,7 @@ def test_reversing_the_campaign_turns_a_drift_round(sea, trials):
 
 def test_of_shuffled_time_nothing_drifts(sea, trials):
     """Each half minute of the campaign at another's place in it: a loss, and no drift beside it."""
-    seen = trials("thrust_drift")
+    seen = trials("thrust_drift", size=1.5)
     drift = next(c for c in sea.usual.model.causes if c.label == "thrust_drift")
     pieces = np.array_split(seen.share, round(len(seen) * seen.step / 30.0))
     order = np.random.default_rng(0).permutation(len(pieces))
