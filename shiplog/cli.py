@@ -48,6 +48,7 @@ def main() -> None:
     # What JAX compiled for one ship serves every later command: some ten seconds each.
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.folder() / "jax"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    cache.trim()
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)
@@ -80,6 +81,24 @@ def _answer(text: str, content: dict, json_to: str | None) -> None:
                 f"{json_to} cannot be written: {error.strerror}.",
                 hint="give --json a path in a folder that exists.",
             ) from error
+
+
+@app.command("cache")
+def cache_command(
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all that is kept.")] = False,
+    json_to: JsonTo = None,
+) -> None:
+    """What shiplog keeps to be faster the next time: where, how much, and a way to remove it.
+
+    Example: shiplog cache --clear
+    """
+    removed = cache.trim(0) if clear else cache.trim()
+    kept = cache.size()
+    text = f"{cache.folder()} holds {kept / 1e6:.1f} MB (at most {cache.LIMIT / 1e6:.0f} MB)."
+    if removed:
+        text += f" {removed / 1e6:.1f} MB were removed."
+    content = {"folder": str(cache.folder()), "bytes": kept, "removed": removed}
+    _answer(text, content | {"limit": cache.LIMIT}, json_to)
 
 
 @app.command()

@@ -7,13 +7,14 @@ is left; which set came first cannot matter.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error
+from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
 from shiplog.linearise import Path
@@ -26,6 +27,11 @@ LIKELY = 0.3  # share of the best one's evidence: before it is linearised again 
 CONTENDERS = 3  # causes that are tried from one hypothesis
 FALLS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
+
+
+SHOWN = 5.0  # nats that a cause would have to bring to be seen at all
+
+log = logging.getLogger(__name__)
 
 
 class Search:
@@ -97,6 +103,7 @@ class Search:
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
             self.told = {f.name: f.told for f in found}
+            self._say_what_would_not_show()
         said = []
         for f in found:
             if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
@@ -106,21 +113,30 @@ class Search:
             said.append((labels, numbers, self._score(base.evidence + f.evidence, labels, one.kind)))
         return said[:CONTENDERS]
 
+    def _say_what_would_not_show(self) -> None:
+        """What the model's misfit and these voyages cost, before anything is looked for."""
+        shares = {name: told.together(SHOWN) for name, told in self.told.items()}
+        blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
+        if blind:
+            log.info("of what is realistic would not show: %s", ", ".join(dict.fromkeys(blind)))
+
     # --- one set of causes ---
 
-    def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], near: Point) -> None:
+    def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
         """A set of causes under every remainder, linearised where it is likeliest."""
         self._tried.add(labels)
         trial = self.trial
         trial.remainder = Remainder(RAISED)
-        point = near
+        point, near = at, None
         if labels:
             lowest = self.nothing.evidence - FALLS
-            path = near.path if isinstance(near, Point) else near
-            point, base = settle(trial, labels, numbers, path, lowest=lowest)
+            point, base = settle(trial, labels, numbers, at.path, lowest=lowest)
             if not math.isfinite(base.evidence):
                 return
-        levels = trial.levels(point, labels)
+            near = base.louder
+        levels = trial.levels(point, labels, near)
+        if near is not None and near > RAISED_FROM:  # a remainder may bring the usual noise back
+            levels.append(trial.level(point, 1.0, labels))
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
         if len(labels) == 1:
@@ -129,7 +145,7 @@ class Search:
         best = max((self.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
         for family in trial.families:
             self._change(point, labels, levels, family, best)
-        if max(level.louder for level in levels if level is self._best(levels, RAISED)) > RAISED_FROM:
+        if self._best(levels, RAISED).louder > RAISED_FROM:
             self._pulses(point, labels)
 
     def _best(self, levels: Sequence[Level], kind: str) -> Level:

@@ -29,3 +29,7 @@ MOST = 0.5
 # Share of the held-out error. Where a plain regression leaves less than this share of the model's
 # error, the model lacks a force: causes that change forces are not tested.
 BASELINE = 0.5
+
+# Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
+# time that it is on, while a force that merely varies is between as often as above.
+BETWEEN = 0.5
