@@ -86,7 +86,7 @@ def _answer(text: str, content: dict, json_to: str | None) -> None:
 @app.command("cache")
 def cache_command(
     clear: Annotated[bool, typer.Option("--clear", help="Remove all that is kept.")] = False,
-    json_to: JsonTo = None,
+    json_to: JsonOption = None,
 ) -> None:
     """What shiplog keeps to be faster the next time: where, how much, and a way to remove it.
 
