@@ -33,11 +33,12 @@ class Planned:
 
     @property
     def options(self) -> list[str]:
-        """Of the simulator's command `case`, after seed, folder and key."""
+        """Of the simulator's command `case`, after seed, folder and key. A ship of another family
+        has campaigns as long as its own time scale L/U asks for."""
         given = [] if not self.family else ["--family", self.family]
         given += [] if self.cause is None else ["--cause", self.cause]
         given += [] if self.size is None else ["--size", str(self.size)]
-        return [*given, "--seconds", str(self.seconds)]
+        return given if self.family else [*given, "--seconds", str(self.seconds)]
 
 
 @dataclass(frozen=True, slots=True)

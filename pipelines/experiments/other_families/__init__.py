@@ -11,3 +11,16 @@
 Two families of forms must not win because one pen wrote both: laws, exponents and noise times here
 are taken from other sources than those of `shiplog.causes`, and a test compares them.
 """
+
+from __future__ import annotations
+
+from pipelines.experiments.other_families import effects
+from pipelines.experiments.other_families.cases import FAMILIES
+from pipelines.experiments.other_families.effects import OUTSIDE
+
+__all__ = ["FAMILIES", "OUTSIDE", "offered"]
+
+
+def offered(family: str) -> tuple[str, ...]:
+    """What can be hidden in a ship of this family, catalogue and outside; each has its actuators."""
+    return effects.offered(FAMILIES[family](0))
