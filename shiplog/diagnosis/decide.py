@@ -60,7 +60,7 @@ def _named(
     for label in best.found.numbers:
         part = slice(at, at + len(columns.of[label]))
         at = part.stop
-        if label not in by or name_of(label) not in names:
+        if label not in by or name_of(label) not in names or not found.states(label):
             continue
         others = _instead(found, best, label)
         assert best.found.covariance is not None

@@ -75,4 +75,4 @@ def form_error(alone: Mapping[str, float], labels: Sequence[str]) -> float:
     if len(labels) < 2:
         return 0.0
     first = max((alone.get(label, 0.0) for label in labels), default=0.0)
-    return thresholds.FORM_ERROR * max(first, 0.0) * (len(labels) - 1)
+    return thresholds.FORM_ERROR**2 * max(first, 0.0) * (len(labels) - 1)

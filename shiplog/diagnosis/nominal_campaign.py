@@ -329,19 +329,20 @@ def assumed(
         none = Discrepancy((), made.unrest.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
         return Campaign(made, effects, none, none, (), 0.0)
-    if given:
-        start = replace(start, spread=reference.GIVEN * start.spread)
+    start = widened(model, setting, start)
     at = reference.settled(model, setting, start, record, rounds=0 if given else reference.ROUNDS)
+    # how parts differ is learned with coefficients as free as they plausibly are: what all parts
+    # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at)
     whole = learn(model, setting, start, record, at, found)
-    columns, deviation = whole.reference.columns, whole.effects.deviation.copy()
-    causes = slice(columns.base, columns.linearised)
-    deviation[causes] = 0.0
-    known = whole.effects.size**-2.0
-    known[causes] = HELD
+    columns, known = whole.reference.columns, whole.effects.size**-2.0
+    known[columns.base : columns.linearised] = HELD
+    if given:
+        known[: columns.base] = reference.GIVEN**-2.0
     made = replace(
-        whole.reference, information=np.diag(known), pull=whole.reference.anchor, nominal=None,
-        modes=None, adapts=not given,
+        whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
+        nominal=None, modes=None, adapts=not given,
     )  # fmt: skip
-    effects = VoyageEffects(deviation, known**-0.5)
-    return replace(whole, reference=made, effects=effects, each=())
+    return replace(
+        whole, reference=made, effects=VoyageEffects(whole.effects.deviation, known**-0.5), each=()
+    )

@@ -26,6 +26,7 @@ class Posterior:
 
     hypotheses   best first, with their probabilities [H]
     names        name of a cause → probability; below practical size it counts as no change
+    labels       the same of each of its kinds, such as each clock
     kinds        kind of remainder → probability
     none         probability that nothing of practical size changed
     """
@@ -33,6 +34,7 @@ class Posterior:
     hypotheses: tuple[Hypothesis, ...]
     probability: np.ndarray
     names: Mapping[str, float]
+    labels: Mapping[str, float]
     kinds: Mapping[str, float]
     none: float
 
@@ -40,6 +42,13 @@ class Posterior:
     def stated(self) -> tuple[str, ...]:
         """Names that are probable enough to be stated."""
         return tuple(n for n, p in self.names.items() if p >= thresholds.STATED)
+
+    def states(self, label: str) -> bool:
+        """Whether one kind of a stated cause belongs to the verdict: the likeliest, and others
+        that are probable enough by themselves."""
+        same = {n: p for n, p in self.labels.items() if name_of(n) == name_of(label)}
+        own = same.get(label, 0.0)
+        return own >= thresholds.STATED or own == max(same.values(), default=0.0)
 
     @property
     def remainder(self) -> str | None:
@@ -61,17 +70,20 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     share = np.exp(score - score.max())
     share /= share.sum()
     names: dict[str, float] = {}
+    labels: dict[str, float] = {}
     kinds: dict[str, float] = {}
     none = 0.0
     for one, p in zip(kept, share, strict=True):
         real = practical(search, one)
         for name in dict.fromkeys(name_of(label) for label in real):
             names[name] = names.get(name, 0.0) + float(p)
+        for label in real:
+            labels[label] = labels.get(label, 0.0) + float(p)
         kinds[one.kind] = kinds.get(one.kind, 0.0) + float(p)
         if not real and one.kind == NOMINAL:
             none += float(p)
     order = sorted(names, key=lambda name: -names[name])
-    return Posterior(tuple(kept), share, {n: names[n] for n in order}, kinds, none)
+    return Posterior(tuple(kept), share, {n: names[n] for n in order}, labels, kinds, none)
 
 
 def practical(search: Search, one: Hypothesis) -> tuple[str, ...]:

@@ -18,9 +18,10 @@ ANOTHER_CAUSE = 0.1
 # Share of trials in which something remains that no cause of the catalogue explains.
 REMAINDER = 0.15
 
-# Share of the log evidence. A cause's equations are right to a few per cent, and what they leave
-# over imitates further causes: each of these has to bring more than this share of the first.
-FORM_ERROR = 0.01
+# Share of a force or of a reading. A cause's equations are right to about this share, and what they
+# leave over imitates further causes. Nats go with the square: each further cause has to bring more
+# than this squared of what the strongest one brings.
+FORM_ERROR = 0.02
 
 # Share of what a hypothesis explains. Beside a remainder, a cause is a name for the trial only
 # where it explains more than the remainder does.
