@@ -8,6 +8,7 @@ Every part of the trial has deviations of its own (`voyage_effects`), which are 
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from shiplog.columns import HELD
 from shiplog.diagnosis import discrepancy
 from shiplog.diagnosis.nominal_campaign import Campaign, parts_of, products
 from shiplog.diagnosis.voyage_effects import reduced
-from shiplog.evidence import Modes
+from shiplog.evidence import Modes, Weighed
 from shiplog.hypotheses import ROBUST, Found, Level, Point
 from shiplog.record import Record
 
@@ -55,7 +56,7 @@ class Trial(hypotheses.Trial):
         self.remainder = Remainder()  # that `scan` includes
         self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model runs away
         self._begun = False
-        self._totals: list[tuple[tuple, np.ndarray, float]] = []
+        self._totals: list[tuple[weakref.ref[Weighed], tuple, np.ndarray, float]] = []
 
     @property
     def pulse(self) -> bytes:
@@ -109,9 +110,9 @@ class Trial(hypotheses.Trial):
 
     def total(self, point: Point, noise: float) -> tuple[np.ndarray, float]:
         """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
-        key = (id(point.weighed), noise, self.weight.tobytes(), super().pulse)
-        for known, total, volume in self._totals:
-            if known == key:
+        key = (noise, self.weight.tobytes(), super().pulse)
+        for of, known, total, volume in self._totals:
+            if of() is point.weighed and known == key:
                 return total, volume
         modes, noise = self.modes(point, noise)
         unit = np.append(self.reference.columns.unit, np.ones(self.unseen.count))
@@ -121,7 +122,8 @@ class Trial(hypotheses.Trial):
         for gram in each:
             gram, logdet = reduced(gram, deviation)
             total, volume = total + gram, volume + logdet
-        self._totals = [*self._totals[-40:], (key, total, volume)]
+        # no id(): a point that is gone leaves its own to the next one
+        self._totals = [*self._totals[-40:], (weakref.ref(point.weighed), key, total, volume)]
         return total, volume
 
     def volume(self, louder: float) -> float:
