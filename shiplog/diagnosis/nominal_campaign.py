@@ -28,6 +28,7 @@ from shiplog.reading import read
 from shiplog.record import Record
 from shiplog.reference import Reference, Settled, Start
 
+ROBUST = 6.0  # medians of χ², from which on a segment counts less
 PART = 20  # segments of one part of a campaign: 10 minutes
 FEWEST = 4  # parts that a campaign is cut into, where it has twice as many segments
 NOISE_TIMES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, of the process noise
@@ -125,6 +126,7 @@ class Characteristics:
     size        family of the discrepancy → prior size of its weights
     share       how much of itself a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
+    weight      [S] of each segment
     """
 
     unrest: Unrest
@@ -132,6 +134,7 @@ class Characteristics:
     size: Mapping[str, float]
     share: float
     noise: float
+    weight: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -173,11 +176,16 @@ def characteristics(
     made = _pass(model, setting, start, record, at)
     columns, held, known = made.columns, made.held, made.columns.known
     unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)
-    modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
-    each = products(modes, made.rows, columns.unit)
     groups = _groups(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
-    effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
+    weight = np.ones(len(made.linear.e))
+    for last in (False, False, True):
+        modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
+        each = products(modes, made.rows, columns.unit, weight)
+        effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
+        if not last:  # what the parts disagree in is no noise, nor what a few segments are off by
+            weight = _weights(modes, made, effects)
+            unrest = _noise_of_parts(made, effects, unrest, weight >= 1.0)
     parts = [reduced(one, effects.deviation)[0] for one in each]
     share = _share(parts, effects, held)
     information, pull = prior(parts, effects.size**-2.0, held, effects.deviation, share)
@@ -186,8 +194,52 @@ def characteristics(
         {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
         {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
         share,
-        _noise(modes, made.rows, columns, effects, information, pull),
+        _noise(modes, made.rows, columns, effects, information, pull, weight),
+        weight,
     )
+
+
+def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Weight [S] of segments with these squares [S]: what is ROBUST medians off or more counts
+    less, so that a few segments do not decide. Segments that are not `kept` [S] have none."""
+    middle = float(np.median(square[kept])) if kept.any() else 1.0
+    weight = np.minimum(1.0, ROBUST * middle / np.maximum(square, 1e-9))
+    return np.where(kept, weight, 0.0)
+
+
+def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray:
+    """χ² [S] of the segments with these numbers [C + W], SI: of the pass's own columns, then of
+    those that push at the nodes."""
+    r = np.concatenate(([1.0], -numbers))
+    left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
+    pushed = modes.pushed @ more
+    along = modes.md @ left
+    square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
+    square += ((2.0 * along + modes.felt * pushed) * pushed).sum(-1)
+    return square - ((along + modes.felt * pushed) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
+
+
+def _weights(modes: Modes, made: _Pass, effects: VoyageEffects) -> np.ndarray:
+    assert effects.numbers is not None
+    square = np.empty(len(modes.dd))
+    for rows, numbers in zip(made.rows, effects.numbers, strict=True):
+        square[rows] = squares(picked(modes, rows), numbers * made.columns.unit)
+    return robust_weights(square, ~made.linear.lost)
+
+
+def _noise_of_parts(
+    made: _Pass, effects: VoyageEffects, unrest: Unrest, kept: np.ndarray
+) -> Unrest:
+    """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
+    assert effects.numbers is not None
+    linear, count = made.linear, made.columns.linearised
+    e = linear.e.copy()
+    for rows, numbers in zip(made.rows, effects.numbers, strict=True):
+        own = numbers * made.columns.unit
+        e[rows] -= linear.j[rows] @ own[:count]
+        push = made.pushed[rows] @ own[count:]
+        e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], push)
+    return evidence.learnt(replace(linear, e=e).pick(kept), np.zeros(count), unrest, rounds=3)
 
 
 def learn(
@@ -204,7 +256,9 @@ def learn(
         structure.at_knots(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
     whole = modes.beside(unseen.pushed(made.linear.cut, segments.grid(record)))
-    every = products(whole, made.rows, np.append(columns.unit, np.ones(unseen.count)))
+    unit = np.append(columns.unit, np.ones(unseen.count))
+    weight = np.where(made.linear.lost, 0.0, found.weight)
+    every = products(whole, made.rows, unit, weight)
     deviation, size = np.zeros(len(known)), known**-0.5
     for name, where in _groups(model, columns, families).items():
         deviation[where] = found.deviation.get(name, voyage_effects.LEAST)
@@ -298,7 +352,7 @@ def _share(parts: Sequence[np.ndarray], effects: VoyageEffects, held: np.ndarray
     return SHARES[int(np.argmax(scores))]
 
 
-def _noise(modes, rows, columns, effects, information, pull) -> float:
+def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
     """Standard deviation of the logarithm of the process noise over the parts."""
     found = []
     for part in rows:
@@ -306,9 +360,9 @@ def _noise(modes, rows, columns, effects, information, pull) -> float:
         scores = []
         tried = np.exp(np.linspace(-0.6, 0.6, 7))
         for factor in tried:
-            gram = products(own, [np.arange(len(part))], columns.unit, None, factor)[0]
+            gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
             gram, logdet = reduced(gram, effects.deviation)
-            volume = float(np.log1p(factor**2 * own.felt).sum()) + logdet
+            volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
             scores.append(reference.marginal(gram, information, pull) - 0.5 * volume)
         found.append(math.log(tried[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))

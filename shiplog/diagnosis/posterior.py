@@ -29,6 +29,7 @@ class Posterior:
     labels       the same of each of its kinds, such as each clock
     kinds        kind of remainder → probability
     none         probability that nothing of practical size changed
+    hidden       name → weight, relative to all these hypotheses, of causes that were only scanned
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -37,6 +38,7 @@ class Posterior:
     labels: Mapping[str, float]
     kinds: Mapping[str, float]
     none: float
+    hidden: Mapping[str, float]
 
     @property
     def stated(self) -> tuple[str, ...]:
@@ -57,10 +59,14 @@ class Posterior:
         return found[0] if found else None
 
     def ranking(self) -> dict[str, float]:
-        """Every answer with its probability, likeliest first."""
+        """Every answer with its probability, likeliest first. Causes that these data would hardly
+        show were not weighed one by one: of "none" they keep what they had before any data."""
         of = {**self.names, "none": self.none}
         of |= {f"unknown:{FAMILY.get(k, k)}": p for k, p in self.kinds.items() if k != NOMINAL}
-        return dict(sorted(of.items(), key=lambda pair: -pair[1]))
+        whole = 1.0 + sum(self.hidden.values())
+        for name, p in self.hidden.items():
+            of[name] = of.get(name, 0.0) + p
+        return dict(sorted(((n, p / whole) for n, p in of.items()), key=lambda pair: -pair[1]))
 
 
 def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
@@ -82,8 +88,14 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
         kinds[one.kind] = kinds.get(one.kind, 0.0) + float(p)
         if not real and one.kind == NOMINAL:
             none += float(p)
+    weight = float(np.exp(score - score.max()).sum())
+    hidden: dict[str, float] = {}
+    for label, one in search.scanned.items():
+        if name_of(label) not in refuted and (label,) not in {h.causes for h in kept}:
+            name = name_of(label)
+            hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
     order = sorted(names, key=lambda name: -names[name])
-    return Posterior(tuple(kept), share, {n: names[n] for n in order}, labels, kinds, none)
+    return Posterior(tuple(kept), share, {n: names[n] for n in order}, labels, kinds, none, hidden)
 
 
 def practical(search: Search, one: Hypothesis) -> tuple[str, ...]:

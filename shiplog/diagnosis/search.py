@@ -39,6 +39,7 @@ class Search:
 
     alone   label → log Bayes factor of that cause by itself against nothing
     told    label → what these data would show of it, were it there
+    scanned label → score of that cause by itself, where it was found first
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class Search:
         self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
         self.alone: dict[str, float] = {}
         self.told: dict = {}
+        self.scanned: dict[str, float] = {}
         self._tried: set[tuple[str, ...]] = set()
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
 
@@ -99,10 +101,13 @@ class Search:
             if c.label not in one.causes and all(c.beside(label) for label in one.causes)
         ]  # fmt: skip
         self.trial.remainder = one.remainder
-        base, found = self.trial.scan(one.point, candidates, one.causes, one.found.louder)
+        _, found = self.trial.scan(one.point, candidates, one.causes, one.found.louder)
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
             self.told = {f.name: f.told for f in found}
+            self.scanned = {
+                f.name: self._score(one.evidence + f.evidence, (f.name,), NOMINAL) for f in found
+            }
             self._say_what_would_not_show()
         said = []
         for f in found:
@@ -110,7 +115,7 @@ class Search:
                 continue
             labels = tuple(sorted((*one.causes, f.name)))
             numbers = {**one.found.numbers, **f.numbers}
-            said.append((labels, numbers, self._score(base.evidence + f.evidence, labels, one.kind)))
+            said.append((labels, numbers, self._score(one.evidence + f.evidence, labels, one.kind)))
         return said[:CONTENDERS]
 
     def _say_what_would_not_show(self) -> None:
@@ -137,6 +142,13 @@ class Search:
         levels = trial.levels(point, labels, near)
         if near is not None and near > RAISED_FROM:  # a remainder may bring the usual noise back
             levels.append(trial.level(point, 1.0, labels))
+        usual = self._best(levels, NOMINAL).louder
+        if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # it is drawn towards the usual noise
+            trial.remainder = Remainder(NOMINAL)
+            levels += [replace(level, value=level.value + trial.expected(level.louder, RAISED)
+                               - trial.expected(level.louder, NOMINAL))
+                       for level in trial.levels(point, labels, usual)]  # fmt: skip
+            trial.remainder = Remainder(RAISED)
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
         if len(labels) == 1:

@@ -17,10 +17,16 @@ import numpy as np
 from shiplog import hypotheses, segments, structure, unnamed
 from shiplog.columns import HELD
 from shiplog.diagnosis import discrepancy
-from shiplog.diagnosis.nominal_campaign import Campaign, parts_of, products
+from shiplog.diagnosis.nominal_campaign import (
+    Campaign,
+    parts_of,
+    products,
+    robust_weights,
+    squares,
+)
 from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.evidence import Modes, Weighed
-from shiplog.hypotheses import ROBUST, Found, Level, Point
+from shiplog.hypotheses import Found, Level, Point
 from shiplog.record import Record
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
@@ -88,17 +94,7 @@ class Trial(hypotheses.Trial):
         unit = np.append(self.reference.columns.unit, np.zeros(self.unseen.count))
         d = np.concatenate((level.solution[: len(self.reference.pull)], np.zeros(self.unseen.count)))
         modes, noise = self.modes(point, level.louder)
-        r = np.concatenate(([1.0], -d * unit))
-        left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
-        pushed = modes.pushed @ more
-        own = modes.md @ left + modes.felt * pushed
-        square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
-        square += ((2.0 * (modes.md @ left) + modes.felt * pushed) * pushed).sum(-1)
-        chi2 = square - (own**2 / (modes.felt + noise**-2.0)).sum(-1)
-        kept = self.weight > 0.0
-        middle = np.median(chi2[kept]) if kept.any() else 1.0
-        weight = np.minimum(1.0, ROBUST * middle / np.maximum(chi2, 1e-9))
-        self.weight = np.where(kept, weight, 0.0)
+        self.weight = robust_weights(squares(modes, d * unit, noise), self.weight > 0.0)
 
     # --- products ---
 
@@ -144,10 +140,15 @@ class Trial(hypotheses.Trial):
         )
         return replace(level, value=level.value + self.expected(louder, self.remainder.kind))
 
+    @property
+    def usual_spread(self) -> float:
+        """Standard deviation of the logarithm of the process noise from campaign to campaign."""
+        return max(self.campaign.noise, LEAST_SPREAD)
+
     def expected(self, noise: float, kind: str) -> float:
         """Log prior density of a level of process noise under a kind of remainder, less the
         greatest one under `nominal`."""
-        usual = max(self.campaign.noise, LEAST_SPREAD)
+        usual = self.usual_spread
         spread = RAISED_SPREAD if kind in (RAISED, INTERMITTENT) else usual
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 

@@ -23,10 +23,12 @@ LEAST = 0.02  # that one pseudo-part contributes: no two voyages are alike to be
 
 @dataclass(frozen=True)
 class VoyageEffects:
-    """deviation [C]: standard deviation of b. size [C]: of θ itself, where it was learned."""
+    """deviation [C]: standard deviation of b. size [C]: of θ itself, where it was learned.
+    numbers [V, C]: θ + b of every part; none where nothing was learned."""
 
     deviation: np.ndarray
     size: np.ndarray
+    numbers: np.ndarray | None = None
 
 
 def reduced(gram: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, float]:
@@ -66,6 +68,7 @@ def learn(
         variance[columns] = FIRST**2
     free = np.flatnonzero(variance > 0.0)
     parts = [(g[1:, 1:], g[1:, 0]) for g in each]
+    numbers = np.zeros((len(parts), count))
     for _ in range(ROUNDS):
         information, towards = np.diag(known), pull.copy()
         inner = []
@@ -80,8 +83,10 @@ def learn(
         covariance = np.linalg.inv(information)
         mean = covariance @ towards
         second = np.zeros(len(free))
-        for (spread, gain), (_, g) in zip(inner, parts, strict=True):
+        numbers = np.repeat(mean[None], len(parts), axis=0)
+        for own_numbers, (spread, gain), (_, g) in zip(numbers, inner, parts, strict=True):
             found = spread @ g[free] - gain @ mean
+            own_numbers[free] += found
             second += found**2 + np.diagonal(spread)
             second += np.einsum("ij,ij->i", gain @ covariance, gain)
         whole = np.zeros(count)
@@ -92,4 +97,4 @@ def learn(
         own = mean**2 + np.diagonal(covariance)
         for columns in sized:
             known[columns] = (len(columns) + 1.0) / (own[columns].sum() + LEAST**2)
-    return VoyageEffects(np.sqrt(variance), known**-0.5)
+    return VoyageEffects(np.sqrt(variance), known**-0.5, numbers)
