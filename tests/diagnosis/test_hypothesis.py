@@ -1,4 +1,4 @@
-"""Priors of hypotheses are probabilities, and what a form's error imitates is worked out by hand."""
+"""Priors of hypotheses are probabilities, and a form's error is worked out by hand."""
 
 import math
 from itertools import combinations
