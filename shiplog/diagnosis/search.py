@@ -190,6 +190,7 @@ class Search:
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
         """An intermittent side force instead of raised process noise."""
         raised = self.found[labels, RAISED]
+        self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)
         value = raised.evidence + max(tried.gain, 0.0)
         self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
