@@ -49,6 +49,7 @@ class Search:
             c for c in trial.reference.model.causes
             if c.label not in trial.fixed and c.label not in banned
         ]  # fmt: skip
+        self.fixed = {n: np.asarray(point.numbers[n]) for n in trial.fixed}
         self.priors = Priors(self.catalogue, tuple(trial.families))
         self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
         self.alone: dict[str, float] = {}
@@ -99,7 +100,9 @@ class Search:
             if c.label not in one.causes and all(c.beside(label) for label in one.causes)
         ]  # fmt: skip
         self.trial.remainder = one.remainder
-        base, found = self.trial.scan(one.point, candidates, one.causes, one.found.louder)
+        base, found = self.trial.scan(
+            one.point, candidates, self._included(one.causes), one.found.louder
+        )
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
             self.told = {f.name: f.told for f in found}
@@ -122,6 +125,10 @@ class Search:
 
     # --- one set of causes ---
 
+    def _included(self, labels: tuple[str, ...]) -> tuple[str, ...]:
+        """What a fit of these causes includes: what the model has already stays as it is."""
+        return (*self.fixed, *labels)
+
     def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
         """A set of causes under every remainder, linearised where it is likeliest."""
         self._tried.add(labels)
@@ -130,13 +137,15 @@ class Search:
         point, near = at, None
         if labels:
             lowest = self.nothing.evidence - FALLS
-            point, base = settle(trial, labels, numbers, at.path, lowest=lowest)
+            both = self.fixed | dict(numbers)
+            point, base = settle(trial, self._included(labels), both, at.path, lowest=lowest)
             if not math.isfinite(base.evidence):
                 return
             near = base.louder
-        levels = trial.levels(point, labels, near)
+        included = self._included(labels)
+        levels = trial.levels(point, included, near)
         if near is not None and near > RAISED_FROM:  # a remainder may bring the usual noise back
-            levels.append(trial.level(point, 1.0, labels))
+            levels.append(trial.level(point, 1.0, included))
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
         if len(labels) == 1:
@@ -165,10 +174,10 @@ class Search:
         plain: Hypothesis,
     ) -> None:  # fmt: skip
         """The set with a change of one family beside it; linearised again where that leads."""
-        trial = self.trial
+        trial, included = self.trial, self._included(labels)
         tried = []
         for level in levels:
-            gained, size = trial.changed(point, level, labels, family)
+            gained, size = trial.changed(point, level, included, family)
             more = trial.expected(level.louder, NOMINAL) - trial.expected(level.louder, RAISED)
             tried.append((level.value + more + gained, size, level.louder))
         value, size, noise = max(tried)
@@ -179,12 +188,12 @@ class Search:
             return
         trial.remainder = remainder
         if labels:
-            start = trial.scan(point, (), labels, noise)[0].numbers
-            again, base = settle(trial, labels, start, point.path)
+            start = trial.scan(point, (), included, noise)[0].numbers
+            again, base = settle(trial, included, start, point.path)
             if math.isfinite(base.evidence) and base.evidence > value:
                 self._put(labels, remainder, base.evidence, again, base)
                 return
-        base, _ = trial.scan(point, (), labels, noise)
+        base, _ = trial.scan(point, (), included, noise)
         self._put(labels, remainder, max(value, base.evidence), point, base)
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
@@ -198,7 +207,7 @@ class Search:
     def _keep(
         self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level
     ) -> None:
-        numbers, covariance = self.trial._numbers(level, point, labels)
+        numbers, covariance = self.trial._numbers(level, point, self._included(labels))
         found = Found("+".join(labels), level.value, level.louder, numbers, covariance)
         self._put(labels, remainder, level.value, point, found)
 
