@@ -164,4 +164,4 @@ def test_a_force_of_the_place_is_unknown_and_depends_on_position():
     assert decision.verdict == "unknown"
     assert decision.structure.family == "position"
     assert weighed.kinds["position"] > 0.9
-    assert list(decision.ranking)[0] == "unknown:position"
+    assert next(iter(decision.ranking)) == "unknown:position"
