@@ -60,7 +60,7 @@ def test_causes_of_one_name_share_that_names_prior():
 
 def test_what_a_form_leaves_over_by_hand():
     alone = {"drag": 300.0, "load": 40.0, "two": -5.0}
-    share = thresholds.FORM_ERROR
+    share = thresholds.FORM_ERROR**2  # nats go with the square of a force
     assert form_error(alone, ()) == form_error(alone, ("drag",)) == 0.0
     assert form_error(alone, ("drag", "load")) == pytest.approx(300.0 * share)
     assert form_error(alone, ("load", "drag")) == pytest.approx(300.0 * share)
