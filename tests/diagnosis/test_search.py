@@ -11,7 +11,7 @@ from straight import CAUSES
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import NOMINAL
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
 
 TOLD = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2
@@ -147,6 +147,32 @@ def test_what_a_model_has_already_stays_beside_what_is_found():
     assert decision.named[0].numbers == pytest.approx(best.found.numbers["load"])
     spread = np.sqrt(decision.named[0].covariance[0, 0])
     assert decision.named[0].numbers[0] == pytest.approx(1.0, abs=4.0 * spread)
+
+
+def test_an_intermittent_force_is_asked_for_beside_no_family():
+    """Where the process noise is raised, whatever was tried before it."""
+    asked = []
+
+    def intermittent(point, base):
+        asked.append(trial.remainder)
+        return straight.Straight.intermittent(trial, point, base)
+
+    plain, point = trial_with({})
+    kernel = np.linalg.cholesky(straight.UNREST.kernel(plain.grid.knots))
+    more = 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
+    for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
+        asked.clear()
+        trial, point = trial_with({}, pushed=more)
+        trial.intermittent = intermittent
+        real = trial.changed
+        trial.changed = lambda p, level, labels, family, real=real, gain=gain, last=last: (
+            (gain, 3.0) if family == last else real(p, level, labels, family)
+        )
+        found = Search(trial, point, {})
+        found.weigh((), {}, point)
+        assert found.found[(), "raised"].found.louder > 1.5
+        assert asked == [Remainder(INTERMITTENT)]
+        assert found.found[(), INTERMITTENT].evidence == found.found[(), "raised"].evidence
 
 
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
