@@ -17,13 +17,12 @@ import numpy as np
 from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
-from shiplog.linearise import Path
 from shiplog.settling import settle
 
 MOST_CAUSES = 3
 MOST_SETS = 16  # that are linearised; what is left then is far behind
 WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
-LIKELY = 0.3  # share of the best one's evidence: before it is linearised again a cause may lack more
+LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
 FALLS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
@@ -113,7 +112,8 @@ class Search:
                 continue
             labels = tuple(sorted((*one.causes, f.name)))
             numbers = {**one.found.numbers, **f.numbers}
-            said.append((labels, numbers, self._score(base.evidence + f.evidence, labels, one.kind)))
+            score = self._score(base.evidence + f.evidence, labels, one.kind)
+            said.append((labels, numbers, score))
         return said[:CONTENDERS]
 
     def _say_what_would_not_show(self) -> None:
