@@ -1,6 +1,7 @@
 """Imports go one way; only the command line calls pipelines; MCAP and Rerun stay in their rooms."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -24,11 +25,11 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"unexplained", "structure", "conventions", "columns"},
     {"misfit", "reading"},
     {"reference"},
-    {"unseen", "external", "hypotheses", "remembered", "direct"},
+    {"unseen", "external", "hypotheses", "direct"},
     {"unnamed", "settling"},
     {"decision"},
-    {"diagnose"},
-    {"advise", "earlier_runs"},
+    {"diagnosis", "diagnose"},
+    {"advise", "earlier_runs", "remembered"},
     {"runs", "report", "viewer", "verdict", "page"},
     {"cli"},
 )
@@ -66,6 +67,22 @@ def test_imports_go_one_way(path):
             assert room in ("logs", "viewer"), where
         if parts[0] == "pickle":
             raise AssertionError(where)
+
+
+def test_modules_of_the_diagnosis_have_no_circle():
+    """What a module of it imports stands before it, in some order of them all."""
+    room = ROOT / "shiplog" / "diagnosis"
+    uses = {}
+    for path in room.glob("*.py"):
+        found = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            module = getattr(node, "module", None) or ""
+            if isinstance(node, ast.ImportFrom) and module.startswith("shiplog.diagnosis"):
+                of = [alias.name for alias in node.names] if module.endswith("diagnosis") else []
+                found |= {module.split(".")[-1], *of} - {"diagnosis"}
+        uses[path.stem] = found
+    assert "trial" in uses["search"] and "thresholds" in uses["decide"]  # both ways of importing
+    list(graphlib.TopologicalSorter(uses).static_order())  # raises CycleError
 
 
 def test_every_room_has_a_level():

@@ -39,8 +39,10 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         verdict = "none"
     if verdict == "named" and best.kind == INTERMITTENT and _is_device(search, best):
         pulses = best.pulses
-    traces = _named(search, found, best, [n for n in map(name_of, best.causes) if n not in names]) \
-        if verdict == "none" else ()
+    traces = ()
+    if verdict == "none":
+        rest = [n for n in map(name_of, best.causes) if n not in names]
+        traces = _named(search, found, best, rest)
     shown = best if verdict in ("named", "unknown") else search.nothing
     trial.remainder = shown.remainder
     return Decision(
@@ -93,7 +95,8 @@ def _structure(search: Search, best: Hypothesis) -> Structure:
     gained = best.evidence - search.nothing.evidence
     family = FAMILY.get(best.kind, best.kind)
     if family in (STOCHASTIC, INTERMITTENT):
-        return Structure(family, gained, EVERYWHERE if family == STOCHASTIC else ("sway", "yaw_rate"))
+        channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
+        return Structure(family, gained, channels)
     acts_on = search.trial.acts_on(best.point, best.found, best.kind)
     return Structure(family, gained, acts_on)
 

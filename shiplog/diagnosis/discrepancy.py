@@ -194,8 +194,7 @@ def _driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
 
 def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
     wind = _apparent(knots)
-    speed, angle = np.hypot(wind[..., [0]], wind[..., [1]]), np.arctan2(wind[..., [1]], wind[..., [0]])
-    square = speed**2
+    square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
     return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
 
 

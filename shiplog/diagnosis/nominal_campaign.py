@@ -149,9 +149,7 @@ class _Pass:
     rows: list[np.ndarray]
 
 
-def _pass(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
-) -> _Pass:
+def _pass(model: Extended, setting: Setting, start: Start, record: Record, at: Settled) -> _Pass:
     columns = reference.columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
@@ -271,7 +269,8 @@ def learn(
     reference_made = Reference(
         model, setting, at.theta, columns, unrest, reference.wide_of(setting), information, pull,
         held, 1.0 / found.share, made.linear, modes, reference.freedom(len(made.rows)),
-        misfit=families, counts=found.share,
+        misfit=families,  # type: ignore[arg-type]  # it pushes as a network's Misfit does
+        counts=found.share,
     )  # fmt: skip
     return Campaign(reference_made, effects, families, unseen, tuple(every), found.noise)
 

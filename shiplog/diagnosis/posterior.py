@@ -120,11 +120,11 @@ def share_of_causes(search: Search, one: Hypothesis) -> float:
 
 
 def best_with(found: Posterior, names: Sequence[str]) -> Hypothesis:
-    """The likeliest hypothesis that contains all of these names."""
-    for one in found.hypotheses:
-        if set(names) <= {name_of(label) for label in one.causes}:
-            return one
-    return found.hypotheses[0]
+    """The likeliest hypothesis that contains all of these names, each in its likeliest kind."""
+    holding = [h for h in found.hypotheses if set(names) <= set(map(name_of, h.causes))]
+    likeliest = [h for h in holding
+                 if set(names) <= {name_of(n) for n in h.causes if found.states(n)}]  # fmt: skip
+    return (likeliest or holding or found.hypotheses)[0]
 
 
 def of_one_device(force: np.ndarray, deviation: np.ndarray) -> bool:

@@ -17,13 +17,12 @@ import numpy as np
 from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
-from shiplog.linearise import Path
 from shiplog.settling import settle
 
 MOST_CAUSES = 3
 MOST_SETS = 16  # that are linearised; what is left then is far behind
 WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
-LIKELY = 0.3  # share of the best one's evidence: before it is linearised again a cause may lack more
+LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
 FALLS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
@@ -50,6 +49,7 @@ class Search:
             c for c in trial.reference.model.causes
             if c.label not in trial.fixed and c.label not in banned
         ]  # fmt: skip
+        self.fixed = {n: np.asarray(point.numbers[n]) for n in trial.fixed}
         self.priors = Priors(self.catalogue, tuple(trial.families))
         self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
         self.alone: dict[str, float] = {}
@@ -101,7 +101,9 @@ class Search:
             if c.label not in one.causes and all(c.beside(label) for label in one.causes)
         ]  # fmt: skip
         self.trial.remainder = one.remainder
-        _, found = self.trial.scan(one.point, candidates, one.causes, one.found.louder)
+        _, found = self.trial.scan(
+            one.point, candidates, self._included(one.causes), one.found.louder
+        )
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
             self.told = {f.name: f.told for f in found}
@@ -115,7 +117,8 @@ class Search:
                 continue
             labels = tuple(sorted((*one.causes, f.name)))
             numbers = {**one.found.numbers, **f.numbers}
-            said.append((labels, numbers, self._score(one.evidence + f.evidence, labels, one.kind)))
+            score = self._score(one.evidence + f.evidence, labels, one.kind)
+            said.append((labels, numbers, score))
         return said[:CONTENDERS]
 
     def _say_what_would_not_show(self) -> None:
@@ -127,6 +130,10 @@ class Search:
 
     # --- one set of causes ---
 
+    def _included(self, labels: tuple[str, ...]) -> tuple[str, ...]:
+        """What a fit of these causes includes: what the model has already stays as it is."""
+        return (*self.fixed, *labels)
+
     def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
         """A set of causes under every remainder, linearised where it is likeliest."""
         self._tried.add(labels)
@@ -135,20 +142,18 @@ class Search:
         point, near = at, None
         if labels:
             lowest = self.nothing.evidence - FALLS
-            point, base = settle(trial, labels, numbers, at.path, lowest=lowest)
+            both = self.fixed | dict(numbers)
+            point, base = settle(trial, self._included(labels), both, at.path, lowest=lowest)
             if not math.isfinite(base.evidence):
                 return
             near = base.louder
-        levels = trial.levels(point, labels, near)
+        included = self._included(labels)
+        levels = trial.levels(point, included, near)
         if near is not None and near > RAISED_FROM:  # a remainder may bring the usual noise back
-            levels.append(trial.level(point, 1.0, labels))
+            levels.append(trial.level(point, 1.0, included))
         usual = self._best(levels, NOMINAL).louder
         if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # it is drawn towards the usual noise
-            trial.remainder = Remainder(NOMINAL)
-            levels += [replace(level, value=level.value + trial.expected(level.louder, RAISED)
-                               - trial.expected(level.louder, NOMINAL))
-                       for level in trial.levels(point, labels, usual)]  # fmt: skip
-            trial.remainder = Remainder(RAISED)
+            levels += self._drawn(point, included, usual)
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
         if len(labels) == 1:
@@ -159,6 +164,18 @@ class Search:
             self._change(point, labels, levels, family, best)
         if self._best(levels, RAISED).louder > RAISED_FROM:
             self._pulses(point, labels)
+
+    def _drawn(self, point: Point, included: Sequence[str], usual: float) -> list[Level]:
+        """Levels about the best one under `nominal`, as made under RAISED."""
+        trial = self.trial
+        trial.remainder = Remainder(NOMINAL)
+        levels = trial.levels(point, included, usual)
+        trial.remainder = Remainder(RAISED)
+        return [
+            replace(level, value=level.value + trial.expected(level.louder, RAISED)
+                    - trial.expected(level.louder, NOMINAL))
+            for level in levels
+        ]  # fmt: skip
 
     def _best(self, levels: Sequence[Level], kind: str) -> Level:
         """Of levels made under RAISED the best under a kind of remainder."""
@@ -177,10 +194,10 @@ class Search:
         plain: Hypothesis,
     ) -> None:  # fmt: skip
         """The set with a change of one family beside it; linearised again where that leads."""
-        trial = self.trial
+        trial, included = self.trial, self._included(labels)
         tried = []
         for level in levels:
-            gained, size = trial.changed(point, level, labels, family)
+            gained, size = trial.changed(point, level, included, family)
             more = trial.expected(level.louder, NOMINAL) - trial.expected(level.louder, RAISED)
             tried.append((level.value + more + gained, size, level.louder))
         value, size, noise = max(tried)
@@ -191,17 +208,18 @@ class Search:
             return
         trial.remainder = remainder
         if labels:
-            start = trial.scan(point, (), labels, noise)[0].numbers
-            again, base = settle(trial, labels, start, point.path)
+            start = trial.scan(point, (), included, noise)[0].numbers
+            again, base = settle(trial, included, start, point.path)
             if math.isfinite(base.evidence) and base.evidence > value:
                 self._put(labels, remainder, base.evidence, again, base)
                 return
-        base, _ = trial.scan(point, (), labels, noise)
+        base, _ = trial.scan(point, (), included, noise)
         self._put(labels, remainder, max(value, base.evidence), point, base)
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
         """An intermittent side force instead of raised process noise."""
         raised = self.found[labels, RAISED]
+        self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)
         value = raised.evidence + max(tried.gain, 0.0)
         self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
@@ -209,7 +227,7 @@ class Search:
     def _keep(
         self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level
     ) -> None:
-        numbers, covariance = self.trial._numbers(level, point, labels)
+        numbers, covariance = self.trial._numbers(level, point, self._included(labels))
         found = Found("+".join(labels), level.value, level.louder, numbers, covariance)
         self._put(labels, remainder, level.value, point, found)
 

@@ -91,8 +91,9 @@ class Trial(hypotheses.Trial):
     def robust(self, point: Point) -> None:
         """Weights of the segments, the same for every hypothesis: a few must not decide."""
         level = max(self.levels(point), key=lambda level: level.value)
-        unit = np.append(self.reference.columns.unit, np.zeros(self.unseen.count))
-        d = np.concatenate((level.solution[: len(self.reference.pull)], np.zeros(self.unseen.count)))
+        none = np.zeros(self.unseen.count)
+        unit = np.append(self.reference.columns.unit, none)
+        d = np.append(level.solution[: len(self.reference.pull)], none)
         modes, noise = self.modes(point, level.louder)
         self.weight = robust_weights(squares(modes, d * unit, noise), self.weight > 0.0)
 
@@ -183,7 +184,8 @@ class Trial(hypotheses.Trial):
         square = gram[0, 0] + self._square_of_prior(towards, count, held, information)
         square -= (gram[1:, 0] + towards) @ solution
         volume = np.linalg.slogdet(both)[1] - self._volume_of_prior(held, information)
-        return Level(louder, gram, logdet, inverse, solution, -0.5 * float(square + volume + logdet))
+        value = -0.5 * float(square + volume + logdet)
+        return Level(louder, gram, logdet, inverse, solution, value)
 
     def _square_of_prior(self, towards, count, held, information) -> float:
         own = np.concatenate([*held, np.zeros(0)])
@@ -258,8 +260,8 @@ class Trial(hypotheses.Trial):
         size, and that size."""
         columns, share = self.families[family], self.reference.counts
         total, _ = self.total(point, level.louder)
-        base = [np.arange(len(self.reference.pull)), *(self.reference.columns.of[n] for n in included)]
-        rows = 1 + np.concatenate(base)
+        more = [self.reference.columns.of[n] for n in included]
+        rows = 1 + np.concatenate([np.arange(len(self.reference.pull)), *more])
         joined = share * total[np.ix_(rows, 1 + columns)]
         pull = share * total[1 + columns, 0] - joined.T @ level.solution
         own = share * total[np.ix_(1 + columns, 1 + columns)] - joined.T @ level.inverse @ joined
@@ -271,7 +273,7 @@ class Trial(hypotheses.Trial):
         return max(found)
 
     def intermittent(self, point: Point, base: Found) -> unnamed.Pulses:
-        """A force that comes and goes at one place along the ship, and its gain over raised noise."""
+        """A force that comes and goes at one place along the ship; its gain over raised noise."""
         return unnamed.pulses(self, point, base)
 
     def acts_on(self, point: Point, base: Found, family: str) -> tuple[str, ...]:
@@ -289,4 +291,3 @@ class Trial(hypotheses.Trial):
         size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / self.reference.unrest.push
         names = np.array(["surge", "sway", "yaw_rate"])
         return tuple(str(n) for n in names[size > size.max() / 3.0])
-

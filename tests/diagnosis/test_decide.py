@@ -1,0 +1,136 @@
+"""Verdicts of posteriors that are made by hand."""
+
+import numpy as np
+import pytest
+import weighed
+
+from shiplog.diagnosis import decide as deciding
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.decide import decide
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.unnamed import Pulses
+
+DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
+WIND, GNSS = ("clock:wind",), ("clock:gnss",)
+PULSES = Pulses(0.0, 60.0, 0.3, 4.0, np.array([0.0, 0.01, 0.004]))
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return weighed.trial()
+
+
+def verdict(trial, probability, **more):
+    return decide(weighed.search(trial, probability, **more))[0]
+
+
+def named(decision) -> list[str]:
+    return [one.cause.label for one in decision.named]
+
+
+def test_one_name(trial):
+    found = verdict(trial, {(DRAG, NOMINAL): 0.95, ((), NOMINAL): 0.05})
+    assert (found.verdict, named(found)) == ("named", ["drag"])
+    (one,) = found.named
+    assert one.probability == pytest.approx(0.95)
+    assert one.numbers == pytest.approx([weighed.SIZE])
+    assert one.covariance.shape == (1, 1)
+    assert found.structure is None and found.pulses is None
+    assert found.base.numbers.keys() == {"drag"}
+
+
+def test_two_names_each_with_its_own_part_of_the_covariance(trial):
+    made = weighed.search(trial, {(("drag", "two"), NOMINAL): 1.0})
+    whole = np.array([[4.0, 1.0, 2.0], [1.0, 9.0, 3.0], [2.0, 3.0, 16.0]])
+    made.found[("drag", "two"), NOMINAL].found.covariance[:] = whole
+    decision, _ = decide(made)
+    assert named(decision) == ["drag", "two"]
+    drag, two = decision.named
+    assert drag.covariance.tolist() == [[4.0]]
+    assert two.covariance.tolist() == whole[1:, 1:].tolist()
+
+
+def test_neither_of_two_is_named(trial):
+    found = verdict(trial, {(DRAG, NOMINAL): 0.5, (LOAD, NOMINAL): 0.45, ((), NOMINAL): 0.05})
+    assert (found.verdict, named(found)) == ("undecided", [])
+    assert list(found.ranking)[:2] == ["drag", "load"]
+    # neither is shown: the numbers are of nothing
+    assert found.base.numbers == {}
+
+
+def test_a_name_that_is_sure_beside_one_that_is_not(trial):
+    found = verdict(trial, {(DRAG, NOMINAL): 0.5, (("drag", "load"), NOMINAL): 0.5})
+    assert named(found) == ["drag"]
+
+
+def test_nothing(trial):
+    found = verdict(trial, {((), NOMINAL): 0.95, (DRAG, NOMINAL): 0.05})
+    assert (found.verdict, named(found), found.traces) == ("none", [], ())
+    found = verdict(trial, {((), NOMINAL): 0.85, (DRAG, NOMINAL): 0.15})
+    assert found.verdict == "undecided"
+
+
+def test_a_trace_is_shown_and_is_no_name(trial):
+    """There for sure, and too small to matter."""
+    found = verdict(trial, {(DRAG, NOMINAL): 0.97, ((), NOMINAL): 0.03}, sizes={"drag": 0.05})
+    assert (found.verdict, named(found)) == ("none", [])
+    assert [one.cause.label for one in found.traces] == ["drag"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "family"), ((RAISED, "stochastic"), ("time", "time"), (INTERMITTENT, "intermittent"))
+)
+def test_a_kind_of_remainder_is_unknown_and_says_its_family(trial, kind, family):
+    found = verdict(
+        trial, {((), kind): 0.93, (DRAG, kind): 0.03, ((), NOMINAL): 0.04},
+        evidence={((), kind): 40.0, ((), NOMINAL): 3.0},
+    )  # fmt: skip
+    assert (found.verdict, named(found)) == ("unknown", [])
+    assert found.structure.family == family
+    assert found.structure.evidence == pytest.approx(37.0)
+    assert set(found.structure.acts_on) <= {"surge", "sway", "yaw_rate"}
+    assert trial.remainder == Remainder(kind, 3.0)  # what is drawn afterwards includes it
+
+
+def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
+    """80 nats together, of which the cause has 30 by itself: unknown. Of 70 by itself: a name."""
+    assert thresholds.MOST == 0.5
+    sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
+    evidence = {(DRAG, "time"): 80.0, (DRAG, NOMINAL): 30.0}
+    little = verdict(trial, sure, evidence=evidence)
+    assert (little.verdict, named(little)) == ("unknown", [])
+    assert little.structure.family == "time"
+    much = verdict(trial, sure, evidence=evidence | {(DRAG, NOMINAL): 70.0})
+    assert (much.verdict, named(much)) == ("named", ["drag"])
+
+
+def test_a_name_of_two_kinds_is_shown_in_the_likelier(trial):
+    """A verdict that names a clock says which."""
+    found = verdict(trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32})
+    assert (found.verdict, named(found)) == ("named", ["clock:gnss"])
+
+
+def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, monkeypatch):
+    sure = {((), INTERMITTENT): 0.98, ((), NOMINAL): 0.02}
+    for device, wanted in ((True, "named"), (False, "unknown")):
+        monkeypatch.setattr(deciding, "_is_device", lambda *_, device=device: device)
+        found = verdict(trial, sure, pulses=PULSES)
+        assert found.verdict == wanted
+        assert (found.pulses is PULSES) == device
+        assert (found.structure is None) == device
+
+
+def test_a_refuted_name_is_not_named_and_its_reason_is_kept(trial):
+    made = weighed.search(trial, {(DRAG, NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
+    decision, found = decide(made, {"drag": "it is worse"})
+    assert named(decision) == ["load"]
+    assert decision.rejected["drag"] == "it is worse"
+    assert "drag" not in found.names
+
+
+def test_others_are_given_with_how_much_less_likely_they_are(trial):
+    """In its place: by the difference of scores, within two thresholds of a statement."""
+    found = verdict(trial, {(DRAG, NOMINAL): 0.94, (LOAD, NOMINAL): 0.05, (TWO, NOMINAL): 1e-4})
+    (one,) = found.named
+    assert one.alike == ("load",)
+    assert one.beaten == pytest.approx({"load": np.log(0.94 / 0.05)})

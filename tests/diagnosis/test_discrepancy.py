@@ -1,0 +1,272 @@
+"""Features of a model's discrepancy, of states and controls that are written out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+import straight
+
+from shiplog import profile as profiles
+from shiplog.diagnosis import discrepancy
+from shiplog.diagnosis.discrepancy import SEEN, UNSEEN, WAVES
+from shiplog.structure import Knots
+
+PUSH = np.array([0.08, 0.05, 0.03])
+TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw
+
+
+def profile(actuators: str, wind: bool = True) -> profiles.Profile:
+    """A ship of 3 m with these [[actuators]]."""
+    blows = '[sensors.wind]\ntopic = "/w"\nfields = ["speed", "angle"]\nunits = ["m/s", "deg"]\n'
+    return profiles.parse(
+        f"""
+[ship]
+name = "fair"
+length_m = 3.0
+[sensors.position]
+kind = "local"
+topic = "/p"
+fields = ["x", "y"]
+unit = "m"
+[sensors.velocity]
+kind = "body"
+topic = "/v"
+fields = ["u", "v"]
+units = ["m/s", "m/s"]
+[sensors.heading]
+topic = "/h"
+field = "heading"
+unit = "deg"
+{blows if wind else ""}
+{actuators}
+""",
+        "fair.toml",
+    )
+
+
+def actuator(name: str, kind: str, place=None) -> str:
+    unit = "deg" if kind in ("rudder", "azimuth") else "rpm"
+    at = "" if place is None else f"position_m = [{place[0]}, {place[1]}]\n"
+    return (
+        f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\ntopic = "/{name}"\n'
+        f'field = "x"\nunit = "{unit}"\n{at}'
+    )
+
+
+def knots(state=None, controls=None, share=None, wind=None, seed: int = 0) -> Knots:
+    """Four segments of five knots; drawn where nothing is given."""
+    rng = np.random.default_rng(seed)
+    state = rng.standard_normal((4, 5, 6)) if state is None else np.asarray(state, dtype=float)
+    shape = state.shape[:2]
+    controls = rng.standard_normal((*shape, 3)) if controls is None else controls
+    share = rng.uniform(size=(*shape, 1)) if share is None else share
+    wind = rng.standard_normal((*shape, 2)) if wind is None else wind
+    return Knots(state, np.concatenate((controls, share, wind), -1))
+
+
+def products(name: str, of: profiles.Profile, at: Knots) -> np.ndarray:
+    """[S, J, F] of the products alone, before they are scaled."""
+    return np.concatenate(discrepancy.PRODUCTS[name](of, at), -1)
+
+
+def one(name: str, of: profiles.Profile, *at: Knots) -> discrepancy.Family:
+    (family,) = discrepancy.of(of, PUSH, 0, (name,), *at).families
+    return family
+
+
+# --- products of ship hydrodynamics
+
+
+def test_products_of_the_motion_by_hand():
+    state = np.zeros((1, 1, 6))
+    state[..., [1, 3, 5]] = (0.5, -0.2, 0.1)  # surge, sway, yaw rate
+    u, v, r = 0.5, -0.2, 0.1
+    wanted = [
+        u, v, r, 0.25, -0.04, 0.01, u * v, u * r, v * r, 0.5 * v, 0.5 * r, 0.2 * r, 0.1 * v,
+    ]  # fmt: skip
+    assert products("motion", TWIN, knots(state))[0, 0] == pytest.approx(wanted)
+
+
+def test_a_screw_and_a_rudder_at_another_place_by_hand():
+    """The rudder turns the screw's jet, though it stands behind it."""
+    of = profile(actuator("rudder", "rudder", (-1.5, 0.0)) + actuator("screw", "propeller"))
+    state = np.zeros((1, 1, 6))
+    state[..., 1] = -0.5
+    angle, n = 0.3, -4.0
+    at = knots(state, np.array([[[angle, n]]]))
+    wanted = [
+        -16.0, 4.0 * -0.5,
+        math.sin(angle) * -0.25, 1.0 - math.cos(angle),
+        -16.0 * math.sin(angle), -16.0 * (1.0 - math.cos(angle)),
+    ]  # fmt: skip
+    assert products("controls", of, at)[0, 0] == pytest.approx(wanted)
+
+
+def test_an_azimuth_turns_the_thruster_at_its_own_place():
+    """Two pods, their angles and thrusts in any order; a tunnel thruster is turned by neither."""
+    of = profile(
+        actuator("bow_angle", "azimuth", (1.5, 0.0))
+        + actuator("aft", "thruster", (-1.5, 0.0))
+        + actuator("aft_angle", "azimuth", (-1.5, 0.0))
+        + actuator("bow", "thruster", (1.5, 0.0))
+        + actuator("tunnel", "thruster", (1.0, 0.0))
+    )
+    assert discrepancy._driven_by(of, 0, [1, 3, 4]) == [3]
+    assert discrepancy._driven_by(of, 2, [1, 3, 4]) == [1]
+    given = np.array([[[0.5, 2.0, -0.7, 3.0, 1.0]]])
+    found = products("controls", of, knots(np.zeros((1, 1, 6)), given))[0, 0]
+    # three thrusters of two products each, then four of each angle
+    assert found[[0, 2, 4]] == pytest.approx([4.0, 9.0, 1.0])
+    bow, aft = found[6:10], found[10:14]
+    assert len(found) == 14
+    assert bow[2:] == pytest.approx([9.0 * math.sin(0.5), 9.0 * (1.0 - math.cos(0.5))])
+    assert aft[2:] == pytest.approx([4.0 * math.sin(-0.7), 4.0 * (1.0 - math.cos(-0.7))])
+
+
+def test_a_rudder_turns_two_screws_at_most():
+    of = profile(
+        "".join(actuator(f"screw_{i}", "propeller", (0.0, i)) for i in (1, 2, 3))
+        + actuator("rudder", "rudder", (-1.5, 0.0))
+    )
+    assert discrepancy._driven_by(of, 3, [0, 1, 2]) == [0, 1]
+
+
+def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
+    """A ship that heads east at 1 m/s with the wind at 2 m/s from the north: 2 m/s from port and
+    1 m/s from ahead are felt."""
+    state = np.zeros((1, 1, 6))
+    state[..., 1], state[..., 4] = 1.0, 0.5 * math.pi
+    at = knots(state, wind=np.array([[[2.0, 0.0]]]))
+    assert discrepancy._apparent(at)[0, 0] == pytest.approx([1.0, -2.0])
+    angle = math.atan2(-2.0, 1.0)
+    wanted = [5.0 * f(k * angle) for k in (1, 2, 3) for f in (math.cos, math.sin)]
+    assert products("wind", TWIN, at)[0, 0] == pytest.approx(wanted)
+
+
+# --- families
+
+
+def test_features_have_unit_size_together_in_each_channel():
+    """Weights of unit variance make an acceleration of unit variance, on average over knots: a
+    family's size is in units of the process noise."""
+    at = knots(seed=1)
+    for name in (*SEEN, *UNSEEN):
+        family = one(name, TWIN, at)
+        features = family.features(at)
+        assert features.shape == (4, 5, 3, len(family.columns))
+        if name == "position":
+            features = features[..., 2:, :]  # two of the channels are turned into each other
+        assert (features**2).sum(-1).mean((0, 1)) == pytest.approx(np.ones(features.shape[2]))
+
+
+def test_weights_are_channel_by_channel():
+    at = knots(seed=2)
+    family = one("motion", TWIN, at)
+    features, each = family.features(at), len(family.columns) // 3
+    for channel in range(3):
+        own = features[..., channel, :]
+        assert (own[..., channel * each : (channel + 1) * each] != 0.0).any()
+        assert np.delete(own, np.arange(channel * each, (channel + 1) * each), -1).max() == 0.0
+
+
+def test_only_what_no_model_has_is_taken_from_its_mean():
+    at = knots(seed=3)
+    for name in SEEN:
+        assert (one(name, TWIN, at).level == 0.0).all()
+    for name in UNSEEN:
+        family = one(name, TWIN, at)
+        features = discrepancy._features(name, TWIN, family.waves, at)
+        assert family.level == pytest.approx(features.mean((0, 1)))
+
+
+def test_headings_features_are_harmonics_of_the_angle():
+    """cos kψ and sin kψ, k up to half their number: whatever was sailed, and the same after a
+    turn."""
+    headings = np.linspace(-3.0, 3.0, 20).reshape(4, 5)
+    state = np.zeros((4, 5, 6))
+    state[..., 4] = headings
+    waves = one("heading", TWIN, knots(state)).waves
+    scale = math.sqrt(2.0 / WAVES["heading"])
+    for psi in (0.0, 0.4, 2.5):
+        wanted = [scale * f(k * psi) for k in (1, 2, 3) for f in (math.cos, math.sin)]
+        assert waves(np.array([psi])) == pytest.approx(wanted, abs=1e-12)
+        assert waves(np.array([psi + 2.0 * math.pi])) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_pull_towards_the_north_turns_with_the_heading():
+    """Four headings at one place: the same force along the earth's axes, whichever way a ship
+    lies. North: ahead, then to port, astern, to starboard."""
+    around = knots(seed=4)
+    family = one("position", TWIN, around)
+    state = np.zeros((4, 1, 6))
+    state[..., 0], state[..., 2] = 0.7, -0.3
+    state[..., 0, 4] = 0.5 * np.pi * np.arange(4)
+    at = Knots(state, around.driven[:, :1])
+    features = family.features(at)
+    each = len(family.columns) // 3
+    north, east, turn = (features[:, 0][..., c * each : (c + 1) * each] for c in range(3))
+    pull = north[0, 0]
+    assert np.abs(pull).max() > 0.01
+    for s, (ahead, starboard) in enumerate(((1, 0), (0, -1), (-1, 0), (0, 1))):
+        assert north[s, 0] == pytest.approx(ahead * pull, abs=1e-12)
+        assert north[s, 1] == pytest.approx(starboard * pull, abs=1e-12)
+        assert east[s, 0] == pytest.approx(-starboard * pull, abs=1e-12)
+        assert east[s, 1] == pytest.approx(ahead * pull, abs=1e-12)
+        assert turn[s, 2] == pytest.approx(pull, abs=1e-12)
+        assert np.abs(north[s, 2]).max() == np.abs(turn[s, :2]).max() == 0.0
+
+
+def test_families_whose_inputs_do_not_vary_are_absent():
+    rng = np.random.default_rng(5)
+    still = np.zeros((4, 5, 6))
+    still[..., 1] = 0.5
+    calm = knots(still, np.full((4, 5, 3), 0.2), np.full((4, 5, 1), 0.5), np.full((4, 5, 2), 1.5))
+    assert discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), calm).families == ()
+    # what varies between campaigns is there, though each by itself is still
+    later = Knots(calm.state + 0.1, calm.driven)
+    found = discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), calm, later)
+    assert [f.name for f in found.families] == [
+        "motion", "controls", "wind", "position", "heading"
+    ]  # fmt: skip
+    moving = knots(rng.standard_normal((4, 5, 6)))
+    whole = discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), moving)
+    assert [f.name for f in whole.families] == [*SEEN, *UNSEEN]
+
+
+def test_a_ship_without_a_wind_sensor_has_no_family_of_the_wind():
+    of = profile(actuator("screw", "propeller"), wind=False)
+    at = knots(controls=np.random.default_rng(6).standard_normal((4, 5, 1)))
+    names = [f.name for f in discrepancy.of(of, PUSH, 0, SEEN, at).families]
+    assert names == ["motion", "controls"]
+
+
+def test_a_feature_that_hardly_varies_is_not_blown_up():
+    state = np.random.default_rng(7).standard_normal((4, 5, 6))
+    state[..., 5] *= 1e-9  # it hardly turns
+    family = one("motion", TWIN, knots(state))
+    assert np.isfinite(family.features(knots(state))).all()
+    assert family.scale.min() >= 0.999e-3 * family.scale.max()
+
+
+def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monkeypatch):
+    at = knots(seed=8)
+    found = discrepancy.of(TWIN, PUSH, 7, SEEN, at)
+    columns = np.concatenate([f.columns for f in found.families])
+    assert columns.tolist() == list(range(7, 7 + found.count))
+
+    monkeypatch.setattr(discrepancy.structure, "at_knots", lambda cut, g: at)
+    pushed = found.pushed(None, None)  # type: ignore[arg-type]
+    assert pushed.shape == (4, 15, found.count)
+    features = np.concatenate([f.features(at) for f in found.families], -1)
+    for channel in range(3):
+        own = pushed[:, 5 * channel : 5 * channel + 5]
+        assert own == pytest.approx(PUSH[channel] * features[..., channel, :])
+
+
+def test_the_same_ship_has_the_same_features_every_time():
+    at = knots(seed=9)
+    for name in (*SEEN, *UNSEEN):
+        one_time, another = one(name, TWIN, at), one(name, TWIN, at)
+        assert (one_time.features(at) == another.features(at)).all()
+    motion, controls = one("motion", TWIN, at), one("controls", TWIN, at)
+    assert motion.waves.phase[:5].tolist() != controls.waves.phase[:5].tolist()

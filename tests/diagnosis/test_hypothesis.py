@@ -1,0 +1,69 @@
+"""Priors of hypotheses are probabilities, and a form's error is worked out by hand."""
+
+import math
+from itertools import combinations
+
+import pytest
+from straight import CAUSES, One
+
+from shiplog import causes
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypothesis import Priors, form_error, name_of
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+
+FAMILIES = ("motion", "wind", "position")
+KINDS = (NOMINAL, RAISED, INTERMITTENT, *FAMILIES)
+
+
+@pytest.mark.parametrize("catalogue", (CAUSES, causes.CATALOGUE, CAUSES[:1]))
+def test_priors_of_one_cause_at_most_sum_to_one(catalogue):
+    priors = Priors(catalogue, FAMILIES)
+    sets = [(), *((cause.label,) for cause in catalogue)]
+    whole = sum(math.exp(priors.of(labels, kind)) for labels in sets for kind in KINDS)
+    assert whole == pytest.approx(1.0, rel=1e-12)
+    none = sum(math.exp(priors.of((), kind)) for kind in KINDS)
+    assert none == pytest.approx(thresholds.NO_CHANGE, rel=1e-12)
+    remains = sum(math.exp(priors.of(labels, k)) for labels in sets for k in KINDS if k != NOMINAL)
+    assert remains == pytest.approx(thresholds.REMAINDER, rel=1e-12)
+
+
+def test_kinds_of_remainder_share_what_remains():
+    priors = Priors(CAUSES, FAMILIES)
+    assert set(priors.kinds) == set(KINDS)
+    for kind in KINDS[1:]:
+        assert math.exp(priors.kinds[kind]) == pytest.approx(thresholds.REMAINDER / 5)
+
+
+def test_each_further_cause_is_rarer_by_a_factor_and_by_its_own_prior():
+    priors = Priors(CAUSES, FAMILIES)
+    for one, other in combinations((c.label for c in CAUSES), 2):
+        alone, other_alone = priors.causes((one,)), priors.causes((other,))
+        some = math.log(1.0 - thresholds.NO_CHANGE)
+        wanted = alone + other_alone - some + math.log(thresholds.ANOTHER_CAUSE)
+        assert priors.causes((one, other)) == pytest.approx(wanted)
+        assert priors.causes((one, other)) == pytest.approx(priors.causes((other, one)))
+
+
+def test_causes_of_one_name_share_that_names_prior():
+    """Four names; the two clocks have half of theirs each."""
+    priors = Priors(CAUSES, FAMILIES)
+    each = {label: math.exp(value) for label, value in priors.each.items()}
+    assert each == pytest.approx(
+        {"two": 1 / 4, "drag": 1 / 4, "load": 1 / 4, "clock:wind": 1 / 8, "clock:gnss": 1 / 8}
+    )
+    assert [name_of(label) for label in ("clock:wind", "drag")] == ["clock", "drag"]
+    # a third clock takes from the clocks, and from nothing else
+    more = Priors((*CAUSES, One("clock", "gyro")), FAMILIES)
+    assert math.exp(more.each["clock:gyro"]) == pytest.approx(1 / 12)
+    assert more.each["drag"] == priors.each["drag"]
+
+
+def test_what_a_form_leaves_over_by_hand():
+    alone = {"drag": 300.0, "load": 40.0, "two": -5.0}
+    share = thresholds.FORM_ERROR**2  # nats go with the square of a force
+    assert form_error(alone, ()) == form_error(alone, ("drag",)) == 0.0
+    assert form_error(alone, ("drag", "load")) == pytest.approx(300.0 * share)
+    assert form_error(alone, ("load", "drag")) == pytest.approx(300.0 * share)
+    assert form_error(alone, ("load", "two")) == pytest.approx(40.0 * share)
+    assert form_error(alone, ("drag", "load", "two")) == pytest.approx(2 * 300.0 * share)
+    assert form_error(alone, ("two", "unseen")) == 0.0  # nothing was explained

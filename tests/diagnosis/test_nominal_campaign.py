@@ -1,0 +1,258 @@
+"""Parts of a campaign, the prior that they make, and how much of itself a trial counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import straight
+from straight import CAUSES, SETTING, UNREST
+
+from shiplog import evidence, reference
+from shiplog.diagnosis import discrepancy, nominal_campaign, voyage_effects
+from shiplog.diagnosis.nominal_campaign import FEWEST, parts_of, prior
+from shiplog.diagnosis.voyage_effects import VoyageEffects
+from shiplog.reference import Settled, Start
+
+
+def cuts(seed: int) -> np.ndarray:
+    """Voyages of segments, some of one only."""
+    rng = np.random.default_rng(seed)
+    each = rng.integers(1, [3, 12, 60, 150][seed % 4], size=rng.integers(1, 7))
+    return np.repeat(rng.permutation(len(each)), each)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_parts_are_whole_stretches_of_one_voyage(seed):
+    voyage = cuts(seed)
+    parts = parts_of(voyage)
+    assert np.concatenate(parts).tolist() == list(range(len(voyage)))  # all of them, in order
+    for rows in parts:
+        assert len(rows)
+        assert (np.diff(rows) == 1).all()
+        assert len(set(voyage[rows])) == 1
+    if len(voyage) >= 2 * FEWEST:
+        assert len(parts) >= FEWEST
+
+
+@pytest.mark.parametrize(
+    ("voyages", "sizes"),
+    (
+        ((100,), (20, 20, 20, 20, 20)),
+        ((50, 50), (25, 25, 25, 25)),  # 50 / 20 is 2.5, which rounds to two
+        ((30,), (5, 5, 5, 5, 5, 5)),  # of ten each there were but three
+        ((8,), (2, 2, 2, 2)),
+        ((1, 1, 1, 1), (1, 1, 1, 1)),
+        ((3,), (3,)),  # too few to be cut
+    ),
+)
+def test_parts_by_hand(voyages, sizes):
+    found = tuple(map(len, parts_of(np.repeat(np.arange(len(voyages)), voyages))))
+    assert found == sizes
+    assert sum(found) == sum(voyages)
+
+
+def test_a_prior_is_the_posterior_of_the_parts_and_one_more_deviation():
+    """Against drawn numbers: θ ~ N(mean, known⁻¹), each part sees all of θ, the trial's numbers
+    are θ + b with b ~ N(0, D): a Gaussian by conditioning, of a part each with its power."""
+    rng = np.random.default_rng(0)
+    count, share = 4, 0.3
+    known, anchor = rng.uniform(0.5, 3.0, count), rng.standard_normal(count)
+    deviation = np.array([0.3, 0.0, 1.0, 0.2])
+    j, e = rng.standard_normal((30, count)), rng.standard_normal(30)
+    both = np.concatenate((e[:, None], j), 1)
+    parts = [both[a : a + 10].T @ both[a : a + 10] for a in (0, 10, 20)]
+    information, pull = prior(parts, known, anchor, deviation, share)
+
+    before = np.diag(1.0 / known)
+    whole = np.eye(30) / share + j @ before @ j.T
+    gain = before @ j.T @ np.linalg.inv(whole)
+    mean = anchor / known
+    mean = mean + gain @ (e - j @ mean)
+    covariance = before - gain @ j @ before + np.diag(deviation**2)
+    assert np.linalg.inv(information) == pytest.approx(covariance, rel=1e-9)
+    assert np.linalg.solve(information, pull) == pytest.approx(mean, rel=1e-9)
+    # no parts: what was known, and the deviation
+    information, pull = prior([], known, anchor, deviation, 1.0)
+    assert np.linalg.inv(information) == pytest.approx(before + np.diag(deviation**2))
+    assert np.linalg.solve(information, pull) == pytest.approx(anchor / known)
+
+
+def drawn_parts(times: float, seed: int, count: int = 6, parts: int = 12) -> list[np.ndarray]:
+    """Parts that agree on numbers of unit size, with noise `times` what is assumed."""
+    rng = np.random.default_rng(seed)
+    theta, found = rng.standard_normal(count), []
+    for _ in range(parts):
+        j = 0.5 * rng.standard_normal((30, count))
+        both = np.concatenate(((j @ theta + times * rng.standard_normal(30))[:, None], j), 1)
+        found.append(both.T @ both)
+    return found
+
+
+def test_a_right_noise_model_counts_whole_and_one_too_quiet_does_not():
+    """Of 15 draws with the noise that is assumed most keep all of it, and none falls below a half;
+    of 15 with twice that noise, which is four times the squares, none keeps more than a half."""
+    effects, none = VoyageEffects(np.zeros(60), np.ones(60)), np.zeros(60)
+    right, wrong = (
+        [nominal_campaign._share(drawn_parts(t, seed, 60), effects, none) for seed in range(15)]
+        for t in (1.0, 2.0)
+    )
+    assert sum(share == 1.0 for share in right) >= 9
+    assert min(right) >= 0.5 >= max(wrong)
+    assert set(right + wrong) <= set(nominal_campaign.SHARES)
+
+
+def test_one_part_cannot_say_how_much_it_counts():
+    effects = VoyageEffects(np.zeros(6), np.ones(6))
+    assert nominal_campaign._share(drawn_parts(1.0, 0, parts=1), effects, np.zeros(6)) == 1.0
+
+
+def test_products_of_parts_are_those_of_the_whole():
+    """Sums of segments, weighted, in units of the numbers."""
+    columns = straight.columns_of(CAUSES[:2])
+    record = straight.sailed(6)
+    given = straight.passed(record, columns)
+    modes = evidence.modes(evidence.weighed(given, UNREST), UNREST)
+    weight = np.linspace(0.2, 1.0, 6)
+    unit = columns.unit
+    rows = [np.arange(2), np.arange(2, 6)]
+    found = nominal_campaign.products(modes, rows, unit, weight, 1.3)
+    wanted = np.zeros((1 + len(unit),) * 2)
+    for s, (e, j, _, c) in enumerate(straight.dense(given, UNREST.louder(1.3))):
+        both = np.concatenate((e[:, None], j * unit), 1)
+        wanted += weight[s] * both.T @ np.linalg.solve(c, both)
+    assert sum(found) == pytest.approx(wanted, rel=1e-6)
+    assert nominal_campaign.products(modes, rows, unit)[0] == pytest.approx(
+        nominal_campaign.products(modes, rows, unit, np.ones(6), 1.0)[0]
+    )
+
+
+# --- a campaign learned from a pass that is exactly linear
+
+
+@pytest.fixture(scope="module")
+def model():
+    class Base:
+        names = ("hull.X_vv", "rudder.t_R")
+
+    class Model:
+        base = Base()
+        causes = CAUSES[:2]
+
+    return Model()
+
+
+START = Start(np.zeros(2), np.array([0.3, 2.0]), np.full(2, -9.0), np.full(2, 9.0))
+
+
+@pytest.fixture(scope="module")
+def learned(model):
+    """Characteristics and campaign of 24 segments in two voyages, with `drag` in all of them."""
+    columns = reference.columns_of(model, SETTING, START)
+    record = straight.sailed(24)
+    numbers = np.zeros(len(columns.unit))
+    numbers[columns.of["drag"]] = 0.5
+    given = straight.passed(record, columns, numbers, told=0.3)
+    at = Settled(np.zeros(2), given.path, UNREST)
+    patch = pytest.MonkeyPatch()
+    patch.setattr(nominal_campaign, "read", lambda *_: (given.cut, None, None))
+    patch.setattr(nominal_campaign.linearise, "linear", lambda *_: given)
+    found = nominal_campaign.characteristics(model, SETTING, START, record, at)
+    made = nominal_campaign.learn(model, SETTING, START, record, at, found)
+    patch.undo()
+    return found, made
+
+
+def test_a_campaign_knows_what_is_usual_of_a_cause(learned):
+    """The cause that all voyages have is expected in a trial, to within its spread."""
+    _, made = learned
+    at = made.reference.columns.of["drag"][0]
+    spread = np.sqrt(np.linalg.inv(made.reference.information)[at, at])
+    assert 0.01 < spread < 0.5
+    assert made.reference.mean[at] == pytest.approx(1.0, abs=4.0 * spread)  # in units of 0.5
+
+
+def test_characteristics_say_every_group_once(learned):
+    found, made = learned
+    assert set(found.deviation) == {"hull", "rudder", "two", "drag", "motion", "controls", "wind"}
+    assert set(found.size) == set(discrepancy.SEEN)
+    assert all(0.0 < value < 1.0 for value in found.deviation.values())
+    assert found.share in nominal_campaign.SHARES
+    # what a trial is given is by these names, column by column
+    columns = made.reference.columns
+    for label in ("two", "drag"):
+        assert made.effects.deviation[columns.of[label]] == pytest.approx(found.deviation[label])
+    for family in made.discrepancy.families:
+        assert made.effects.size[family.columns] == pytest.approx(found.size[family.name])
+    assert made.reference.counts == found.share
+    # of a model without any misfit little is learned of it: sizes in units of the process noise
+    assert max(found.size.values()) < 0.5
+    # parts drawn with one process noise differ by what seven steps of a grid can tell
+    assert 0.0 <= found.noise < 0.3
+
+
+def test_columns_follow_one_another(learned):
+    """Coefficients, causes, then what a model sees; the families that none sees come after."""
+    _, made = learned
+    columns = made.reference.columns
+    at = columns.linearised
+    for family in (*made.discrepancy.families, *made.unseen.families):
+        assert family.columns.tolist() == list(range(at, at + len(family.columns)))
+        at += len(family.columns)
+    assert len(columns.unit) == columns.linearised + made.discrepancy.count
+    assert all(len(one) == 1 + len(columns.unit) + made.unseen.count for one in made.each)
+    assert len(made.each) == len(made.parts) == len(parts_of(made.reference.nominal.cut.voyage))
+
+
+def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
+    _, made = learned
+    ref = made.reference
+    count = 1 + len(ref.pull)
+    kept = [one[:count, :count] for one in made.parts]
+    information, pull = prior(
+        kept, made.effects.size**-2.0, ref.anchor, made.effects.deviation, ref.counts
+    )
+    assert information == pytest.approx(ref.information, rel=1e-6, abs=1e-6)
+    assert pull == pytest.approx(ref.pull, rel=1e-6, abs=1e-6)
+    for i in range(len(made.parts)):
+        less, _ = made.prior_without(i)
+        gone = np.linalg.eigvalsh(ref.information - less)
+        assert gone.min() > -1e-6 * gone.max()
+        assert gone.max() > 0.0
+    nobody, _ = made.prior_without(-1)
+    assert nobody == pytest.approx(ref.information)
+
+
+def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, monkeypatch):
+    """A cause that only the trial can have, such as a second place's: no deviation was learned."""
+    found, _ = learned
+    columns = reference.columns_of(model, SETTING, START)
+    record = straight.sailed(24)
+    given = straight.passed(record, columns, told=0.3)
+    monkeypatch.setattr(nominal_campaign, "read", lambda *_: (given.cut, None, None))
+    monkeypatch.setattr(nominal_campaign.linearise, "linear", lambda *_: given)
+    less = replace(found, deviation={n: v for n, v in found.deviation.items() if n != "drag"})
+    at = Settled(np.zeros(2), given.path, UNREST)
+    made = nominal_campaign.learn(model, SETTING, START, record, at, less)
+    own = made.effects.deviation[columns.of["drag"]]
+    assert own == pytest.approx([voyage_effects.LEAST])
+
+
+def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):
+    """`scaled` may grow one coefficient by 1.5 at its realistic size of 0.5; the other stays."""
+
+    class Scaled(straight.One):
+        def coefficients(self, c, p, state, share, at):
+            return c | {"hull.X_vv": c["hull.X_vv"] * (1.0 + p[0])}
+
+        @property
+        def absorbed(self):
+            return True
+
+    class Model:
+        base = model.base
+        causes = (Scaled("scaled"),)
+
+    start = replace(START, values=np.array([3.0, 0.8]))
+    assert nominal_campaign.widened(Model(), SETTING, start).spread == pytest.approx([1.5, 2.0])
+    # of a cause that no fit takes in nothing follows
+    assert nominal_campaign.widened(model, SETTING, start).spread == pytest.approx([0.3, 2.0])

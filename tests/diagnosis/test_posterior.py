@@ -1,0 +1,167 @@
+"""Sums of probabilities over hypotheses that are made by hand."""
+
+import numpy as np
+import pytest
+import weighed
+
+from shiplog import causes
+from shiplog import profile as profiles
+from shiplog.causes import Setting
+from shiplog.diagnosis import posterior as posteriors
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypothesis import name_of
+from shiplog.diagnosis.posterior import best_with, of_one_device, posterior, share_of_causes
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+
+DRAG, LOAD = ("drag",), ("load",)
+WIND, GNSS = ("clock:wind",), ("clock:gnss",)
+MIXED = {
+    ((), NOMINAL): 0.05, (DRAG, NOMINAL): 0.4, (DRAG, RAISED): 0.1, (LOAD, NOMINAL): 0.05,
+    (("drag", "load"), NOMINAL): 0.2, (WIND, NOMINAL): 0.08, (GNSS, "position"): 0.07,
+    (("clock:gnss", "clock:wind"), NOMINAL): 0.03, ((), INTERMITTENT): 0.02,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return weighed.trial()
+
+
+def test_probabilities_are_sums_by_name_and_by_kind(trial):
+    found = posterior(weighed.search(trial, MIXED))
+    assert found.probability.sum() == pytest.approx(1.0)
+    assert (np.diff(found.probability) <= 0.0).all()
+    assert found.names == pytest.approx({"drag": 0.7, "load": 0.25, "clock": 0.18})
+    assert list(found.names) == ["drag", "load", "clock"]
+    assert found.labels == pytest.approx(
+        {"drag": 0.7, "load": 0.25, "clock:wind": 0.11, "clock:gnss": 0.10}
+    )
+    assert found.kinds == pytest.approx(
+        {NOMINAL: 0.81, RAISED: 0.1, "position": 0.07, INTERMITTENT: 0.02}
+    )
+    assert found.none == pytest.approx(0.05)
+    ranking = found.ranking()
+    assert ranking == pytest.approx({
+        "drag": 0.7, "load": 0.25, "clock": 0.18, "unknown:stochastic": 0.1,
+        "unknown:position": 0.07, "none": 0.05, "unknown:intermittent": 0.02,
+    })  # fmt: skip
+    assert list(ranking.values()) == sorted(ranking.values(), reverse=True)
+
+
+def test_a_factor_of_all_scores_changes_nothing(trial):
+    """Scores are known up to a constant, and thousands of nats below nothing."""
+    made = weighed.search(trial, {key: 1e-300 * p for key, p in MIXED.items()})
+    assert posterior(made).names == pytest.approx(
+        posterior(weighed.search(trial, MIXED)).names, rel=1e-6
+    )
+
+
+def test_what_is_below_practical_size_is_no_change(trial):
+    """`drag` at 0.09 of 0.1; beside `load`, which is large, only that is there."""
+    made = weighed.search(trial, MIXED, sizes={"drag": 0.09})
+    found = posterior(made)
+    assert found.names == pytest.approx({"load": 0.25, "clock": 0.18})
+    assert found.none == pytest.approx(0.45)  # its hypotheses with a remainder are not nothing
+    assert posteriors.practical(made, made.found[("drag", "load"), NOMINAL]) == LOAD
+    assert posterior(weighed.search(trial, MIXED, sizes={"drag": -0.11})).none == pytest.approx(
+        0.05
+    )
+
+
+def test_one_of_two_stated_names_is_not_enough(trial):
+    """A or B: together sure, each by itself not."""
+    found = posterior(weighed.search(trial, {(DRAG, NOMINAL): 0.55, (LOAD, NOMINAL): 0.45}))
+    assert found.stated == ()
+    assert sum(found.names.values()) == pytest.approx(1.0)
+    assert found.none < 1e-6
+
+
+@pytest.mark.parametrize(("p", "said"), ((0.899, False), (0.901, True)))
+def test_a_name_is_stated_from_a_probability_on(trial, p, said):
+    assert thresholds.STATED == 0.9
+    found = posterior(weighed.search(trial, {(DRAG, NOMINAL): p, (LOAD, RAISED): 1.0 - p}))
+    assert (found.stated == DRAG) is said
+    found = posterior(weighed.search(trial, {(DRAG, RAISED): p, (LOAD, NOMINAL): 1.0 - p}))
+    assert (found.remainder == RAISED) is said
+    # the nominal misfit is no remainder that anybody asks for
+    assert posterior(weighed.search(trial, {(DRAG, NOMINAL): 1.0})).remainder is None
+
+
+def test_refuted_names_go_and_the_rest_is_sure_again(trial):
+    """Every hypothesis with it, whatever else is in it; the others' ratios stay."""
+    made = weighed.search(trial, MIXED)
+    found = posterior(made, ("drag",))
+    whole = 0.05 + 0.05 + 0.08 + 0.07 + 0.03 + 0.02
+    assert found.probability.sum() == pytest.approx(1.0)
+    assert found.names == pytest.approx({"load": 0.05 / whole, "clock": 0.18 / whole})
+    assert found.none == pytest.approx(0.05 / whole)
+    # of a name with several labels all of them
+    assert set(posterior(made, ("clock",)).names) == {"drag", "load"}
+    assert set(posterior(made, ("drag", "load", "clock")).names) == set()
+    assert posterior(made, ("drag", "load", "clock")).none == pytest.approx(5.0 / 7.0)
+
+
+def test_the_likeliest_hypothesis_with_some_names(trial):
+    found = posterior(weighed.search(trial, MIXED))
+    assert best_with(found, ()).causes == DRAG
+    assert best_with(found, ("load",)).causes == ("drag", "load")
+    assert best_with(found, ("load", "drag")).causes == ("drag", "load")
+    assert best_with(found, ("clock",)).causes == WIND
+    assert best_with(found, ("clock", "load")) is found.hypotheses[0]  # none has both
+
+
+def test_a_stated_name_is_shown_in_its_likeliest_kind(trial):
+    """The wind's clock has the likeliest hypothesis, GNSS's the larger sum."""
+    found = posterior(weighed.search(
+        trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32}
+    ))  # fmt: skip
+    assert found.stated == ("clock",)
+    assert found.states("clock:gnss") and not found.states("clock:wind")
+    assert best_with(found, ("clock",)).causes == GNSS
+
+
+def test_share_of_what_is_explained_by_causes(trial):
+    """Of 50 nats with a change of position 10 are the cause's; of raised noise it is the better."""
+    both = weighed.search(
+        trial, {(DRAG, "position"): 0.9, (DRAG, NOMINAL): 0.05, (DRAG, RAISED): 0.05},
+        evidence={(DRAG, "position"): 50.0, (DRAG, NOMINAL): 4.0, (DRAG, RAISED): 10.0},
+    )  # fmt: skip
+    of = both.found
+    assert share_of_causes(both, of[DRAG, "position"]) == pytest.approx(0.2)
+    assert share_of_causes(both, of[DRAG, RAISED]) == pytest.approx(1.0)
+    assert share_of_causes(both, of[(), NOMINAL]) == 1.0  # nothing is explained
+    del of[DRAG, NOMINAL], of[DRAG, RAISED]
+    assert share_of_causes(both, of[DRAG, "position"]) == 0.0
+
+
+# --- one device
+
+
+def test_a_force_that_is_on_or_off_is_one_device():
+    rng = np.random.default_rng(0)
+    on = np.repeat(rng.uniform(size=(30, 4)) < 0.25, 4, axis=1)
+    force = 5.0 * on + 0.3 * rng.standard_normal(on.shape)
+    assert of_one_device(force, np.full(on.shape, 0.3))
+    assert of_one_device(-force, np.full(on.shape, 0.3))
+
+
+def test_a_force_that_merely_varies_is_none():
+    """Gaussian, from one node to the next or from one segment to the next: as often between as
+    above."""
+    rng = np.random.default_rng(1)
+    varies = 5.0 * rng.standard_normal((30, 16))
+    slow = np.repeat(5.0 * rng.standard_normal((120, 1)), 16, axis=1)
+    for force in (varies, slow):
+        assert not of_one_device(force, np.full(force.shape, 0.3))
+    assert not of_one_device(0.2 * varies, np.full(varies.shape, 2.0))  # nor what is not seen
+
+
+def test_a_causes_label_begins_with_its_name():
+    """What is refuted is dropped by name: a label of another name would be refuted for ever."""
+    for ship in ("esso-vectwin", "milliampere", "blueboat"):
+        of = Setting(
+            profiles.load(ship), {"speed": 0.5, "length": 3.0, "mass": 245.0}, np.zeros((1, 2)), 1.0
+        )
+        for cause in causes.CATALOGUE:
+            for one in cause.each(of):
+                assert name_of(one.label) == one.name == cause.name

@@ -1,0 +1,130 @@
+"""Of held-out voyages: what makes the error surely greater is dropped, and nothing else."""
+
+import math
+
+import pytest
+import weighed
+
+from shiplog.diagnosis.refutation import judged
+from shiplog.diagnosis.trial import NOMINAL
+from shiplog.gain import Gain
+
+DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
+BETTER, WORSE = (0.1, 0.3), (-0.4, -0.02)
+UNSURE, HARDLY = (-0.3, 0.2), (-0.4, 0.001)
+
+
+def gain(low: float, high: float) -> Gain:
+    return Gain(1.0, 1.0 - 0.5 * (low + high), low, high, 12, {})
+
+
+class HeldOut:
+    """Gains by what is named, and by the name that is taken away; what was asked is kept."""
+
+    def __init__(self, gains, worths=None):
+        self.gains, self.worths, self.asked = gains, worths or {}, []
+
+    def gain(self, decision):
+        labels = tuple(one.cause.label for one in decision.named)
+        self.asked.append(labels)
+        assert len(self.asked) < 20, "it never ends"
+        return gain(*self.gains[labels])
+
+    def worth(self, rest, decision):
+        kept = {one.cause.label for one in rest.named}
+        (gone,) = {one.cause.label for one in decision.named} - kept
+        return gain(*self.worths[gone])
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return weighed.trial()
+
+
+def test_without_held_out_voyages_the_decision_stands(trial):
+    made = weighed.search(trial, {(DRAG, NOMINAL): 1.0})
+    decision, found, gained, refuted = judged(made, None)
+    assert [one.cause.label for one in decision.named] == ["drag"]
+    assert (gained, refuted) == (None, {})
+    assert found.names["drag"] == pytest.approx(1.0)
+
+
+def test_nothing_named_is_not_held_out(trial):
+    held = HeldOut({})
+    decision, _, gained, refuted = judged(weighed.search(trial, {((), NOMINAL): 1.0}), held)
+    assert (decision.verdict, gained, refuted, held.asked) == ("none", None, {}, [])
+
+
+@pytest.mark.parametrize("interval", (BETTER, UNSURE, HARDLY))
+def test_what_is_not_surely_worse_stays(trial, interval):
+    held = HeldOut({DRAG: interval})
+    decision, _, gained, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
+    assert [one.cause.label for one in decision.named] == ["drag"]
+    assert (gained.low, gained.high) == interval
+    assert refuted == {}
+
+
+def test_what_is_surely_worse_is_dropped_and_the_next_is_judged(trial):
+    """The likeliest is refuted; of the rest another is sure, and holds."""
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
+    )
+    held = HeldOut({DRAG: WORSE, LOAD: UNSURE})
+    decision, found, gained, refuted = judged(made, held)
+    assert held.asked == [DRAG, LOAD]
+    assert [one.cause.label for one in decision.named] == ["load"]
+    assert found.names == pytest.approx({"load": 0.039 / 0.0391})
+    assert gained.high == UNSURE[1]
+    assert list(refuted) == ["drag"]
+    assert "2.0% to 40.0% greater" in refuted["drag"]
+    assert decision.rejected["drag"] == refuted["drag"]
+
+
+def test_after_a_refutation_the_rest_may_be_undecided(trial):
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.02, (TWO, NOMINAL): 0.02}
+    )
+    decision, _, gained, refuted = judged(made, HeldOut({DRAG: WORSE}))
+    assert (decision.verdict, decision.named, gained) == ("undecided", (), None)
+    assert list(refuted) == ["drag"]
+
+
+def test_everything_refuted_ends_with_nothing(trial):
+    """Each in turn; it ends after as many rounds as there are names."""
+    given = {(labels, NOMINAL): 100.0**-i for i, labels in enumerate((DRAG, LOAD, TWO))}
+    clocks = {(("clock:wind",), NOMINAL): 1e-8, (("clock:gnss",), NOMINAL): 1e-9}
+    made = weighed.search(trial, given | clocks)
+    held = HeldOut({(label,): WORSE for label in ("drag", "load", "two", "clock:wind")})
+    decision, found, gained, refuted = judged(made, held)
+    assert held.asked == [DRAG, LOAD, TWO, ("clock:wind",)]
+    assert (decision.verdict, decision.named, gained) == ("none", (), None)
+    assert set(refuted) == {"drag", "load", "two", "clock"}
+    assert found.none == pytest.approx(1.0)
+
+
+def test_of_two_the_one_that_is_worth_least_goes_first(trial):
+    """Both are surely worse; the set without the worse one is judged again, and holds."""
+    made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
+    held = HeldOut(
+        {("drag", "load"): BETTER, LOAD: BETTER}, {"drag": (-0.5, -0.2), "load": (-0.3, -0.1)}
+    )
+    decision, _, gained, refuted = judged(made, held)
+    assert held.asked == [("drag", "load"), LOAD]
+    assert [one.cause.label for one in decision.named] == ["load"]
+    assert list(refuted) == ["drag"]
+    assert gained.low == BETTER[0]
+
+
+def test_of_two_each_is_judged_over_the_other_alone(trial):
+    """Together they are better than nothing; one is surely worse than not having it."""
+    made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (DRAG, NOMINAL): 0.03})
+    held = HeldOut({("drag", "load"): BETTER, DRAG: BETTER}, {"drag": UNSURE, "load": WORSE})
+    decision, _, _, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == ["drag"]
+    assert list(refuted) == ["load"]
+
+
+def test_a_gain_without_bounds_refutes_nothing(trial):
+    held = HeldOut({DRAG: (-math.inf, math.nan)})
+    decision, _, _, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
+    assert (len(decision.named), refuted) == (1, {})

@@ -1,0 +1,218 @@
+"""Campaigns and trials whose segments are exactly linear in every number.
+
+Sensitivities are drawn once, so that nothing is compiled, integrated or trained, and what the
+diagnosis says of such a trial can be worked out densely.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from shiplog import evidence, linearise, reference, segments, structure
+from shiplog import profile as profiles
+from shiplog.causes import Cause, Parameter, Setting
+from shiplog.columns import Columns
+from shiplog.diagnosis import discrepancy
+from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.nominal_campaign import Campaign, prior
+from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
+from shiplog.evidence import Unrest
+from shiplog.hypotheses import Point
+from shiplog.linearise import Linear, Path
+from shiplog.record import Record
+from shiplog.reference import Reference
+from shiplog.segments import KNOT
+from shiplog.unnamed import Pulses
+
+PROFILE = profiles.load("esso-vectwin")
+NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
+UNREST = Unrest(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
+SETTING = Setting(PROFILE, {"speed": 0.5, "length": 3.0, "mass": 245.0}, np.zeros((1, 2)), 1.0)
+COEFFICIENTS = 2  # of the base model
+STEP = 0.5  # s between rows
+
+
+@dataclass(frozen=True)
+class One(Cause):
+    """A cause of one number in steps of its realistic size; `unit` tells one of a name apart."""
+
+    word: str = "one"
+    unit: str = ""
+
+    kind = "ship"
+    story = "Something changed."
+    equation = "x = {size:.2f}"
+    parameters = (Parameter("size", "", 0.5, 0.1),)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.word
+
+    @property
+    def label(self) -> str:
+        return f"{self.word}:{self.unit}" if self.unit else self.word
+
+
+@dataclass(frozen=True)
+class Two(One):
+    """A cause of two numbers."""
+
+    word: str = "two"
+    parameters = (Parameter("along", "", 0.5, 0.1), Parameter("across", "", 2.0, 0.4))
+
+
+CAUSES = (Two(), One("drag"), One("clock", "wind"), One("clock", "gnss"), One("load"))
+
+
+def sailed(count: int, voyages: int = 2, seed: int = 0) -> Record:
+    """A record of `count` segments of 30 s each, in `voyages` of equal length, at 2 Hz."""
+    rng = np.random.default_rng(seed)
+    rows = round(segments.SECONDS / STEP)
+    each = count // voyages * rows + 1
+    t = STEP * np.arange(each)
+    state, orders = [], []
+    for _ in range(voyages):
+        phase = rng.uniform(0.0, 6.0, (8, 1))
+        period = rng.uniform(40.0, 110.0, (8, 1))
+        waves = np.sin(2.0 * np.pi * t / period + phase)
+        size = np.array([[20.0], [0.4], [15.0], [0.1], [2.0], [0.05]])
+        state.append((size * waves[:6] + np.array([[0.0], [0.4], [0.0], [0.0], [0.0], [0.0]])).T)
+        orders.append(np.stack((0.4 * waves[6], 0.3 * waves[7], 8.0 + 4.0 * waves[5]), -1))
+    length = each * voyages
+    starts = np.zeros(length, dtype=bool)
+    starts[::each] = True
+    wind = np.stack((2.0 + rng.standard_normal(length) * 0.3, np.full(length, -1.0)), -1)
+    return Record(
+        profile=PROFILE, names=tuple(f"v{i}" for i in range(voyages)),
+        voyage=np.repeat(np.arange(voyages), each), time=np.tile(t, voyages),
+        share=(np.arange(length) + 0.5) / length, starts=starts,
+        seen=np.ones(length, dtype=bool), state=np.concatenate(state),
+        actuator=np.concatenate(orders), wind=wind, step=STEP,
+    )  # fmt: skip
+
+
+def columns_of(causes: tuple[Cause, ...]) -> Columns:
+    sizes = [cause.sizes(SETTING) for cause in causes]
+    return Columns(COEFFICIENTS, causes, np.concatenate((np.array([0.3, 2.0]), *sizes)))
+
+
+def passed(
+    record: Record, columns: Columns, numbers: np.ndarray | None = None, *, seed: int = 1,
+    noise: float = 1.0, told: float = 1.0, pushed: np.ndarray | None = None,
+) -> Linear:  # fmt: skip
+    """One pass of a record, drawn: e = Z z + J d + noise with `numbers` d [C] in SI.
+
+    noise    times the standard deviations of UNREST that the noise and the acceleration have
+    told     what one unit of a number moves an observation by, in its standard deviations
+    pushed   [S, 3J] accelerations beside the process noise
+    """
+    rng = np.random.default_rng(seed)
+    g = segments.grid(record)
+    cut = segments.cut(record, segments.begins(record))
+    knots, count = g.knots, columns.linearised
+    size = 6 + 3 * knots
+    z = rng.standard_normal((*cut.y.shape, size)) * NOISE[:, None] * 3.0
+    j = rng.standard_normal((*cut.y.shape, count)) * NOISE[:, None] * told
+    j = j / columns.unit[:count]
+    # each cause in columns of its own stream: another order of the causes is the same data
+    for cause in columns.causes:
+        own = np.random.default_rng([seed, *cause.label.encode()])
+        at = columns.of[cause.label]
+        drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * told
+        j[..., at] = drawn / columns.unit[at]
+    d = np.zeros(count) if numbers is None else numbers
+    kernel = np.linalg.cholesky(UNREST.kernel(knots))
+    start = UNREST.start * rng.standard_normal((len(cut), 6))
+    push = noise * rng.standard_normal((len(cut), 3 * knots)) @ kernel.T
+    if pushed is not None:
+        push = push + pushed
+    moved = np.einsum("sbcz,sz->sbc", z, np.concatenate((start, push), 1))
+    e = moved + j @ d + noise * NOISE * rng.standard_normal(cut.y.shape)
+    path = Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, knots)))
+    return Linear(cut, path, e, z, j)
+
+
+def campaign(
+    nominal: Record, given: Linear, columns: Columns, *, parts: int = 4, share: float = 1.0,
+    deviation: float = 0.1, size: float = 0.3, names: tuple[str, ...] = ("motion",),
+    noise: float = 0.1,
+) -> Campaign:  # fmt: skip
+    """What `nominal_campaign.learn` makes of a pass, with deviations and sizes as given."""
+    g = segments.grid(nominal)
+    knots = structure.at_knots(given.cut, g)
+    first = columns.linearised
+    seen = discrepancy.of(PROFILE, UNREST.push, first, names, knots) if names else \
+        Discrepancy((), UNREST.push)  # fmt: skip
+    columns = columns.with_misfit(seen.count)
+    count = len(columns.unit)
+    unseen = discrepancy.of(PROFILE, UNREST.push, count, discrepancy.UNSEEN, knots)
+    modes = evidence.modes(evidence.weighed(given, UNREST), UNREST)
+    if seen.families:
+        modes = modes.beside(seen.pushed(given.cut, g))
+    whole = modes.beside(unseen.pushed(given.cut, g))
+    by = np.concatenate(([1.0], columns.unit, np.ones(unseen.count)))
+    rows = np.array_split(np.arange(len(given.cut)), parts)
+    each = []
+    for part in rows:
+        weight = np.zeros(len(given.cut))
+        weight[part] = 1.0
+        each.append(whole.total(weight) * np.outer(by, by))
+    spread = np.full(count, deviation)
+    sizes = columns.known**-0.5
+    sizes[first:] = size
+    anchor = np.zeros(count)
+    kept = [reduced(one[: 1 + count, : 1 + count], spread)[0] for one in each]
+    information, pull = prior(kept, sizes**-2.0, anchor, spread, share)
+    model = SimpleNamespace(causes=columns.causes, base=None)
+    made = Reference(
+        model, SETTING, np.zeros(COEFFICIENTS), columns, UNREST,  # type: ignore[arg-type]
+        linearise.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor, 1.0 / share,
+        given, modes, reference.freedom(parts), misfit=seen if seen.families else None,  # type: ignore[arg-type]
+        counts=share,
+    )  # fmt: skip
+    return Campaign(made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), noise)
+
+
+class Straight(Trial):
+    """A trial whose pass is the same wherever its causes stand, less what their numbers do."""
+
+    def __init__(self, made: Campaign, record: Record, given: Linear, fixed=()) -> None:
+        super().__init__(made, record, fixed)
+        self.given = given
+
+    def at(self, numbers, near=None, louder=None) -> Point:
+        columns = self.reference.columns
+        d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
+        linear = replace(self.given, e=self.given.e - self.given.j @ d)
+        point = Point(dict(numbers), linear.path, linear, evidence.weighed(linear, self.unrest))
+        if self.first is None:
+            self.first = point
+        return point
+
+    def intermittent(self, point, base) -> Pulses:
+        """There is no hull that a force could act on."""
+        return Pulses(0.0, -1.0, 0.0, 1.0, np.zeros(3))
+
+
+def dense(given: Linear, unrest: Unrest, rows: np.ndarray | None = None):
+    """Of each segment e [N], J [N, C], Z [N, 3J] by the knots and its covariance C [N, N]: start
+    and acceleration in it, explicitly."""
+    knots = (given.z.shape[-1] - 6) // 3
+    at = KNOT * np.arange(knots)
+    stays = np.exp(-np.abs(at[:, None] - at) / unrest.time)
+    kernel = np.zeros((6 + 3 * knots,) * 2)
+    kernel[:6, :6] = np.diag(unrest.start**2)
+    kernel[6:, 6:] = np.kron(np.diag(unrest.push**2), stays)
+    for s in range(len(given.e)) if rows is None else rows:
+        z = given.z[s].reshape(-1, given.z.shape[-1])
+        r = np.diag(np.tile(unrest.noise**2, given.e.shape[1]))
+        yield (
+            given.e[s].ravel(),
+            given.j[s].reshape(len(z), -1),
+            z[:, 6:],
+            r + z @ kernel @ z.T,
+        )

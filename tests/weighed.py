@@ -1,0 +1,57 @@
+"""A search that has weighed hypotheses with scores of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import straight
+
+from shiplog.diagnosis.hypothesis import Hypothesis
+from shiplog.diagnosis.search import Search
+from shiplog.diagnosis.trial import NOMINAL, Remainder
+from shiplog.hypotheses import Found
+from shiplog.unnamed import Pulses
+
+SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
+
+
+def trial() -> straight.Straight:
+    """One with nothing in it."""
+    columns = straight.columns_of(straight.CAUSES)
+    nominal, record = straight.sailed(8), straight.sailed(4, seed=3)
+    usual = straight.campaign(nominal, straight.passed(nominal, columns), columns)
+    return straight.Straight(usual, record, straight.passed(record, columns, seed=2))
+
+
+def search(
+    of: straight.Straight,
+    probability: Mapping[tuple[tuple[str, ...], str], float],
+    *,
+    evidence: Mapping[tuple[tuple[str, ...], str], float] | None = None,
+    sizes: Mapping[str, float] | None = None,
+    pulses: Pulses | None = None,
+) -> Search:
+    """Hypotheses (causes, kind) with these probabilities, up to a factor.
+
+    evidence   of a hypothesis; 100 nats a cause where none is given
+    sizes      of a label's numbers
+    """
+    point = of.first or of.at({})
+    made = Search(of, point, {})
+    columns = of.reference.columns
+    given = {((), NOMINAL): 1e-12, **probability}
+    for (labels, kind), p in given.items():
+        numbers = {
+            n: np.full(len(columns.of[n]), (sizes or {}).get(n, SIZE)) for n in sorted(labels)
+        }
+        count = sum(map(len, numbers.values()))
+        said = (evidence or {}).get((labels, kind), 100.0 * len(labels))
+        found = Found("+".join(labels), said, 1.0, numbers, 0.01 * np.eye(count))
+        remainder = Remainder(kind, 3.0)
+        score = float(np.log(p)) - 40.0
+        made.found[labels, kind] = Hypothesis(
+            tuple(sorted(labels)), remainder, said, score, point, found, pulses
+        )
+    made.alone = {cause.label: 1.0 for cause in made.catalogue}
+    return made
