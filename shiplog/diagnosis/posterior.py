@@ -140,7 +140,8 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> bool:
         return False
     on = size > 0.5 * strongest
     between = (size > 0.2 * strongest) & ~on
-    return bool(between.sum() < thresholds.BETWEEN * on.sum())
+    often = on.mean() > 0.5  # what is on for most of the time is no device that comes and goes
+    return bool(not often and between.sum() < thresholds.BETWEEN * on.sum())
 
 
 __all__ = ["FAMILY", "INTERMITTENT", "Posterior", "best_with", "of_one_device", "posterior"]

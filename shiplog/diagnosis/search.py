@@ -59,6 +59,15 @@ class Search:
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
 
     def run(self) -> None:
+        """Weigh hypotheses until none is worth it. Scores are then renewed: what a cause brings by
+        itself, on which the allowance for form errors rests, is known at the end only."""
+        self._run()
+        self.found = {
+            key: replace(h, score=self._score(h.evidence, h.causes, h.kind))
+            for key, h in self.found.items()
+        }
+
+    def _run(self) -> None:
         self.weigh((), {}, self.first)
         while len(self._tried) < MOST_SETS:
             best = self.ranked()
