@@ -126,6 +126,15 @@ def test_products_of_parts_are_those_of_the_whole():
     )
 
 
+def test_weights_of_segments_by_hand():
+    """Six medians off is the edge; what is lost stays so and is not in the median."""
+    square = np.array([1.0, 2.0, 3.0, 36.0, 1e9])
+    kept = np.array([True, True, True, True, False])
+    found = nominal_campaign.robust_weights(square, kept)  # the median of four is 2.5
+    assert found == pytest.approx([1.0, 1.0, 1.0, 15.0 / 36.0, 0.0])
+    assert nominal_campaign.robust_weights(square, np.zeros(5, dtype=bool)).tolist() == [0.0] * 5
+
+
 # --- a campaign learned from a pass that is exactly linear
 
 
