@@ -23,12 +23,12 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     refuted = dict(refuted or {})
     found = posteriors.posterior(search, tuple(refuted))
     names = found.stated
-    best = posteriors.best_with(found, names)
+    kind = found.remainder
+    best = posteriors.best_with(found, names, kind if not names else None)
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
     trial = search.trial
     trial.remainder = best.remainder
     verdict, structure, named, pulses = "undecided", None, (), None
-    kind = found.remainder
     if names and mostly:
         verdict, named = "named", _named(search, found, best, names)
     elif best.kind != NOMINAL and (kind is not None or names):

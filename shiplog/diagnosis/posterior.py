@@ -119,9 +119,11 @@ def share_of_causes(search: Search, one: Hypothesis) -> float:
     return (alone - nothing) / whole if whole > 0.0 else 1.0
 
 
-def best_with(found: Posterior, names: Sequence[str]) -> Hypothesis:
-    """The likeliest hypothesis that contains all of these names, each in its likeliest kind."""
+def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:
+    """The likeliest hypothesis that contains all of these names, each in its likeliest kind; of one
+    kind of remainder where that is given."""
     holding = [h for h in found.hypotheses if set(names) <= set(map(name_of, h.causes))]
+    holding = [h for h in holding if kind in (None, h.kind)] or holding
     likeliest = [h for h in holding
                  if set(names) <= {name_of(n) for n in h.causes if found.states(n)}]  # fmt: skip
     return (likeliest or holding or found.hypotheses)[0]
