@@ -7,7 +7,6 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
-
 LIMIT = 400_000_000  # bytes: some forty ships' compiled equations and campaigns
 
 

@@ -86,6 +86,10 @@ NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
     "yaw rate": _unless(
         lambda s: s.profile.sensors.yaw_rate is not None, "no yaw rate is recorded"
     ),
+    "body velocity": _unless(
+        lambda s: s.profile.sensors.kind("velocity") == "body",
+        "the velocity is recorded over ground",
+    ),
     "wind": _unless(lambda s: s.profile.has_wind, "no wind is recorded"),
     "wind force": _unless(lambda s: not s.lacking, "the model feels no wind"),
     "rudder": _unless(lambda s: bool(s.columns("rudder")), "the ship has no rudder"),

@@ -39,10 +39,9 @@ class HeadingOffset(Cause):
     def beside(self, label: str) -> bool:
         return label.partition(":")[0] != self.name
 
-    def missing(self, setting: Setting) -> str | None:
-        if self.turned and setting.profile.sensors.kind("velocity") != "body":
-            return "the velocity is recorded over ground"
-        return None
+    @property
+    def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return ("body velocity",) if self.turned else ()
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         seen = record.sighted.turned(-float(p[0]))

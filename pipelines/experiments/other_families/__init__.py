@@ -22,5 +22,5 @@ __all__ = ["FAMILIES", "OUTSIDE", "offered"]
 
 
 def offered(family: str) -> tuple[str, ...]:
-    """What can be hidden in a ship of this family, catalogue and outside; each has its actuators."""
+    """What can be hidden in a ship of this family, of the catalogue and outside it."""
     return effects.offered(FAMILIES[family](0))
