@@ -42,6 +42,7 @@ def record(
     profile: Profile,
     *,
     heading: float = 0.0,
+    by_compass: bool = False,
     bias: float = 0.0,
     scale: float = 1.0,
     moved: tuple[float, float] = (0.0, 0.0),
@@ -52,6 +53,7 @@ def record(
     """What ingest makes of the path, seen by instruments that are wrong.
 
     heading, bias   what the compass and the gyro show too much [rad, rad/s]; scale: times
+    by_compass      whether a body velocity is one over ground that the compass has turned
     moved           the antenna, from where the profile has it [m]; with it the velocity's sensor,
                     where the profile has both in one place
     late            channel → s that its clock is behind
@@ -72,7 +74,7 @@ def record(
     arm = sensors.velocity.lever_arm_m
     a, b = np.add(arm, moved) if arm == sensors.position.lever_arm_m else arm
     body = np.stack((v[:, 1] - v[:, 5] * b, v[:, 3] + v[:, 5] * a), -1)
-    if sensors.kind("velocity") != "body":  # over ground, turned with what the compass shows
+    if by_compass or sensors.kind("velocity") != "body":  # over ground, turned with what the compass shows
         turned = v[:, 4] - compass
         c, s = np.cos(turned), np.sin(turned)
         body = np.stack((c * body[:, 0] - s * body[:, 1], s * body[:, 0] + c * body[:, 1]), -1)
