@@ -177,8 +177,8 @@ def test_the_network_is_fitted_again_where_that_makes_its_error_less(afloat):
 
 def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
     done = diagnose_run(afloat.run.path, afloat.store, afloat.names, afloat.work / "out")
-    judge = HeldOut(afloat.held.cut, trials.simulator(afloat.run, afloat.trial), afloat.trial)
-    _, found, _ = judge.refuted(afloat.decision)
+    judge = HeldOut(afloat.held.cut, trials.simulator(afloat.run, done.trial), done.trial)
+    found = judge.gain(replace(done.decision, adapted=False))
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
     assert [c["name"] for c in done.verdict.causes] == ["current"]
     said = [n for n in done.verdict.notes if "MMG" in n]

@@ -92,7 +92,7 @@ class Range:
 
 RANGES: dict[str, Range] = {
     "current": Range(0.06, 0.34, "U", "typical: 0.1 to 0.5 m/s in tidal basins, at 1.5 m/s"),
-    "wind_force": Range(0.18, 0.42, "1", "scatter of wind-tunnel coefficients (Blendermann 1994)"),
+    "wind_force": Range(0.20, 0.50, "1", "scatter of wind-tunnel coefficients (Blendermann 1994)"),
     "keel": Range(0.30, 0.80, "1", "typical clearance under the keel in harbours"),
     "bank": Range(0.04, 0.12, "1", "close banks (Ch'ng, Doctors & Renilson 1993)"),
     "fouling": Range(0.11, 0.86, "1", "slime to heavy calcareous fouling (Schultz 2007, table 7)"),
@@ -100,8 +100,8 @@ RANGES: dict[str, Range] = {
     "cross_flow_drag": Range(0.16, 0.46, "1", "scatter of C_D of sections (Faltinsen 1990)"),
     "thrust_loss": Range(0.10, 0.38, "1", "Coanda, inflow, wear (Minsaas & Lehn 1978)"),
     "unit_loss": Range(0.25, 0.60, "1", "equipment: a damaged blade, weed, a slipping belt"),
-    "thrust_drift": Range(0.12, 0.28, "1", "equipment: a battery that runs down, growth on blades"),
-    "rudder_force": Range(0.12, 0.36, "1", "scatter of lift slopes (Molland & Turnock 2007)"),
+    "thrust_drift": Range(0.15, 0.35, "1", "equipment: a battery that runs down, growth on blades"),
+    "rudder_force": Range(0.10, 0.30, "1", "scatter of lift slopes (Molland & Turnock 2007)"),
     "rudder_offset": Range(2.0, 6.5, "deg", "equipment: misaligned feedback"),
     "rudder_lag": Range(0.12, 0.45, "L/U", "SOLAS II-1/29 allows 28 s from side to side"),
     "rudder_delay": Range(0.08, 0.26, "L/U", "equipment: hydraulic dead time, network"),
@@ -111,7 +111,7 @@ RANGES: dict[str, Range] = {
     "yaw_rate_scale": Range(0.02, 0.085, "1", "equipment: MEMS gyros"),
     "clock_offset": Range(0.05, 0.18, "L/U", "equipment: NMEA latency of 0.2 to 2 s"),
     "antenna_ahead": Range(0.08, 0.32, "L", "equipment: another mast than the drawing's"),
-    "antenna_aside": Range(0.02, 0.12, "L", "equipment"),
+    "antenna_aside": Range(0.03, 0.15, "L", "equipment"),
     "wind_direction_offset": Range(6.0, 20.0, "deg", "equipment: a vane set by eye"),
     "wind_speed_scale": Range(0.10, 0.28, "1", "flow about masts (Moat, Yelland & Molland 2006)"),
     "tether": Range(0.05, 0.14, "F", "a line to a buoy"),
