@@ -74,7 +74,8 @@ def record(
     arm = sensors.velocity.lever_arm_m
     a, b = np.add(arm, moved) if arm == sensors.position.lever_arm_m else arm
     body = np.stack((v[:, 1] - v[:, 5] * b, v[:, 3] + v[:, 5] * a), -1)
-    if by_compass or sensors.kind("velocity") != "body":  # over ground, turned with what the compass shows
+    if by_compass or sensors.kind("velocity") != "body":
+        # over ground, turned with what the compass shows
         turned = v[:, 4] - compass
         c, s = np.cos(turned), np.sin(turned)
         body = np.stack((c * body[:, 0] - s * body[:, 1], s * body[:, 0] + c * body[:, 1]), -1)

@@ -732,7 +732,7 @@ def test_the_sizes_are_those_of_the_table():
         return [value["value"] for value in parameters.values()]
 
     table = {
-        "current": [(0.05, 0.18), (0, 360)], "heading_offset": [(1.5, 6)], "rudder_lag": [(1, 4)],
+        "current": [(0.05, 0.18), (0, 360)], "heading_offset": [(1.2, 6)], "rudder_lag": [(1.2, 5)],
         "antenna_offset": [(0.3, 1.2), (0.05, 0.3)], "rudder_delay": [(0.6, 2.0)],
         "wind_direction_offset": [(8, 25)], "yaw_rate_bias": [(0.1, 0.5)],
         "thrust_loss": [(0.70, 0.92)], "fouling": [(1.25, 2.0)], "thrust_drift": [(0.12, 0.35)],
