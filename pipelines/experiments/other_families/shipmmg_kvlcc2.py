@@ -72,7 +72,7 @@ class _Capture(OdeSolver):
 def package():
     """The module shipmmg.mmg_3dof. Raises ValueError where it is not installed."""
     try:
-        from shipmmg import mmg_3dof
+        from shipmmg import mmg_3dof  # pyright: ignore[reportMissingImports]  # an optional extra
     except ImportError as error:
         raise ValueError(
             'The family shipmmg needs the package of that name: pip install "shiplog[experiments]".'
