@@ -15,26 +15,33 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog"
 
 
-def files() -> list[Path]:
-    """All that is kept, least recently used first."""
-    found = [path for path in folder().rglob("*") if path.is_file()]
-    return sorted(found, key=lambda path: path.stat().st_mtime)
+def files() -> list[tuple[float, int, Path]]:
+    """Time of last change, bytes and path of all that is kept, oldest first. Another process may
+    remove a file at any time: what is gone is passed over."""
+    found = []
+    for path in folder().rglob("*"):
+        try:
+            if path.is_file():
+                known = path.stat()
+                found.append((known.st_mtime, known.st_size, path))
+        except OSError:
+            continue
+    return sorted(found)
 
 
 def size() -> int:
     """Bytes that are kept."""
-    return sum(path.stat().st_size for path in files())
+    return sum(bytes_ for _, bytes_, _ in files())
 
 
 def trim(limit: int = LIMIT) -> int:
-    """Remove what was used least recently until no more than `limit` bytes are kept; the bytes that
-    were removed. A file that another process has removed, or that cannot be, is passed over."""
-    kept, removed = size(), 0
-    for path in files():
+    """Remove the oldest files until no more than `limit` bytes are kept; the bytes removed."""
+    found = files()
+    kept, removed = sum(bytes_ for _, bytes_, _ in found), 0
+    for _, bytes_, path in found:
         if kept - removed <= limit:
             break
         try:
-            bytes_ = path.stat().st_size
             path.unlink()
         except OSError:
             continue
