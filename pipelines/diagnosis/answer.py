@@ -163,7 +163,9 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
     unseen = held is not None and len(context.uncovered) > MOSTLY * len(held.cut)
     if decision.verdict == "unknown" and not context.lost and family in SEEN and unseen:
         return "coverage"
-    if decision.verdict == "none" and context.pushed:
+    # shorter than a segment altogether, such stretches are listed, and no answer for the trial
+    pushed = sum(one.end_s - one.start_s for one in context.pushed)
+    if decision.verdict == "none" and pushed >= segments.SECONDS:
         return "external"
     return decision.verdict
 
