@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL
+from shiplog.evidence import Unrest
 from shiplog.unnamed import pulse_force
 
 EVERYWHERE = ("surge", "sway", "yaw_rate")
@@ -27,7 +29,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     best = posteriors.best_with(found, names, kind if not names else None)
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
     trial = search.trial
-    trial.remainder = best.remainder
+    trial.remainder, trial.unrest = best.remainder, trial.reference.unrest
     verdict, structure, named, pulses = "undecided", None, (), None
     if names and mostly:
         verdict, named = "named", _named(search, found, best, names)
@@ -45,6 +47,8 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         traces = _named(search, found, best, rest)
     shown = best if verdict in ("named", "unknown") else search.nothing
     trial.remainder = shown.remainder
+    if pulses is not None:  # its force and times are asked of this trial later
+        trial.unrest = _with_pulses(search, best)
     return Decision(
         verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
         found.ranking(), shown.found.louder, shown.point, shown.found, search.first,
@@ -104,15 +108,19 @@ def _structure(search: Search, best: Hypothesis) -> Structure:
 def _is_device(search: Search, best: Hypothesis) -> bool:
     assert best.pulses is not None
     trial = search.trial
-    kept = trial.unrest, trial.remainder
-    from dataclasses import replace
-
-    trial.unrest = replace(trial.unrest, pulse=best.pulses.unit * best.pulses.force)
+    kept = trial.unrest
+    trial.unrest = _with_pulses(search, best)
     try:
         force, deviation = pulse_force(trial, best.point, best.found, best.pulses)
     finally:
-        trial.unrest, trial.remainder = kept
+        trial.unrest = kept
     return posteriors.of_one_device(force, deviation)
+
+
+def _with_pulses(search: Search, best: Hypothesis) -> Unrest:
+    """The trial's process noise with the hypothesis' intermittent force in it."""
+    assert best.pulses is not None
+    return replace(search.trial.reference.unrest, pulse=best.pulses.unit * best.pulses.force)
 
 
 def _reasons(
@@ -131,6 +139,3 @@ def _reasons(
             why += f", of which a nominal voyage has {misfit:.0f} too"
         said[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
     return said
-
-
-__all__ = ["NOMINAL", "RAISED", "decide"]
