@@ -89,8 +89,8 @@ def _path(model, theta, start, push, driven, step):
 
 
 @traced
-def _slopes(model, theta, states, driven, *, coefficients):
-    """∂ν̇ by state [3, 6, S K], by what drives [3, D, S K] and by θ [3, P or 0, S K].
+def _slopes(model, theta, states, driven):
+    """∂ν̇ by state [3, 6, S K], by what drives [3, D, S K] and by θ [3, P, S K].
 
     In single precision, in half the time: six digits of a slope are more than a linearisation has,
     and what it is about is simulated in double. Sample by sample last, each with a θ of its own,
@@ -101,17 +101,14 @@ def _slopes(model, theta, states, driven, *, coefficients):
     )
     states, driven = (values.reshape(-1, values.shape[-1]).T for values in (states, driven))
     count = states.shape[1]
-    by = (states, driven)
-    if coefficients:
-        by = (*by, jnp.broadcast_to(theta[:, None], (len(theta), count)))
+    by = (states, driven, jnp.broadcast_to(theta[:, None], (len(theta), count)))
 
-    def one(state, now, values=theta):
+    def one(state, now, values):
         return model.acceleration(values, state, now[:-2], now[-2:])
 
     _, back = jax.vjp(jax.vmap(one, in_axes=1, out_axes=1), *by)
     rows = jnp.broadcast_to(jnp.eye(3, dtype=jnp.float32)[..., None], (3, 3, count))
-    found = jax.lax.map(back, rows)
-    return found if coefficients else (*found, jnp.zeros((3, 0, count), jnp.float32))
+    return jax.lax.map(back, rows)
 
 
 # --- in numpy: one record, in flat memory ---------------------------------------------------------
@@ -344,12 +341,15 @@ def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarr
 
 
 def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
-    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P]. Those of a model that is smooth
-    and takes long (a network) are worked out as often as they change, and go straight between."""
+    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P; P only where `coefficients` are
+    asked for]. Those of a model that is smooth and takes long (a network) are worked out as often
+    as they change, and go straight between."""
     nodes = states.shape[1]
     stride = max(round(model.smooth / step), 1)
     at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))
-    found = _slopes(model, theta, states[:, at], driven[:, at], coefficients=coefficients)
+    # one compilation serves both: it takes longer than all that it saves to leave θ out
+    *found, by_theta = _slopes(model, theta, states[:, at], driven[:, at])
+    found.append(by_theta if coefficients else np.zeros((3, 0, by_theta.shape[-1]), np.float32))
     right = np.clip(np.searchsorted(at, np.arange(nodes)), 1, len(at) - 1)
     part = ((np.arange(nodes) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
     every = []

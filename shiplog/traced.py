@@ -23,6 +23,10 @@ from shiplog import cache
 
 log = logging.getLogger(__name__)
 
+# The emitters of fused loops need twice the time to compile a ship's derivatives, and what they
+# compile is no faster. Measured with `python -m pipelines.benchmarks.compiling`.
+COMPILER = {"xla_cpu_use_fusion_emitters": False}
+
 
 class Traced:
     """`jax.jit` of a function of arrays and pytrees; what is given by keyword is static."""
@@ -49,7 +53,7 @@ class Traced:
             return self._function(*jax.tree.unflatten(tree, given), **static)
 
         if not _own(tree):
-            return jax.jit(flat)
+            return jax.jit(flat, compiler_options=COMPILER)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         digest = hashlib.sha256(cache.source() + f"{jax.__version__} {name} {key}".encode())
         kept = cache.folder() / "traced" / f"{digest.hexdigest()}.bin"
@@ -60,7 +64,7 @@ class Traced:
             shapes = [jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves]
             found = export.export(jax.jit(flat))(*shapes)
             _keep(kept, found)
-        return jax.jit(found.call)
+        return jax.jit(found.call, compiler_options=COMPILER)
 
 
 def traced(function: Callable) -> Traced:
