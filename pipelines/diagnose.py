@@ -56,11 +56,15 @@ def diagnose_run(
         )
     recorded = trial.record_of(store, names, profile)
     before_effect = not set(names) & set(run.made_on) and not run.given
+    nominal = _nominal(run, store, profile) if before_effect else None
+    if not former:
+        nominal, recorded = trial.in_ship_time(run, nominal, recorded)
     if not answer.enough(recorded):
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
         _write(done)
         return done
-    nominal = _nominal(run, store, profile) if before_effect else None
+    if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
+        nominal = None
     notes = []
     if before_effect and nominal is None:
         notes.append(
@@ -76,7 +80,8 @@ def diagnose_run(
         notes += [lacking] if lacking else []
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
-        listed(names, most=4), run.name, len(tried.rows), segments.SECONDS, tried.reference.counts,
+        listed(names, most=4), run.name, len(tried.rows), tried.grid.seconds,
+        tried.reference.counts,
     )  # fmt: skip
     point = tried.begin(run.extension_numbers())
     whole = tried.covering(point)
@@ -127,6 +132,7 @@ def diagnose_run(
         lost,
         notes,
         pushed,
+        tried.grid.seconds,
         where.uncovered(run, store, names, profile, held.cut) if held else (),
         where.by_channel(held) if held else (),
         where.depends_on(*seen, whole),
@@ -142,13 +148,12 @@ def diagnose_run(
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
-    """The voyages that the run was made on; None where they are not there, or too few."""
+    """The voyages that the run was made on; None where they are not there."""
     stored = {entry.name for entry in store.entries()}
     there = [n for n in run.made_on if n in stored]
     if not there:
         return None
-    found = trial.record_of(store, there, profile)
-    return found if len(segments.begins(found)) >= NOMINAL else None
+    return trial.record_of(store, there, profile)
 
 
 def _decided(

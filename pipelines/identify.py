@@ -47,10 +47,12 @@ def identify_run(
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     planned = plan(learnt, config.data, config.window)
     ready = prepare(config, profile, learnt, held, planned, parameters)
-    if config.model == "hybrid" and len(set(ready.voyages)) < 2 and not held.height:
+    able = len(set(ready.voyages)) > 1 and config.physics.folds > 1
+    if config.model == "hybrid" and not able and not held.height:
         raise RunError(
             "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
-            hint="name a second voyage with --voyages, or one with --validation.",
+            hint="name a second voyage with --voyages and leave --folds out, or name one with "
+            "--validation.",
         )
     config = config.model_copy(
         update={
@@ -98,7 +100,8 @@ def identify_run(
         if one is not None
     ]
     if by_voyage is None:
-        said.append("One voyage only: nothing could be held out, so the gain is not tested.")
+        why = "One voyage only" if config.physics.folds > 1 else "No folds were asked for"
+        said.append(f"{why}: nothing was held out, so the gain is not tested.")
     said += identifiability.note(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
         mmg.meaning,

@@ -19,7 +19,7 @@ from shiplog.reading import read
 from shiplog.record import Record
 from shiplog.sensitivity import Series, rollout
 
-SECONDS = 300.0
+SECONDS = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time
 STEP = 0.5  # s of the simulation
 HARD = np.radians(35.0)  # farther no rudder is laid, and no thruster turned
 FAR = 1e3  # m, m/s: a simulation beyond has left the pond
@@ -27,10 +27,18 @@ FAR = 1e3  # m, m/s: a simulation beyond has left the pond
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """Thrust and steering at times t [n], as shares of what the voyages used; starts at rest."""
+    """Thrust and steering at times t [n], as shares of what the voyages used; starts at rest.
+
+    words   with a place for every one of `times` [s]: both are of a three-metre ship, as t is
+    """
 
     words: str
     drive: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    times: tuple[float, ...] = ()
+
+    def said(self, factor: float) -> str:
+        """The words, for a ship whose time scale is `factor` times that of a three-metre ship."""
+        return self.words.format(*(f"{factor * time:.0f} s" for time in self.times))
 
 
 def _still(t: np.ndarray, share: float) -> np.ndarray:
@@ -46,17 +54,23 @@ MANOEUVRES = (
     Manoeuvre(
         "one slow full turn to either side", lambda t: (_still(t, 0.6), 0.4 * _in_turn(t, 150.0))
     ),
-    Manoeuvre("a zigzag, 30 s to either side", lambda t: (_still(t, 0.8), 0.8 * _in_turn(t, 30.0))),
     Manoeuvre(
-        "doublets of 3 s at constant revolutions", lambda t: (_still(t, 0.7), _in_turn(t, 3.0))
+        "a zigzag, {} to either side", lambda t: (_still(t, 0.8), 0.8 * _in_turn(t, 30.0)), (30.0,)
     ),
     Manoeuvre(
-        "full power and no power in turn, a minute each, on a straight course",
+        "doublets of {} at constant revolutions",
+        lambda t: (_still(t, 0.7), _in_turn(t, 3.0)),
+        (3.0,),
+    ),
+    Manoeuvre(
+        "full power and no power in turn, {} each, on a straight course",
         lambda t: (0.5 + 0.5 * _in_turn(t, 60.0), _still(t, 0.0)),
+        (60.0,),
     ),
     Manoeuvre(
-        "bursts of full power from rest, 10 s each minute",
+        "bursts of full power from rest, {} every {}",
         lambda t: (np.where(t % 60.0 < 10.0, 1.0, 0.0), _still(t, 0.0)),
+        (10.0, 60.0),
     ),
     Manoeuvre(
         "the same course out and back",
@@ -85,17 +99,17 @@ def advice(
     alike = {n.cause.label: n for n in named if n.alike}
     if not alike:
         return {}
-    said = sailed(trial, fixed)
+    said, factor = sailed(trial, fixed), trial.record.timescale.factor
     found = {}
     for label, one in alike.items():
         worth = {
-            m.words: min(apart(trial, gram, one, other) for other in one.alike)
+            m.said(factor): min(apart(trial, gram, one, other) for other in one.alike)
             for m, gram in zip(MANOEUVRES, said, strict=True)
             if gram is not None
         }
         if worth:
             best = max(worth, key=lambda words: worth[words])
-            found[label] = Advice(best, SECONDS, worth[best])
+            found[label] = Advice(best, factor * SECONDS, worth[best])
     return found
 
 
@@ -136,8 +150,9 @@ def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | N
 def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
     """All manoeuvres in the trial's mean wind, a voyage each; which stayed in the pond [M]."""
     record, model = trial.record, trial.reference.model
-    time = np.arange(0.0, SECONDS + STEP, STEP)
-    actuator = np.stack([driven(record, m, time) for m in MANOEUVRES])
+    factor = record.timescale.factor
+    time = np.arange(0.0, factor * SECONDS + STEP, STEP)
+    actuator = np.stack([driven(record, m, time / factor) for m in MANOEUVRES])
     count, rows = actuator.shape[:2]
     wind = np.broadcast_to(record.true_wind[record.seen].mean(0), (count, rows, 2))
     share = np.full((count, rows, 1), record.share[-1])
@@ -149,7 +164,7 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
         states = rollout(model, theta, series)
     kept = np.abs(states).max((1, 2)) < FAR
     states = np.where(kept[:, None, None], states, 0.0)
-    fine = np.arange(0.0, SECONDS, record.step)
+    fine = np.arange(0.0, factor * SECONDS, record.step)
 
     def between(values: np.ndarray) -> np.ndarray:
         every = [np.interp(fine, time, column) for one in values for column in one.T]
@@ -176,6 +191,7 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
         actuator=between(actuator),
         wind=felt,
         step=record.step,
+        timescale=record.timescale,
     ), kept
 
 

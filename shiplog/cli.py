@@ -278,7 +278,11 @@ def train(
     ] = None,
     folds: Annotated[
         int | None,
-        typer.Option(min=2, help="Physical models: parts that voyages are held out in, 5 unless."),
+        typer.Option(
+            min=0,
+            help="Physical models: parts that voyages are held out in, 5 unless given; 0 holds "
+            "none out, and the gain is not tested.",
+        ),
     ] = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
@@ -316,7 +320,7 @@ def train(
         ("--parameters", parameters),
         ("--without", without),
         ("--free", free),
-        ("--folds", folds),
+        ("--folds", folds is not None),
     ):
         if given:
             raise ShiplogError(

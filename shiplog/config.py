@@ -59,7 +59,7 @@ class Physics(Section):
     without: tuple[str, ...] = ()  # forces switched off
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
     substeps: int = Field(default=1, ge=1)  # Euler steps within each measured one
-    folds: int = Field(default=5, ge=2)
+    folds: int = Field(default=5, ge=0)  # that voyages are held out in; below 2, none is
     # on the plausible spreads, for the ridge; to choose from on validation voyages
     ridges: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
     width: int = Field(default=8, gt=0)  # of the hybrid's residual network

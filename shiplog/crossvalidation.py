@@ -51,7 +51,7 @@ def cross_validate(
 
     fit   gets `data` with the weights of the held-out windows at zero
     """
-    parts = folds(groups, count)
+    parts = folds(groups, count) if count > 1 else []
     if not parts:
         return None
 

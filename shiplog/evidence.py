@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shiplog.linearise import Linear
-from shiplog.segments import BIN, KNOT
+from shiplog.timescale import BIN, KNOT
 
 SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
@@ -29,12 +29,13 @@ LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, 
 class Unrest:
     """Sizes of what is random.
 
-    noise   [6]  of one observation (2 s), channels.STATE; of its variance a share `coloured` [6]
-                 lasts, and fades within `fade` [6] s
+    noise   [6]  of one observation (a mean over `bin` s), channels.STATE; of its variance a share
+                 `coloured` [6] lasts, and fades within `fade` [6] s
     push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
     time         s over which that stays
     start   [6]  how free the initial state is
     pulse   [3]  acceleration of one force that nobody records, and `pulse_time` [s]
+    bin, knot    s of one observation, and between the knots of the acceleration
     """
 
     noise: np.ndarray
@@ -45,12 +46,15 @@ class Unrest:
     pulse_time: float = 12.0
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
+    bin: float = BIN
+    knot: float = KNOT
 
     def kernel(self, knots: int) -> np.ndarray:
         """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
-        whole = np.kron(np.diag(self.push**2), _decay(knots, self.time))
+        apart = self.knot * np.arange(knots)
+        whole = np.kron(np.diag(self.push**2), _decay(apart, self.time))
         if self.pulse is not None:
-            whole += np.kron(np.outer(self.pulse, self.pulse), _decay(knots, self.pulse_time))
+            whole += np.kron(np.outer(self.pulse, self.pulse), _decay(apart, self.pulse_time))
         return whole
 
     def louder(self, factor: float) -> Unrest:
@@ -65,16 +69,16 @@ class Unrest:
         return whole
 
 
-def _decay(knots: int, time: float) -> np.ndarray:
-    """Correlation [J, J] of an Ornstein-Uhlenbeck process at the knots."""
-    at = np.arange(knots) * KNOT
-    return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(knots)
+def _decay(at: np.ndarray, time: float) -> np.ndarray:
+    """Correlation [J, J] of an Ornstein-Uhlenbeck process at knots at these times [J]."""
+    return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(len(at))
 
 
-def _correlation(share: float, fade: float, bins: int) -> np.ndarray:
-    """[B, B] of noise of which a share lasts, as an Ornstein-Uhlenbeck process does."""
-    apart = np.abs(np.subtract.outer(np.arange(bins), np.arange(bins))) * BIN
-    return (1.0 - share) * np.eye(bins) + share * np.exp(-apart / fade)
+def _correlation(share: float, fade: float, at: np.ndarray) -> np.ndarray:
+    """[B, B] of noise at these times [B] of which a share lasts, as an Ornstein-Uhlenbeck process
+    does."""
+    apart = np.abs(np.subtract.outer(at, at))
+    return (1.0 - share) * np.eye(len(at)) + share * np.exp(-apart / fade)
 
 
 class _Whitening:
@@ -83,11 +87,12 @@ class _Whitening:
     def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
         """used   [S, B, 6] bool: what was not seen is nothing"""
         bins = used.shape[1]
+        at = unrest.bin * np.arange(bins)
         self.by: list[np.ndarray] = []  # [S, B, B] of each channel
         self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
         for channel in range(6):
             patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
-            correlation = _correlation(unrest.coloured[channel], unrest.fade[channel], bins)
+            correlation = _correlation(unrest.coloured[channel], unrest.fade[channel], at)
             roots = np.zeros((len(patterns), bins, bins))
             for root, pattern in zip(roots, patterns, strict=True):
                 seen = np.ix_(pattern, pattern)
@@ -280,7 +285,7 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
     products = _by_channel(linear, left, unrest)
     seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
     knots = (linear.z.shape[-1] - 6) // 3
-    inverse = np.linalg.inv(_decay(knots, unrest.time))
+    inverse = np.linalg.inv(_decay(unrest.knot * np.arange(knots), unrest.time))
     least = np.log(np.concatenate((LEAST, np.full(3, 1e-12))))
 
     def at(sizes: np.ndarray) -> Unrest:
@@ -347,7 +352,7 @@ def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
         best = np.inf
         for share in SHARES:
             for time in FADES if share > 0.0 else FADES[:1]:
-                correlation = _correlation(share, time, bins)
+                correlation = _correlation(share, time, unrest.bin * np.arange(bins))
                 variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))
                 cost = np.linalg.slogdet(correlation)[1] + bins * np.log(variance)
                 if cost < best:

@@ -23,7 +23,6 @@ from shiplog.models.mmg import wind as air
 from shiplog.models.mmg.model import named
 from shiplog.quality import jumps, stretches
 from shiplog.record import Record
-from shiplog.segments import KNOT
 from shiplog.traced import traced
 from shiplog.unexplained import Unexplained
 
@@ -226,7 +225,7 @@ def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
     power = (np.abs(record.actuator[:, drives]) / np.maximum(most, 1e-9)).max(1)
     turned = np.concatenate(([0], np.cumsum(power > STILL)))
     before = np.maximum(rows - round(RESTS / record.step), record.firsts[rows])
-    after = np.minimum(rows + round(0.5 * KNOT / record.step), record.lasts[rows])
+    after = np.minimum(rows + round(0.5 * record.timescale.knot / record.step), record.lasts[rows])
     return turned[after + 1] == turned[before]
 
 
@@ -261,7 +260,9 @@ def _knots(found: Unexplained) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
     """Knots that follow each other."""
-    apart = (np.diff(record.firsts[rows]) != 0) | (np.diff(record.time[rows]) > 1.5 * KNOT)
+    apart = (np.diff(record.firsts[rows]) != 0) | (
+        np.diff(record.time[rows]) > 1.5 * record.timescale.knot
+    )
     ends = [0, *(np.flatnonzero(apart) + 1).tolist(), len(rows)]
     yield from (slice(a, b) for a, b in itertools.pairwise(ends))
 

@@ -22,7 +22,7 @@ import numpy as np
 from jax import Array
 
 from shiplog import variational
-from shiplog.segments import NODE_ROWS, Cut, Grid
+from shiplog.segments import Cut, Grid
 from shiplog.sensitivity import Physical, rate
 from shiplog.traced import traced
 
@@ -203,7 +203,7 @@ def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path
     at = 0.5 * (centre[1:] + centre[:-1])
     accelerated = resampled(at, change, knots)
     states = resampled(centre, y, knots)
-    per = round(g.knot / (g.step * NODE_ROWS))
+    per = round(g.knot / (g.step * g.every))
     said = accelerations(model, theta, states, segments.driven[:, ::per])
     start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
     return Path(start, np.moveaxis(accelerated - said, -1, 1))

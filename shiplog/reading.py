@@ -33,14 +33,13 @@ def read(
     record: Record,
     rows: np.ndarray,
     numbers: Mapping[str, np.ndarray] | None = None,
-    g: segments.Grid | None = None,
 ) -> tuple[Cut, np.ndarray, np.ndarray]:
     """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
     by the motion averaged over seconds, as its noise tells nothing of a clock."""
     given = dict(numbers or {})
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
-    base = segments.cut(corrected(model.causes, record, given), rows, g)
+    base = segments.cut(corrected(model.causes, record, given), rows)
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
     shown = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it
@@ -61,13 +60,13 @@ def read(
             )
             # of what both share nothing changes
             if more.actuator is not less.actuator:
-                change = segments.at_nodes(record, rows, more.actuator - less.actuator, g)
+                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
                 moved[..., : change.shape[-1], column] = change / apart
             if more.wind is not less.wind or more.state is not less.state:
-                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind, g)
+                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
-                shown[..., column] = segments.measured(between, rows, g)[0] / apart
+                shown[..., column] = segments.measured(between, rows)[0] / apart
         before = corrected((cause,), before, given)
     return base, moved, shown

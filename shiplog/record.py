@@ -20,6 +20,7 @@ from shiplog.channels import Quality
 from shiplog.midship import Axes
 from shiplog.profile import Profile
 from shiplog.quality import stretches
+from shiplog.timescale import THREE_METRES, Timescale
 
 STEP_S = 1.0 / RATE_HZ
 FILLED = 20  # rows: a shorter gap is bridged for the inputs, and not scored
@@ -37,6 +38,7 @@ class Record:
     state      [n, 6]  channels.STATE at midship, heading unwrapped within a stretch
     actuator   [n, A]
     wind       [n, 2]  apparent wind, where it comes from: ahead and to starboard [m/s]
+    timescale          of the ship: how long its segments are
     """
 
     profile: Profile
@@ -50,6 +52,7 @@ class Record:
     actuator: np.ndarray
     wind: np.ndarray
     step: float = STEP_S
+    timescale: Timescale = THREE_METRES
 
     def __len__(self) -> int:
         return len(self.time)

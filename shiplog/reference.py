@@ -35,7 +35,7 @@ KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
 VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
 CAREFUL_KAPPA = 11.0  # of too few voyages
-UNREST_TIME = 4.0  # s
+UNREST_TIME = 4.0  # s, of a three-metre ship
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 
 
@@ -154,7 +154,10 @@ def settled(
     cut, moved, shown = read(model, setting, record, segments.begins(record))
     base, unit = columns.base, columns.unit
     theta = np.clip(start.values, start.low, start.high)
-    unrest = Unrest(wide.noise, 0.04 * wide.push, UNREST_TIME, wide.start)
+    of = record.timescale
+    unrest = Unrest(
+        wide.noise, 0.04 * wide.push, UNREST_TIME * of.factor, wide.start, bin=of.bin, knot=of.knot
+    )
     path = linear = None
     whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
     for round_ in range(rounds + 1):

@@ -27,6 +27,7 @@ from shiplog.record import Record
 from shiplog.reference import Settled, Start
 
 UNREST = ("noise", "push", "start", "coloured", "fade")
+TIMES = ("time", "bin", "knot")
 
 log = logging.getLogger(__name__)
 
@@ -80,11 +81,12 @@ def _read(kept: File) -> dict | None:
 
 def _unrest(unrest: Unrest) -> dict:
     whole = {f"unrest_{name}": getattr(unrest, name) for name in UNREST}
-    return whole | {"time": unrest.time}
+    return whole | {name: getattr(unrest, name) for name in TIMES}
 
 
 def _known_unrest(arrays: dict) -> Unrest:
-    return Unrest(time=float(arrays["time"]), **{n: arrays[f"unrest_{n}"] for n in UNREST})
+    times = {n: float(arrays[n]) for n in TIMES}
+    return Unrest(**times, **{n: arrays[f"unrest_{n}"] for n in UNREST})
 
 
 def _settled(arrays: dict) -> Settled:
@@ -106,7 +108,14 @@ def _keep(kept: File, arrays: dict) -> None:
 def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:
     leaves, shape = jax.tree.flatten(model)
     digest = hashlib.sha256(cache.source())
-    for word in (shape, setting.scale, setting.profile, record.names, record.step):
+    for word in (
+        shape,
+        setting.scale,
+        setting.profile,
+        record.names,
+        record.step,
+        record.timescale,
+    ):
         digest.update(repr(word).encode())
     arrays: Iterable = (
         *leaves, *astuple(start), record.voyage, record.time, record.share, record.starts,

@@ -17,7 +17,7 @@ import numpy as np
 
 from shiplog.linearise import resampled
 from shiplog.record import Record
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid
+from shiplog.segments import Cut, Grid
 
 FAMILIES = ("position", "heading", "time", "motion", "controls", "wind")
 UNSEEN = ("position", "heading", "time")  # by any model of forces, a network too
@@ -39,8 +39,8 @@ class Knots:
 
 def at_knots(segments: Cut, g: Grid) -> Knots:
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
-    every = round(KNOT / (g.step * NODE_ROWS))
-    state = resampled(centre, segments.y, np.arange(g.knots) * KNOT)
+    every = round(g.knot / (g.step * g.every))
+    state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
     return Knots(state, segments.driven[:, ::every])
 
 

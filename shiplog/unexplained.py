@@ -15,7 +15,6 @@ from shiplog import segments
 from shiplog.evidence import Unrest, starts_and_knots
 from shiplog.linearise import Linear
 from shiplog.record import Record
-from shiplog.segments import KNOT
 
 HALF = 8  # knots: half a segment
 ACCELERATIONS = ("surge_acceleration", "sway_acceleration", "yaw_acceleration")
@@ -29,6 +28,7 @@ class Unexplained:
     rows      [S, J]     of the record
     time      [S, J]     s into the voyage
     voyage    [S]        counts in the record's names
+    knot                 s between knots
     """
 
     mean: np.ndarray
@@ -36,6 +36,7 @@ class Unexplained:
     rows: np.ndarray
     time: np.ndarray
     voyage: np.ndarray
+    knot: float
 
 
 def covering(record: Record) -> np.ndarray:
@@ -47,7 +48,7 @@ def covering(record: Record) -> np.ndarray:
     """
     size = segments.grid(record).rows
     begins = segments.begins(record)
-    between = begins + HALF * round(KNOT / record.step)
+    between = begins + HALF * round(record.timescale.knot / record.step)
     between = between[between + size <= record.lasts[begins]]
     ends = np.append(np.flatnonzero(record.starts)[1:], len(record)) - 1 - size
     lasts = ends[(ends >= 0) & (record.firsts[np.maximum(ends, 0)] == record.firsts[ends + size])]
@@ -64,13 +65,14 @@ def posterior(linear: Linear, d: np.ndarray, unrest: Unrest, record: Record) -> 
     z, covariance = starts_and_knots(linear, d, unrest)
     mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
-    rows = linear.cut.rows[:, None] + round(KNOT / record.step) * np.arange(knots)
+    rows = linear.cut.rows[:, None] + round(record.timescale.knot / record.step) * np.arange(knots)
     return Unexplained(
         mean.reshape(count, 3, knots),
         sd.reshape(count, 3, knots),
         rows,
         record.time[rows],
         linear.cut.voyage,
+        record.timescale.knot,
     )
 
 
@@ -86,7 +88,7 @@ def once(found: Unexplained) -> np.ndarray:
     keep = np.ones(rows.size, dtype=bool)
     last = order[0]
     for at in order[1:]:
-        if voyage[at] == voyage[last] and time[at] - time[last] < 0.5 * KNOT:
+        if voyage[at] == voyage[last] and time[at] - time[last] < 0.5 * found.knot:
             worse = at if doubt[at] > doubt[last] else last
             keep[worse] = False
             last = last if worse == at else at
@@ -125,8 +127,8 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 
 
 def around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Means of values [n, c] over KNOT around rows [m], within the stretch: [m, c]."""
-    half = round(0.5 * KNOT / record.step)
+    """Means of values [n, c] over a knot around rows [m], within the stretch: [m, c]."""
+    half = round(0.5 * record.timescale.knot / record.step)
     low = np.maximum(rows - half, record.firsts[rows])
     high = np.minimum(rows + half, record.lasts[rows]) + 1
     centre = values.mean(0)  # a running sum of large numbers would lose small changes

@@ -15,8 +15,10 @@ from scipy.optimize import minimize
 
 from shiplog import evidence, reference, structure
 from shiplog.columns import HELD
+from shiplog.evidence import Unrest, Weighed
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
 from shiplog.models.mmg import MMG, body
+from shiplog.reference import Reference
 from shiplog.structure import Basis, Products
 from shiplog.traced import traced
 
@@ -156,18 +158,23 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
 def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
     accelerations go together as those of no other unrest do. Judged on what is left."""
-    ref = trial.reference
     left, d = trial.left_of(point, trial.solved(point, base))
     r = np.concatenate(([1.0], -d))
     alone = replace(
         left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
     )
-    startless = evidence.startless(alone, trial.unrest)
-    plain = replace(trial.unrest, pulse=None)
+    return pulses_of(alone, trial.reference, trial.unrest, trial.weight)
 
-    def value(unrest: evidence.Unrest) -> float:
+
+def pulses_of(alone: Weighed, ref: Reference, unrest: Unrest, weight: np.ndarray) -> Pulses:
+    """The same of what is left alone: products [S, 1, 1] and [S, Z, 1], segments of a `weight`
+    [S]."""
+    startless = evidence.startless(alone, unrest)
+    plain = replace(unrest, pulse=None)
+
+    def value(unrest: Unrest) -> float:
         each, volume = startless.square(unrest)
-        return -0.5 * ref.counts * (float(trial.weight @ each) + volume)
+        return -0.5 * ref.counts * (float(weight @ each) + volume)
 
     isotropic = max(value(plain.louder(v)) for v in LOUDER)
     ship, length = ref.model.stand_in, ref.setting.scale["length"]

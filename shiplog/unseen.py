@@ -16,14 +16,14 @@ import polars as pl
 
 from shiplog import channels
 from shiplog.profile import Profile
-from shiplog.segments import KNOT
+from shiplog.timescale import KNOT
 from shiplog.unexplained import ACCELERATIONS
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 LEAST = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
 BEYOND = 4.0  # standard deviations of what chance reaches
 SHIFTS = 20
-APART = 60.0  # s, the least shift: what pushes a ship at random is forgotten by then
+APART = 30  # knots, the least shift: what pushes a ship at random is forgotten by then
 PIECE = 300.0  # s, exchanged to make time mean nothing
 FOLDS = 8  # more voyages are left out in groups
 PLACES = 12
@@ -73,12 +73,17 @@ Indices = np.ndarray  # [K] which knot's unseen variable goes with each knot
 
 
 def table(
-    knots: pl.DataFrame, profile: Profile, rng: np.random.Generator, shifts: int = SHIFTS
+    knots: pl.DataFrame,
+    profile: Profile,
+    rng: np.random.Generator,
+    shifts: int = SHIFTS,
+    knot: float = KNOT,
 ) -> tuple[Dependence, ...]:
     """One row each for heading, position, time and controls.
 
     knots   of `unexplained.table`, or the same columns of any other model's residual
     rng     draws the shifts
+    knot    s between knots
 
     R² is beyond what a regression on everything visible predicts; that of position also beyond
     heading, or every steady force would count as a matter of place.
@@ -93,7 +98,7 @@ def table(
             np.concatenate((shared.visible, heading(np.arange(len(psi)))), 1),
         ),
         "time": (_time(knots["share"].to_numpy(), shared.carried), shared.visible),
-        "controls": (_controls(knots, profile, shared), shared.visible),
+        "controls": (_controls(knots, profile, shared, knot), shared.visible),
     }
     time = knots["time_s"].to_numpy()
     found = []
@@ -205,12 +210,12 @@ def _time(share: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.ndar
 
 
 def _controls(
-    knots: pl.DataFrame, profile: Profile, shared: _Knots
+    knots: pl.DataFrame, profile: Profile, shared: _Knots, knot: float
 ) -> Callable[[Indices], np.ndarray]:
     """What each actuator did over the last knot; nothing where a stretch begins."""
     values = knots.select(profile.actuator_names).to_numpy()
     step = np.diff(knots["time_s"].to_numpy(), prepend=-np.inf)
-    follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * KNOT)
+    follows = (np.diff(shared.runs, prepend=-1) == 0) & (step < 1.5 * knot)
     change = _unit(np.where(follows[:, None], np.diff(values, axis=0, prepend=values[:1]), 0.0))
     return lambda at: _times(change[at], shared.carried)
 
@@ -220,7 +225,7 @@ def _shifted(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> In
     moved = np.arange(len(runs))
     for run in np.unique(runs):
         rows = np.flatnonzero(runs == run)
-        least = min(round(APART / KNOT), len(rows) // 2)
+        least = min(APART, len(rows) // 2)
         moved[rows] = np.roll(rows, rng.integers(least, len(rows) - least + 1))
     return moved
 

@@ -25,7 +25,7 @@ from shiplog.hypotheses import Point
 from shiplog.linearise import Linear, Path
 from shiplog.record import Record
 from shiplog.reference import Reference
-from shiplog.segments import KNOT
+from shiplog.timescale import KNOT, SECONDS
 from shiplog.unnamed import Pulses
 
 PROFILE = profiles.load("esso-vectwin")
@@ -71,7 +71,7 @@ CAUSES = (Two(), One("drag"), One("clock", "wind"), One("clock", "gnss"), One("l
 def sailed(count: int, voyages: int = 2, seed: int = 0) -> Record:
     """A record of `count` segments of 30 s each, in `voyages` of equal length, at 2 Hz."""
     rng = np.random.default_rng(seed)
-    rows = round(segments.SECONDS / STEP)
+    rows = round(SECONDS / STEP)
     each = count // voyages * rows + 1
     t = STEP * np.arange(each)
     state, orders = [], []
@@ -174,7 +174,10 @@ def campaign(
         given, modes, reference.freedom(parts), misfit=seen if seen.families else None,  # type: ignore[arg-type]
         counts=share,
     )  # fmt: skip
-    return Campaign(made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), noise)
+    return Campaign(
+        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), noise, tuple(rows),
+        np.ones(len(given.cut)),
+    )  # fmt: skip
 
 
 class Straight(Trial):

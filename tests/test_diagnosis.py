@@ -34,6 +34,7 @@ from shiplog import (
     runs,
     segments,
     structure,
+    timescale,
     unnamed,
 )
 from shiplog import decision as decisions
@@ -1145,7 +1146,7 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     noisy = replace(seen, state=seen.state + noise)
     loud = reading.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
     assert (loud - quiet).std() < 0.4 * quiet.std()
-    change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / segments.BIN
+    change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / timescale.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
     assert np.corrcoef(between.ravel(), change.ravel())[0, 1] > 0.75
 
@@ -1162,7 +1163,7 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     stepped = replace(seen, actuator=step)
     moved = reading.read(ref.model, ref.setting, stepped, np.array([900]))[1][0, :, 0, column]
     # straight from row to row: the step is half a row before
-    t = (900 - 1000 + 0.5 + segments.NODE_ROWS * np.arange(len(moved))) * seen.step
+    t = (900 - 1000 + 0.5 + timescale.NODE_ROWS * np.arange(len(moved))) * seen.step
     assert np.abs(moved[t < -0.15]).max() == 0.0
     after = (t > 0.15) & (t < 5.0 * time)
     assert moved[after] == pytest.approx(-0.2 * np.exp(-t[after] / time) / time, rel=0.02)

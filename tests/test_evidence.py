@@ -10,7 +10,8 @@ from shiplog import evidence
 from shiplog.evidence import Unrest
 from shiplog.linearise import Linear, Path
 from shiplog.reference import inflation, marginal, usual
-from shiplog.segments import KNOT, Cut
+from shiplog.segments import Cut
+from shiplog.timescale import KNOT
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 UNREST = Unrest(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))

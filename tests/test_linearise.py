@@ -16,7 +16,8 @@ from shiplog.causes.ship import RudderDelay, RudderLag
 from shiplog.linearise import Path, Wide
 from shiplog.models import mmg
 from shiplog.record import Record
-from shiplog.segments import KNOT, NODE_ROWS, Cut
+from shiplog.segments import Cut
+from shiplog.timescale import KNOT, NODE_ROWS, Timescale
 
 PROFILE = profiles.load("esso-osaka")  # rudder and propeller
 SETTING = Setting(PROFILE, {"speed": 0.6, "length": 3.0}, np.zeros((1, 2)), 1.0)
@@ -294,13 +295,13 @@ def test_a_path_is_pulled_onto_a_known_push():
 
 def test_a_path_is_pulled_on_a_longer_grid_too():
     """Segments of 60 s with knots of 4 s: the same pushes, found through `reading` and all."""
-    g = segments.grid(SEEN, segments.Scale(60.0, 4.0, 4.0))
-    rows = segments.begins(SEEN, g)
+    seen = replace(SEEN, timescale=Timescale(60.0, 4.0, 4.0))
+    g, rows = segments.grid(seen), segments.begins(seen)
     t = g.knot * np.arange(g.knots)
     push = np.stack((0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t)))
     true = Path(SEEN.state[rows], np.tile(push, (2, 1, 1)))
-    cut, moved, shown = reading.read(Toy(), SETTING, SEEN, rows, None, g)
-    assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 301
+    cut, moved, shown = reading.read(Toy(), SETTING, seen, rows)
+    assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
     y, _ = linearise._run(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)

@@ -10,8 +10,9 @@ from shiplog.evidence import Unrest
 from shiplog.linearise import Linear, Path
 from shiplog.models.network import Network
 from shiplog.reference import marginal
-from shiplog.segments import KNOT, NODE_ROWS, Cut, Grid
+from shiplog.segments import Cut, Grid
 from shiplog.structure import at_knots
+from shiplog.timescale import KNOT, NODE_ROWS
 
 KNOTS, BINS, STEP = 6, 5, 0.2
 GRID = Grid(STEP, round((KNOTS - 1) * KNOT / STEP), round((KNOTS - 1) * KNOT / STEP) // NODE_ROWS

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipelines.diagnosis import where
 from pipelines.diagnosis.held_out import HeldOut
-from shiplog import advise, diagnose, segments
+from shiplog import advise, diagnose, segments, timescale
 from shiplog import verdict as verdicts
 from shiplog.decision import Decision
 from shiplog.diagnosis.trial import Trial as DiagnosisTrial
@@ -58,6 +58,7 @@ class Context:
     untested        label → why it could not be tested
     dropped         label → why held-out voyages refute it
     lost            why no name would be believed; empty where one would
+    segment         s, how long the segments were
     alone           what the model takes off fitted again with nothing named, where it is fitted
                     again beside what is named
     """
@@ -69,6 +70,7 @@ class Context:
     lost: str = ""
     notes: Sequence[str] = ()
     pushed: Sequence[Interval] = ()
+    segment: float = timescale.SECONDS
     uncovered: Sequence[Interval] = ()
     wrong: Sequence[dict] = ()
     unseen: Sequence[dict] = ()
@@ -165,7 +167,7 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
         return "coverage"
     # shorter than a segment altogether, such stretches are listed, and no answer for the trial
     pushed = sum(one.end_s - one.start_s for one in context.pushed)
-    if decision.verdict == "none" and pushed >= segments.SECONDS:
+    if decision.verdict == "none" and pushed >= context.segment:
         return "external"
     return decision.verdict
 
@@ -182,10 +184,11 @@ def enough(recorded: Record) -> bool:
 
 
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
-    short = max(LEAST_S - recorded.seconds, segments.SECONDS * 4 - recorded.seconds, 0.0)
+    short = max(LEAST_S - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
     said = (
         f"Too little for a verdict: {recorded.seconds:.0f} s can be used and {LEAST_S:.0f} s in "
-        f"unbroken stretches of {segments.SECONDS:.0f} s are needed. Log at least {short:.0f} s "
-        "more, with turns both ways, a stop, and runs on several headings."
+        f"unbroken stretches of {recorded.timescale.seconds:.0f} s are needed. "
+        f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
+        "headings."
     )
     return Verdict("coverage", said, run.name, before_effect)

@@ -16,7 +16,6 @@ from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.hypotheses import Trial
 from shiplog.reading import corrected
 from shiplog.record import Record
-from shiplog.segments import KNOT
 from shiplog.unexplained import around
 from shiplog.windows import Windows
 
@@ -124,7 +123,7 @@ def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
     force, _ = unnamed.pulse_force(trial, decision.point, decision.base, decision.pulses)
-    apart = round(KNOT / trial.record.step)
+    apart = round(trial.record.timescale.knot / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
     whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force
     return whole[:, None] * np.array([0.0, 1.0, decision.pulses.lever])

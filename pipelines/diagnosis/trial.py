@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.prepare import seconds
 from pipelines.split import plan
 from shiplog import causes as catalogue
-from shiplog import record, reference, remembered, table, user_causes, windows
+from shiplog import record, reference, remembered, table, timescale, user_causes, windows
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
 from shiplog.extend import ExtendedSimulator, campaign
@@ -44,6 +44,23 @@ def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
 
 def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
     return record.read([frame.collect() for frame in store.tables(names)], names, profile)
+
+
+def in_ship_time(
+    run: Run, nominal: Record | None, recorded: Record
+) -> tuple[Record | None, Record]:
+    """Both campaigns with the time scale of this ship at the speed of its usual voyages."""
+    usual = recorded if nominal is None else nominal
+    _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
+    shorter = min(one.seconds for one in (usual, recorded))
+    of = timescale.of_ship(main.length, speed_of(usual), shorter)
+    changed = None if nominal is None else replace(nominal, timescale=of)
+    return changed, replace(recorded, timescale=of)
+
+
+def speed_of(usual: Record) -> float:
+    """Root mean square speed [m/s]."""
+    return float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
 
 
 def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
@@ -128,7 +145,7 @@ def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[s
 
 def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     """Ship and place of a diagnosis; her speed is that of the `usual` voyages."""
-    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
+    speed = speed_of(usual)
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     places, spacing = _places(recorded, PLACES)
     scale = {

@@ -10,9 +10,10 @@ import polars as pl
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.prepare import seconds
 from shiplog import coverage as covering
-from shiplog import external, segments, table, unexplained, unnamed, unseen, wrong
+from shiplog import external, table, unexplained, unnamed, unseen, wrong
 from shiplog import verdict as verdicts
 from shiplog.decision import Decision
+from shiplog.diagnosis import trial as diagnosis_trial
 from shiplog.extend import campaign
 from shiplog.hypotheses import Point, Trial
 from shiplog.linearise import Linear
@@ -33,6 +34,8 @@ def pushed(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
     """Stretches that no force of the ship explains; the trial judges no hypothesis on them."""
     ref = trial.reference
     base, _ = trial.scan(point, (), trial.fixed)
+    if isinstance(trial, diagnosis_trial.Trial):
+        whole = trial.of_parts(whole, point, base)
     found = external.find(
         *trial.left(whole, trial.solved(point, base)), trial.unrest.louder(base.louder),
         trial.record,
@@ -42,7 +45,7 @@ def pushed(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
     of = np.array(trial.record.names)[trial.record.voyage[trial.rows]]
     begin = trial.record.time[trial.rows]
     for stretch in found:
-        inside = (begin < stretch.end_s) & (begin + segments.SECONDS > stretch.start_s)
+        inside = (begin < stretch.end_s) & (begin + trial.grid.seconds > stretch.start_s)
         out |= inside & (of == stretch.voyage)
     trial.leave_out(out)
     return [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
@@ -65,7 +68,7 @@ def depends_on(trial: Trial, decision: Decision, whole: Linear) -> list[dict]:
         trial.unrest.louder(decision.nothing.louder), trial.record,
     )  # fmt: skip
     knots = unexplained.table(found, trial.record)
-    rows = unseen.table(knots, trial.record.profile, np.random.default_rng(0))
+    rows = unseen.table(knots, trial.record.profile, np.random.default_rng(0), knot=trial.grid.knot)
     return [verdicts.unseen_json(row) for row in rows]
 
 
@@ -106,10 +109,10 @@ def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
         name = trial.record.names[trial.record.voyage[row]]
         begin = float(trial.record.time[row])
         for k in np.flatnonzero(np.abs(force[i, :-1]) >= PULSE_SURE * strongest):
-            at, value = begin + segments.KNOT * float(k), float(force[i, k])
+            at, value = begin + trial.grid.knot * float(k), float(force[i, k])
             one = {"voyage": name, "start_s": at, "end_s": at, "force_N": value,
                    "sd_N": float(sd[i, k])}  # fmt: skip
-            if times and _joined(times[-1], one):
+            if times and _joined(times[-1], one, PULSE_APART * trial.grid.knot):
                 last = times[-1]
                 last["end_s"] = at
                 if abs(value) > abs(last["force_N"]):
@@ -119,7 +122,7 @@ def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
     return times
 
 
-def _joined(last: dict, one: dict) -> bool:
+def _joined(last: dict, one: dict, pause: float) -> bool:
     """Whether it goes on, the same way, after at most a short pause."""
-    near = one["start_s"] - last["end_s"] < PULSE_APART * segments.KNOT
+    near = one["start_s"] - last["end_s"] < pause
     return last["voyage"] == one["voyage"] and near and last["force_N"] * one["force_N"] > 0

@@ -34,8 +34,9 @@ from shiplog.exceptions import RunError, ShiplogError
 from shiplog.hypotheses import Point, Trial
 from shiplog.linearise import Linear
 from shiplog.record import Record
-from shiplog.segments import BIN, Cut
+from shiplog.segments import Cut
 from shiplog.store import Store
+from shiplog.timescale import BIN
 
 VELOCITY = [1, 3, 5]  # of channels.STATE
 SURE = 0.999  # that nothing is named where nothing is hidden, if the noise were white

@@ -29,9 +29,9 @@ from shiplog.record import Record
 from shiplog.reference import Reference, Settled, Start
 
 ROBUST = 6.0  # medians of χ², from which on a segment counts less
-PART = 20  # segments of one part of a campaign: 10 minutes
+PART = 20  # segments of one part of a campaign: 10 minutes of a three-metre ship
 FEWEST = 4  # parts that a campaign is cut into, where it has twice as many segments
-NOISE_TIMES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, of the process noise
+NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 
 
@@ -46,6 +46,7 @@ class Campaign:
     unseen       families that no model of forces has, over the nominal campaign
     each         products of the nominal parts, in units: [1 + C, 1 + C], then the unseen families'
     noise        standard deviation, over the parts, of the logarithm of the process noise
+    rows         nominal segments of each part; weight [S] of each segment
     """
 
     reference: Reference
@@ -54,6 +55,8 @@ class Campaign:
     unseen: Discrepancy
     each: tuple[np.ndarray, ...]
     noise: float
+    rows: tuple[np.ndarray, ...]
+    weight: np.ndarray
 
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
@@ -272,7 +275,10 @@ def learn(
         misfit=families,  # type: ignore[arg-type]  # it pushes as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
-    return Campaign(reference_made, effects, families, unseen, tuple(every), found.noise)
+    return Campaign(
+        reference_made, effects, families, unseen, tuple(every), found.noise, tuple(made.rows),
+        weight,
+    )  # fmt: skip
 
 
 def widened(model: Extended, setting: Setting, start: Start) -> Start:
@@ -298,11 +304,11 @@ def noise_time(
     """Sizes and correlation time of the process noise that make the nominal campaign likeliest,
     the model's discrepancy aside."""
     best, found = -math.inf, unrest
-    middle = NOISE_TIMES.index(4.0)
+    middle = NOISE_TIMES.index(1.0)
     for way in (NOISE_TIMES[middle:], NOISE_TIMES[:middle][::-1]):
-        for time in way:
-            tried = replace(found, time=time)
-            for _ in range(2 if time == 4.0 else 1):
+        for factor in way:
+            tried = replace(found, time=factor * unrest.time)
+            for _ in range(2 if factor == 1.0 else 1):
                 numbers, _ = _solved(linear, pushed, tried, columns, held)
                 left = linear.less(pushed @ numbers[columns.linearised :])
                 tried = evidence.learnt(left, numbers[: columns.linearised], tried, rounds=2)
@@ -381,7 +387,7 @@ def assumed(
         made = reference.assume(model, setting, start, record, given, inputs)
         none = Discrepancy((), made.unrest.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
-        return Campaign(made, effects, none, none, (), 0.0)
+        return Campaign(made, effects, none, none, (), 0.0, (), np.zeros(0))
     start = widened(model, setting, start)
     at = reference.settled(model, setting, start, record, rounds=0 if given else reference.ROUNDS)
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts

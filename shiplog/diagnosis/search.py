@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shiplog.diagnosis import placebo
 from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
@@ -36,15 +37,16 @@ log = logging.getLogger(__name__)
 class Search:
     """All hypotheses weighed so far.
 
+    placebo label or remainder → nats that it gains on nominal voyages
     alone   label → log Bayes factor of that cause by itself against nothing
     told    label → what these data would show of it, were it there
     scanned label → score of that cause by itself, where it was found first
     """
 
     def __init__(
-        self, trial: Trial, point: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
+        self, trial: Trial, point: Point, usual: Mapping[str, float], banned: Sequence[str] = ()
     ) -> None:
-        self.trial, self.first, self.placebo = trial, point, placebo
+        self.trial, self.first, self.placebo = trial, point, usual
         self.catalogue = [
             c for c in trial.reference.model.causes
             if c.label not in trial.fixed and c.label not in banned
@@ -227,6 +229,11 @@ class Search:
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
         """An intermittent side force instead of raised process noise."""
+        if INTERMITTENT not in self.placebo:
+            usual = placebo.intermittent(
+                self.trial.campaign, self.trial.grid, float(self.trial.weight.sum())
+            )
+            self.placebo = {**self.placebo, INTERMITTENT: usual}
         raised = self.found[labels, RAISED]
         self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)

@@ -27,6 +27,7 @@ from shiplog.diagnosis.nominal_campaign import (
 from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.evidence import Modes, Weighed
 from shiplog.hypotheses import Found, Level, Point
+from shiplog.linearise import Linear
 from shiplog.record import Record
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
@@ -252,6 +253,33 @@ class Trial(hypotheses.Trial):
             self.weight = kept
         level = self.solve(total, 0.0, louder, point, included, ref.information, ref.pull)
         return self._numbers(level, point, included)[0], self._coefficients(level)
+
+    def of_parts(self, linear: Linear, point: Point, base: Found) -> Linear:
+        """A pass of this trial without what each part's own deviations do, under a hypothesis of
+        that point. The pass may have other segments of the record than the trial's."""
+        columns = self.reference.columns
+        unit = np.append(columns.unit, np.ones(self.unseen.count))
+        common = self.solved(point, base) / columns.unit
+        modes, noise = self.modes(point, base.louder)
+        deviation = self.campaign.effects.deviation
+        free = np.flatnonzero(deviation > 0.0)
+        e, pushed = linear.e.copy(), np.zeros(0)
+        if self.reference.misfit is not None:
+            pushed = self.reference.misfit.pushed(linear.cut, self.grid)
+        begins = self.rows[[rows[0] for rows in self.parts]]
+        of = np.searchsorted(begins, linear.cut.rows, side="right") - 1
+        count = columns.linearised
+        for i, gram in enumerate(products(modes, self.parts, unit, self.weight, noise)):
+            own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
+            left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + np.arange(len(common)))] @ common
+            found = np.zeros(len(common))
+            found[free] = np.linalg.solve(own, left) * columns.unit[free]
+            rows = of == i
+            e[rows] -= linear.j[rows] @ found[:count]
+            if pushed.size:
+                moved = pushed[rows] @ found[count:]
+                e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], moved)
+        return replace(linear, e=e)
 
     # --- remainders ---
 

@@ -48,7 +48,7 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
 
 def searched(hidden, placebo=None, banned=(), **setting) -> Search:
     trial, point = trial_with(hidden, **setting)
-    found = Search(trial, point, placebo or {}, banned)
+    found = Search(trial, point, {INTERMITTENT: 0.0, **(placebo or {})}, banned)
     found.run()
     return found
 
@@ -168,7 +168,7 @@ def test_an_intermittent_force_is_asked_for_beside_no_family():
         trial.changed = lambda p, level, labels, family, real=real, gain=gain, last=last: (
             (gain, 3.0) if family == last else real(p, level, labels, family)
         )
-        found = Search(trial, point, {})
+        found = Search(trial, point, {INTERMITTENT: 0.0})
         found.weigh((), {}, point)
         assert found.found[(), "raised"].found.louder > 1.5
         assert asked == [Remainder(INTERMITTENT)]

@@ -1,19 +1,21 @@
 """Segments in units of the ship: how long, what a bin and a knot are, and cut on a longer grid."""
 
+from dataclasses import replace
+
 import closed
 import numpy as np
 import pytest
 
 from shiplog import profile as profiles
-from shiplog import segments
-from shiplog.segments import NODE_ROWS, Scale
+from shiplog import segments, timescale
+from shiplog.timescale import NODE_ROWS, Timescale
 
 SEEN = closed.record(profiles.load("esso-osaka"))  # 120 s
 
 
 @pytest.mark.parametrize("speed", [0.31, 0.4, 0.5, 0.59])
 def test_a_three_metre_ship_keeps_half_a_minute(speed):
-    assert segments.scale(3.0, speed) == Scale(30.0, 2.0, 2.0) == Scale()
+    assert timescale.of_ship(3.0, speed) == Timescale(30.0, 2.0, 2.0) == Timescale()
 
 
 @pytest.mark.parametrize(
@@ -28,7 +30,7 @@ def test_a_three_metre_ship_keeps_half_a_minute(speed):
     ],
 )
 def test_larger_and_slower_ships_have_longer_segments(length, speed, seconds):
-    found = segments.scale(length, speed)
+    found = timescale.of_ship(length, speed)
     assert found.seconds == pytest.approx(seconds)
     assert found.bin == found.knot == pytest.approx(seconds / 15)
 
@@ -37,11 +39,11 @@ def test_larger_and_slower_ships_have_longer_segments(length, speed, seconds):
 def test_every_scale_fits_the_rows(time):
     """Bins and knots lie on nodes, of records at 10 Hz; 15 bins, 16 knots; four ship times, within
     a factor of two where it is not at a bound."""
-    found = segments.scale(time, 1.0)
-    g = segments.grid(SEEN, found)
+    found = timescale.of_ship(time, 1.0)
+    g = segments.grid(replace(SEEN, timescale=found))
     assert (g.bins, g.knots) == (15, 16)
     assert g.rows == round(found.seconds / 0.1) == 15 * round(found.bin / 0.1)
-    assert (g.nodes - 1) % 15 == 0 and g.rows % NODE_ROWS == 0
+    assert (g.nodes - 1) % 15 == 0 and g.rows % g.every == 0 and g.every % NODE_ROWS == 0
     assert g.weights.sum(1) == pytest.approx(1.0)  # hats add up to one everywhere
     if 21.0 < found.seconds < 240.0:
         assert 2.0 < found.seconds / time < 6.1
@@ -50,19 +52,35 @@ def test_every_scale_fits_the_rows(time):
 def test_the_grid_that_nobody_scales_is_todays():
     g = segments.grid(SEEN)
     assert (g.seconds, g.bin, g.knot, g.nodes, g.bins, g.knots) == (30.0, 2.0, 2.0, 151, 15, 16)
-    rows = segments.begins(SEEN)
-    one, other = segments.cut(SEEN, rows), segments.cut(SEEN, rows, g)
-    assert np.array_equal(one.y, other.y) and np.array_equal(one.driven, other.driven)
 
 
 def test_on_a_longer_grid_a_bin_is_a_longer_mean():
     """Of a ramp its middle: 4 s to a bin, 60 s to a segment, two of them in 120 s."""
-    g = segments.grid(SEEN, Scale(60.0, 4.0, 4.0))
-    rows = segments.begins(SEEN, g)
+    ramp = replace(closed.record(profiles.load("esso-osaka")), timescale=Timescale(60.0, 4.0, 4.0))
+    g, rows = segments.grid(ramp), segments.begins(ramp)
     assert rows.tolist() == [0, 600]
-    ramp = closed.record(profiles.load("esso-osaka"))
     ramp.state[:] = ramp.time[:, None]
-    cut = segments.cut(ramp, rows, g)
+    cut = segments.cut(ramp, rows)
     middle = 60.0 * np.arange(2)[:, None] + 4.0 * np.arange(15) + 2.0
     assert cut.y == pytest.approx(np.repeat(middle[..., None], 6, -1), abs=1e-9)
-    assert cut.driven.shape[1] == g.nodes == 301
+    assert cut.driven.shape[1] == g.nodes == 151
+
+
+def test_a_short_campaign_has_shorter_segments():
+    """A ship of 60 s would have segments of 240 s; 2000 s hold 48 of 30 s and not of 60 s."""
+    assert timescale.of_ship(60.0, 1.0).seconds == 240.0
+    assert timescale.of_ship(60.0, 1.0, 2000.0).seconds == 30.0
+    assert timescale.of_ship(60.0, 1.0, 7000.0).seconds == 120.0
+    assert timescale.of_ship(3.0, 0.4, 100.0).seconds == 30.0
+
+
+def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
+    """At a node of 0.8 s: the trapezium over four rows to either side, and no row twice."""
+    ramp = replace(closed.record(profiles.load("esso-osaka")), timescale=Timescale(60.0, 4.0, 4.0))
+    g, rows = segments.grid(ramp), segments.begins(ramp)
+    values = np.random.default_rng(0).standard_normal((len(ramp), 2))
+    found = segments.at_nodes(ramp, rows, values)
+    assert g.every == 4
+    at = rows[1] + 7 * 4
+    row = 0.5 * (values[at - 2] + values[at + 2]) + values[at - 1 : at + 2].sum(0)
+    assert found[1, 7] == pytest.approx(row / 4.0)
