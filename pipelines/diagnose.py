@@ -7,6 +7,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from pipelines.diagnosis import answer, baseline, own, pictures, setup, trial, where
 from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
@@ -30,6 +32,7 @@ REFUTED = 3  # times that the verdict is looked for again without what did not h
 NOMINAL = 8  # segments, fewer of which do not show what is usual
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def diagnose_run(
     run_path: Path,
     store: Store,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+from threadpoolctl import threadpool_limits
 
 from pipelines.choices import choose_network, choose_ridge, physics
 from pipelines.equations import Prepared, prepare
@@ -31,6 +32,7 @@ from shiplog.windows import AUGMENTATIONS
 log = logging.getLogger(__name__)
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def identify_run(
     config: Config, store: Store, out: Path, parameters: Path | None = None
 ) -> tuple[Run, list[str]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,15 @@ RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent f
 SHOWN = 5.0  # nats that a cause would have to bring to be seen at all
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of one family's weights: with what evidence, at what process noise."""
+
+    remainder: Remainder
+    value: float
+    noise: float
 
 
 class Search:
@@ -171,8 +180,11 @@ class Search:
             gained = self.found[labels, NOMINAL].evidence - self.nothing.evidence
             self.alone[labels[0]] = max(gained, self.alone.get(labels[0], -math.inf))
         best = max((self.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
-        for family in trial.families:
-            self._change(point, labels, levels, family, best)
+        changed = [self._changed(point, included, levels, family) for family in trial.families]
+        scores = [self._score(c.value, labels, c.remainder.kind) for c in changed]
+        near = max((best.score, *(score - WINDOW for score in scores)))
+        for one, score in zip(changed, scores, strict=True):
+            self._change(point, labels, one, best, score >= near)
         if self._best(levels, RAISED).louder > RAISED_FROM:
             self._pulses(point, labels)
 
@@ -200,21 +212,25 @@ class Search:
             return max(levels, key=lambda level: level.value)
         return max(map(under, levels), key=lambda level: level.value)
 
-    def _change(
-        self, point: Point, labels: tuple[str, ...], levels: Sequence[Level], family: str,
-        plain: Hypothesis,
-    ) -> None:  # fmt: skip
-        """The set with a change of one family beside it; linearised again where that leads."""
-        trial, included = self.trial, self._included(labels)
-        tried = []
+    def _changed(
+        self, point: Point, included: Sequence[str], levels: Sequence[Level], family: str
+    ) -> Change:
+        """A change of one family's weights beside included causes, at its best size and noise."""
+        trial, tried = self.trial, []
         for level in levels:
             gained, size = trial.changed(point, level, included, family)
             more = trial.expected(level.louder, NOMINAL) - trial.expected(level.louder, RAISED)
             tried.append((level.value + more + gained, size, level.louder))
         value, size, noise = max(tried)
-        remainder = Remainder(family, size)
-        if self._score(value, labels, family) < plain.score:
-            # far behind: its numbers are never asked for
+        return Change(Remainder(family, size), value, noise)
+
+    def _change(
+        self, point: Point, labels: tuple[str, ...], one: Change, plain: Hypothesis, leads: bool
+    ) -> None:
+        """The set with a change of one family beside it; linearised again where that leads."""
+        trial, included = self.trial, self._included(labels)
+        remainder, value, noise = one.remainder, one.value, one.noise
+        if not leads:  # far behind: its numbers are never asked for
             self._put(labels, remainder, value, point, replace(plain.found, evidence=value))
             return
         trial.remainder = remainder
