@@ -244,7 +244,8 @@ class Search:
         self._put(labels, remainder, max(value, base.evidence), point, base)
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
-        """An intermittent side force instead of raised process noise."""
+        """An intermittent side force instead of raised process noise: a force that gains no more
+        than on nominal voyages is that noise and nothing else, and is not counted twice."""
         if INTERMITTENT not in self.placebo:
             usual = placebo.intermittent(
                 self.trial.campaign, self.trial.grid, float(self.trial.weight.sum())
@@ -253,8 +254,9 @@ class Search:
         raised = self.found[labels, RAISED]
         self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)
-        value = raised.evidence + max(tried.gain, 0.0)
-        self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
+        if tried.gain > self.placebo[INTERMITTENT]:
+            value = raised.evidence + tried.gain
+            self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
 
     def _keep(
         self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level

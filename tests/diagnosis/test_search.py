@@ -12,6 +12,7 @@ from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
+from shiplog.unnamed import Pulses
 
 TOLD = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2
@@ -149,6 +150,13 @@ def test_what_a_model_has_already_stays_beside_what_is_found():
     assert decision.named[0].numbers[0] == pytest.approx(1.0, abs=4.0 * spread)
 
 
+def pushes() -> np.ndarray:
+    """[S, 3J] three times the usual process noise."""
+    plain, _ = trial_with({})
+    kernel = np.linalg.cholesky(straight.UNREST.kernel(plain.grid.knots))
+    return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
+
+
 def test_an_intermittent_force_is_asked_for_beside_no_family():
     """Where the process noise is raised, whatever was tried before it."""
     asked = []
@@ -157,9 +165,7 @@ def test_an_intermittent_force_is_asked_for_beside_no_family():
         asked.append(trial.remainder)
         return straight.Straight.intermittent(trial, point, base)
 
-    plain, point = trial_with({})
-    kernel = np.linalg.cholesky(straight.UNREST.kernel(plain.grid.knots))
-    more = 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
+    more = pushes()
     for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
         asked.clear()
         trial, point = trial_with({}, pushed=more)
@@ -172,7 +178,21 @@ def test_an_intermittent_force_is_asked_for_beside_no_family():
         found.weigh((), {}, point)
         assert found.found[(), "raised"].found.louder > 1.5
         assert asked == [Remainder(INTERMITTENT)]
-        assert found.found[(), INTERMITTENT].evidence == found.found[(), "raised"].evidence
+        assert ((), INTERMITTENT) not in found.found  # it gains nothing: it is raised noise
+
+
+@pytest.mark.parametrize(("gain", "usual"), [(40.0, 0.0), (40.0, 25.0), (40.0, 45.0)])
+def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_usual(gain, usual):
+    trial, point = trial_with({}, pushed=pushes())
+    trial.intermittent = lambda point, base: Pulses(0.0, gain, 0.0, 1.0, np.zeros(3))
+    found = Search(trial, point, {INTERMITTENT: usual})
+    found.weigh((), {}, point)
+    if gain < usual:
+        assert ((), INTERMITTENT) not in found.found
+        return
+    one, raised = found.found[(), INTERMITTENT], found.found[(), "raised"]
+    assert one.evidence - raised.evidence == pytest.approx(gain)
+    assert one.score - raised.score == pytest.approx(gain - usual)
 
 
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
