@@ -45,7 +45,7 @@ def of_ship(length: float, speed: float, recorded: float = math.inf) -> Timescal
     """The time scale of a ship.
 
     length    m
-    speed     root mean square of the nominal voyages [m/s]
+    speed     working speed: what 19 of 20 seconds of its nominal voyages do not exceed [m/s]
     recorded  s, of the shorter campaign: it is cut into `ENOUGH` segments at least
 
     In steps of two, so that a ship of the three-metre class keeps 30 s, 2 s and 2 s; not below

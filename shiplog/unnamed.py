@@ -15,8 +15,9 @@ from scipy.optimize import minimize
 
 from shiplog import evidence, reference, structure
 from shiplog.columns import HELD
-from shiplog.evidence import Unrest, Weighed
+from shiplog.evidence import Unrest
 from shiplog.hypotheses import LOUDER, Found, Point, Trial
+from shiplog.linearise import Linear
 from shiplog.models.mmg import MMG, body
 from shiplog.reference import Reference
 from shiplog.structure import Basis, Products
@@ -158,18 +159,17 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
 def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
     accelerations go together as those of no other unrest do. Judged on what is left."""
-    left, d = trial.left_of(point, trial.solved(point, base))
-    r = np.concatenate(([1.0], -d))
-    alone = replace(
-        left, dd=np.einsum("i,sij,j->s", r, left.dd, r)[:, None, None], zd=left.zd @ r[:, None]
-    )
-    return pulses_of(alone, trial.reference, trial.unrest, trial.weight)
+    left, d = trial.left(point.linear, trial.solved(point, base))
+    return pulses_of(left, d, trial.reference, trial.unrest, trial.weight)
 
 
-def pulses_of(alone: Weighed, ref: Reference, unrest: Unrest, weight: np.ndarray) -> Pulses:
-    """The same of what is left alone: products [S, 1, 1] and [S, Z, 1], segments of a `weight`
-    [S]."""
-    startless = evidence.startless(alone, unrest)
+def pulses_of(
+    linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray
+) -> Pulses:
+    """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
+    # subtracted before it is squared: of products small differences of large numbers would be left
+    alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
+    startless = evidence.startless(evidence.weighed(alone, unrest), unrest)
     plain = replace(unrest, pulse=None)
 
     def value(unrest: Unrest) -> float:

@@ -27,6 +27,7 @@ from shiplog.store import Store
 from shiplog.windows import Windows
 
 PLACES = 12  # of a map of the bottom
+WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slower for it
 
 
 def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
@@ -49,18 +50,14 @@ def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
 def in_ship_time(
     run: Run, nominal: Record | None, recorded: Record
 ) -> tuple[Record | None, Record]:
-    """Both campaigns with the time scale of this ship at the speed of its usual voyages."""
+    """Both campaigns with the time scale of this ship at the working speed of its usual voyages."""
     usual = recorded if nominal is None else nominal
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     shorter = min(one.seconds for one in (usual, recorded))
-    of = timescale.of_ship(main.length, speed_of(usual), shorter)
+    working = np.quantile(np.linalg.norm(usual.state[:, [1, 3]], axis=1), WORKING)
+    of = timescale.of_ship(main.length, float(working), shorter)
     changed = None if nominal is None else replace(nominal, timescale=of)
     return changed, replace(recorded, timescale=of)
-
-
-def speed_of(usual: Record) -> float:
-    """Root mean square speed [m/s]."""
-    return float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
 
 
 def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
@@ -145,7 +142,7 @@ def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[s
 
 def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
     """Ship and place of a diagnosis; her speed is that of the `usual` voyages."""
-    speed = speed_of(usual)
+    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     places, spacing = _places(recorded, PLACES)
     scale = {

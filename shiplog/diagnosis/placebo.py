@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog import evidence, unnamed
+from shiplog import unnamed
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.trial import SIZES
 from shiplog.segments import Grid
@@ -62,9 +62,8 @@ def intermittent(campaign: Campaign, g: Grid, segments: float) -> float:
         e[rows] -= linear.j[rows] @ found[:own]
         moved = pushed[rows] @ found[own:]
         e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], moved)
-    alone = replace(linear, e=e, j=np.zeros((*e.shape, 0)))
-    weighed = evidence.weighed(alone, reference.unrest)
-    gain = unnamed.pulses_of(weighed, reference, reference.unrest, campaign.weight).gain
+    left, none = replace(linear, e=e), np.zeros(linear.j.shape[-1])
+    gain = unnamed.pulses_of(left, none, reference, reference.unrest, campaign.weight).gain
     return max(gain, 0.0) * segments / float(campaign.weight.sum())
 
 

@@ -107,8 +107,10 @@ def asked(monkeypatch):
     """What is left of the nominal campaign when the force is asked for, and the weights."""
     said = {}
 
-    def pulses_of(alone, reference, unrest, weight):
-        said.update(alone=alone, weight=weight)
+    def pulses_of(linear, d, reference, unrest, weight):
+        left = evidence.weighed(linear, unrest).dd[:, 0, 0]
+        said.update(left=left, weight=weight)
+        assert not d.any()
         return Pulses(0.0, GAIN, 0.0, 1.0, np.zeros(3))
 
     monkeypatch.setattr(unnamed, "pulses_of", pulses_of)
@@ -136,7 +138,7 @@ def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
         given = straight.passed(record, columns, own, told=3.0)
         made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
         placebo.intermittent(made, segments.grid(record), 12.0)
-        left[bool(own.any())] = asked["alone"].dd[:, 0, 0]
+        left[bool(own.any())] = asked["left"]
         before = evidence.weighed(given, straight.UNREST).dd[:, 0, 0]
         assert not own.any() or before.min() > 3.0 * left[True].max()
     assert left[True] == pytest.approx(left[False], rel=0.1)
