@@ -53,5 +53,6 @@ def search(
         made.found[labels, kind] = Hypothesis(
             tuple(sorted(labels)), remainder, said, score, point, found, pulses
         )
+    made.run = lambda: None  # there is nothing else to weigh
     made.alone = {cause.label: 1.0 for cause in made.catalogue}
     return made

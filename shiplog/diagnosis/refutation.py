@@ -1,8 +1,8 @@
 """Held-out voyages may refute a name: one rule, for every cause alike.
 
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted where the
-held-out error with it is surely greater than without it; then every hypothesis that contains it is
-dropped, and the others' probabilities are renormalised.
+held-out error with it is surely greater than without it; then the search goes on without it, and
+probabilities are those of the hypotheses that do not contain it.
 """
 
 from __future__ import annotations
@@ -53,3 +53,4 @@ def judged(
             f"held-out voyages refute it: with it the error is {-worth.high:.1%} to "
             f"{-worth.low:.1%} greater"
         )
+        search.without(one.cause.name)

@@ -66,6 +66,8 @@ class Search:
         self.alone: dict[str, float] = {}
         self.told: dict = {}
         self.scanned: dict[str, float] = {}
+        self.banned: set[str] = set()  # names
+        self._most = MOST_SETS
         self._tried: set[tuple[str, ...]] = set()
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
 
@@ -78,9 +80,17 @@ class Search:
             for key, h in self.found.items()
         }
 
+    def without(self, name: str) -> None:
+        """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
+        self.banned.add(name)
+        self._most = len(self._tried) + MOST_SETS
+        self._expanded.clear()
+        self.run()
+
     def _run(self) -> None:
-        self.weigh((), {}, self.first)
-        while len(self._tried) < MOST_SETS:
+        if () not in self._tried:
+            self.weigh((), {}, self.first)
+        while len(self._tried) < self._most:
             best = self.ranked()
             near = [h for h in best if h.score > best[0].score - WINDOW]
             fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
@@ -89,8 +99,9 @@ class Search:
             self._expand(fresh[0])
 
     def ranked(self) -> list[Hypothesis]:
-        """Best first."""
-        return sorted(self.found.values(), key=lambda h: -h.score)
+        """Best first, without those that contain a banned cause."""
+        kept = (h for h in self.found.values() if not self.banned & set(map(name_of, h.causes)))
+        return sorted(kept, key=lambda h: -h.score)
 
     @property
     def nothing(self) -> Hypothesis:
@@ -104,7 +115,7 @@ class Search:
         best = self.ranked()[0].score
         for labels, numbers, predicted in self._additions(one):
             worth = predicted > best - WINDOW or not one.causes
-            if worth and labels not in self._tried and len(self._tried) < MOST_SETS:
+            if worth and labels not in self._tried and len(self._tried) < self._most:
                 self.weigh(labels, numbers, one.point)
         for label in one.causes if len(one.causes) > 1 else ():
             labels = tuple(n for n in one.causes if n != label)
@@ -118,7 +129,8 @@ class Search:
             return []
         candidates = [
             c for c in self.catalogue
-            if c.label not in one.causes and all(c.beside(label) for label in one.causes)
+            if c.label not in one.causes and c.name not in self.banned
+            and all(c.beside(label) for label in one.causes)
         ]  # fmt: skip
         self.trial.remainder = one.remainder
         _, found = self.trial.scan(
@@ -126,11 +138,12 @@ class Search:
         )
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
-            self.told = {f.name: f.told for f in found}
-            self.scanned = {
+            self.scanned |= {
                 f.name: self._score(one.evidence + f.evidence, (f.name,), NOMINAL) for f in found
             }
-            self._say_what_would_not_show()
+            if not self.told:
+                self.told = {f.name: f.told for f in found}
+                self._say_what_would_not_show()
         said = []
         for f in found:
             if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:

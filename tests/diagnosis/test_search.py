@@ -9,6 +9,7 @@ import straight
 from straight import CAUSES
 
 from shiplog.diagnosis import posterior as posteriors
+from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
@@ -211,3 +212,17 @@ def test_a_force_of_the_place_is_unknown_and_depends_on_position():
     assert decision.structure.family == "position"
     assert weighed.kinds["position"] > 0.9
     assert next(iter(decision.ranking)) == "unknown:position"
+
+
+def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch):
+    """One contender at a time, and two causes hidden, one of them with half the columns of a third:
+    without the strongest the third is weighed, which was not worth a look beside it."""
+    monkeypatch.setattr(searching, "CONTENDERS", 1)
+    found = searched({"drag": [1.2]}, alike=("drag", "load", 0.7))
+    assert found.ranked()[0].causes == ("drag",)
+    weighed = {h.causes for h in found.ranked()}
+    assert ("load",) not in weighed
+    found.without("drag")
+    assert all("drag" not in h.causes for h in found.ranked())
+    assert found.ranked()[0].causes == ("load",)
+    assert set(found.scanned) == {c.label for c in CAUSES}
