@@ -20,7 +20,7 @@ from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Tr
 from shiplog.hypotheses import Found, Level, Point
 from shiplog.settling import settle
 
-MOST_CAUSES = 3
+MOST_CAUSES = 5  # each pays its prior; beyond, coefficients of another ship were given
 MOST_SETS = 16  # that are linearised; what is left then is far behind
 WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
