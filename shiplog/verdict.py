@@ -255,23 +255,29 @@ def sentence(
     louder: float,
     alone: float | None = None,
     ranking: Sequence[dict] = (),
+    wrong: Sequence[dict] = (),
 ) -> str:
-    """The verdict in a sentence. `alone`: share of the error that the model takes off when it is
-    fitted again with nothing named; None where it is not fitted again."""
+    """The verdict in a sentence or a few; what is named comes after the share that it explains.
+
+    alone   share of the error that the model takes off when it is fitted again with nothing named;
+            None where it is not fitted again
+    wrong   share of the error in each channel, before anything is named
+    """
     if verdict == "named":
         said = " ".join(_likely(cause) for cause in causes)
         if gain is None:
             return said
         if gain.real:
-            said = (
-                f"{said} With it in the model, the error on {gain.windows} held-out windows falls "
-                f"by {gain.reduction:.0%} ({gain.low:.0%} to {gain.high:.0%})."
+            share = (
+                f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
+                f"explained ({gain.low:.0%} to {gain.high:.0%})."
             )
         else:
-            said = (
-                f"{said} On {gain.windows} held-out windows no gain is sure: the error is "
-                f"{less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
+            share = (
+                f"No part of the error on {gain.windows} held-out windows is surely explained: it "
+                f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
             )
+        said = " ".join(part for part in (share, said, _left(gain, wrong)) if part)
         if alone is None:
             return said
         return f"{said} Fitted again with nothing named, the model has an error {less(alone)}."
@@ -300,6 +306,20 @@ def sentence(
         return "The ship was pushed, held or towed: no force of her own explains these stretches."
     return (
         "No change found: the errors are those that the model already had in its nominal voyages."
+    )
+
+
+def _left(gain: Gain, wrong: Sequence[dict]) -> str:
+    """The largest part of the error that what is named does not explain; empty where none is."""
+    left = {
+        one["channel"]: one["share_of_error"] * (1.0 - gain.channels.get(one["channel"], 0.0))
+        for one in wrong
+    }
+    if not left:
+        return ""
+    channel, share = max(left.items(), key=lambda pair: pair[1])
+    return (
+        f"The largest part that is not is in {channel.replace('_', ' ')}: {share:.0%} of the error."
     )
 
 

@@ -114,7 +114,7 @@ def verdict(
     sentence = f"{context.lost}: no cause can be told."
     if not context.lost:
         sentence = verdicts.sentence(
-            said, causes, structure, found, decision.louder, context.alone, ranking
+            said, causes, structure, found, decision.louder, context.alone, ranking, context.wrong
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
