@@ -7,6 +7,7 @@ probabilities are those of the hypotheses that do not contain it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 from shiplog import decision as decisions
@@ -32,23 +33,27 @@ class HeldOut(Protocol):
 def judged(
     search: Search, held: HeldOut | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
-    """The decision that held-out voyages leave, its posterior and gain, and name → why refuted."""
+    """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.
+
+    Of several causes the one that takes most off the held-out error comes first.
+    """
     refuted: dict[str, str] = {}
     while True:
         decision, found = decide(search, refuted)
         if held is None or not decision.named:
             return decision, found, None, refuted
         gain = held.gain(decision)
-        worst = None
-        for one in decision.named:
-            worth = gain
-            if len(decision.named) > 1:
-                worth = held.worth(decisions.without(search.trial, decision, one), decision)
-            if worth.high < 0.0 and (worst is None or worth.high < worst[1].high):
-                worst = one, worth
-        if worst is None:
-            return decision, found, gain, refuted
-        one, worth = worst
+        worths = [gain]
+        if len(decision.named) > 1:
+            rests = [decisions.without(search.trial, decision, one) for one in decision.named]
+            worths = [held.worth(rest, decision) for rest in rests]
+        asked = list(zip(decision.named, worths, strict=True))
+        worse = [pair for pair in asked if pair[1].high < 0.0]  # surely
+        if not worse:
+            order = sorted(asked, key=lambda pair: -pair[1].reduction)
+            ordered = replace(decision, named=tuple(one for one, _ in order))
+            return ordered, found, gain, refuted
+        one, worth = min(worse, key=lambda pair: pair[1].high)
         refuted[one.cause.name] = (
             f"held-out voyages refute it: with it the error is {-worth.high:.1%} to "
             f"{-worth.low:.1%} greater"

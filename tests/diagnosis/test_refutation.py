@@ -128,3 +128,12 @@ def test_a_gain_without_bounds_refutes_nothing(trial):
     held = HeldOut({DRAG: (-math.inf, math.nan)})
     decision, _, _, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
     assert (len(decision.named), refuted) == (1, {})
+
+
+@pytest.mark.parametrize("first", ("drag", "load"))
+def test_what_takes_most_off_the_error_comes_first(trial, first):
+    made = weighed.search(trial, {(("drag", "load"), NOMINAL): 1.0})
+    worths = {"drag": UNSURE, "load": UNSURE} | {first: BETTER}
+    decision, _, _, _ = judged(made, HeldOut({("drag", "load"): BETTER}, worths))
+    assert [one.cause.label for one in decision.named][0] == first
+    assert {one.cause.label for one in decision.named} == {"drag", "load"}
