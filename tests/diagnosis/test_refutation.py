@@ -135,5 +135,5 @@ def test_what_takes_most_off_the_error_comes_first(trial, first):
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 1.0})
     worths = {"drag": UNSURE, "load": UNSURE} | {first: BETTER}
     decision, _, _, _ = judged(made, HeldOut({("drag", "load"): BETTER}, worths))
-    assert [one.cause.label for one in decision.named][0] == first
+    assert decision.named[0].cause.label == first
     assert {one.cause.label for one in decision.named} == {"drag", "load"}
