@@ -18,6 +18,7 @@ from shiplog import coverage as covering
 from shiplog.channels import STATE
 from shiplog.comparison import BAND, Actuator, Comparison
 from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.judgement import MEANING, Judgement, force_line, judge
 from shiplog.runs import Run
 from shiplog.store import Store
 from shiplog.windows import Windows
@@ -33,7 +34,8 @@ class Evaluation:
                evaluate.ERRORS: one row a window and seed
     rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
     coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
-    floors     mean L of holding the velocity and of quadratic least squares, first run's data
+    floors     L of every window [N]: of holding the velocity and of quadratic least squares, on
+               the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as Comparison has them; or None
     """
@@ -45,31 +47,46 @@ class Evaluation:
     errors: pl.DataFrame
     rollouts: pl.DataFrame
     coverage: pl.DataFrame
-    floors: dict[str, float]
+    floors: dict[str, np.ndarray]
     inside: pl.DataFrame
     forces: pl.DataFrame | None
 
     def answer(self, run: Run) -> dict:
         """The contract's JSON for one run, and the share of samples inside its 90 % band."""
         errors = self.errors.filter(pl.col("run") == run.name)
-        answer = report.evaluation_json(errors, self.floors, self.coverage)
+        answer = report.evaluation_json(errors, self.means, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
+        said = self.judgement(run)
         return answer | {
+            "sentence": said.sentence,
+            "judgement": said.as_json(),
             "band_90": dict(shares.iter_rows()),
             "winds": report.winds(errors).drop("run").to_dicts(),
         }
 
+    @property
+    def means(self) -> dict[str, float]:
+        """Mean L of each floor."""
+        return {name: float(values.mean()) for name, values in self.floors.items()}
+
+    def judgement(self, run: Run) -> Judgement:
+        errors = self.errors.filter(pl.col("run") == run.name)
+        length = self.runs[0].profile.ship.length_m
+        return judge(run.name, errors, self.floors, length, self.runs[0].config.window)
+
     def text(self) -> str:
-        """Markdown: models against floors, voyages, the worst windows of the first run."""
+        """Markdown: a sentence a run, models against floors, voyages, the worst windows of the
+        first run."""
         answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
         first = next(iter(answers.values()))
         errors = self.errors.filter(pl.col("run") == self.runs[0].name)
         count = first["windows"]
         lines = [
-            f"L is the paper's evaluation function (Eq. 8), mean over {count} windows of "
-            f"{self.runs[0].config.window} s and over seeds; yaw rate in deg/s.",
+            *[self.judgement(run).sentence for run in self.runs],
             "",
-            report.models_table(answers, self.floors, self.runs[0].name),
+            f"{MEANING} Means over {count} windows and over seeds:",
+            "",
+            report.models_table(answers, self.means, self.runs[0].name),
             "",
             *report.band_lines(self.inside),
             f"Per voyage, {self.runs[0].name}:",
@@ -81,6 +98,8 @@ class Evaluation:
             "",
             report.windows_table(errors, self.coverage),
         ]
+        if len(self.voyages) == 1 and self.forces is not None:
+            lines += ["", force_line(self.forces, self.voyages[0])]
         if self.too_short:
             lines += ["", f"Without a window of that length: {listed(self.too_short)}."]
         return "\n".join(lines)
@@ -350,13 +369,13 @@ def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -
     )
 
 
-def _floors(run: Run, cut: Windows) -> dict[str, float]:
-    """Mean L of both floors on the same windows; the fitted one learns what the run learned."""
+def _floors(run: Run, cut: Windows) -> dict[str, np.ndarray]:
+    """L of both floors on the same windows [N]; the fitted one learns what the run learned."""
     size = run.config.window
     names = (run.profile.actuator_names, run.profile.wind_names)
     learnt = windows.cut(run.training(), plan(run.training(), "ref", size), size, *names)
     fitted = floors.least_squares(learnt)
     return {
-        name: float(evaluate.score(model, cut).errors["loss"].mean())  # type: ignore[arg-type]
+        name: evaluate.score(model, cut).errors["loss"].to_numpy()
         for name, model in (("hold", floors.hold), ("least_squares", fitted))
     }

@@ -53,24 +53,28 @@ def parts(error: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(each), np.minimum(each, RUNAWAY), RUNAWAY)
 
 
-def gain(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> Gain:
-    """Of L by window and channel [N, 3]: ratio of means, bootstrapped over blocks of windows that
-    never join two voyages (Künsch 1989)."""
-    names = list(voyages)
+def shares(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> tuple[float, float]:
+    """90 % interval of the ratio of means of L after [N] to L before [N], bootstrapped over blocks
+    of windows that never join two voyages (Künsch 1989)."""
     blocks: list[list[int]] = []
-    for i, name in enumerate(names):
-        fresh = not blocks or names[blocks[-1][0]] != name or len(blocks[-1]) == BLOCK
+    for i, name in enumerate(voyages):
+        fresh = not blocks or voyages[blocks[-1][0]] != name or len(blocks[-1]) == BLOCK
         if fresh:
             blocks.append([])
         blocks[-1].append(i)
     of = np.array([[before[b].sum(), after[b].sum()] for b in blocks])
     rng = np.random.default_rng(0)
     drawn = of[rng.integers(len(of), size=(DRAWS, len(of)))].sum(1)
-    reduced = 1.0 - drawn[:, 1] / np.maximum(drawn[:, 0], 1e-12)
-    low, high = np.quantile(reduced, (0.05, 0.95))
+    low, high = np.quantile(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-12), (0.05, 0.95))
+    return float(low), float(high)
+
+
+def gain(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> Gain:
+    """Of L by window and channel [N, 3]: ratio of means, with the interval of `shares`."""
+    low, high = shares(before.sum(1), after.sum(1), voyages)
     with np.errstate(divide="ignore", invalid="ignore"):
         each = 1.0 - after.sum(0) / np.maximum(before.sum(0), 1e-12)
     return Gain(
-        float(before.sum(1).mean()), float(after.sum(1).mean()), float(low), float(high),
-        len(names), {c.name: float(v) for c, v in zip(VELOCITY, each, strict=True)},
+        float(before.sum(1).mean()), float(after.sum(1).mean()), 1.0 - high, 1.0 - low,
+        len(voyages), {c.name: float(v) for c, v in zip(VELOCITY, each, strict=True)},
     )  # fmt: skip

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import polars as pl
 
 from shiplog.findings import CONTRACT, VoyageReport
+from shiplog.judgement import FEWEST
 from shiplog.profile import Profile
 from shiplog.store import Entry
 
@@ -276,9 +277,9 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
 
 
 def voyages_table(answer: dict) -> str:
-    """L, windows and coverage of each voyage."""
+    """L, windows and coverage of each voyage; of a few windows no share is said."""
     rows = [
-        (name, v["windows"], v["loss"], f"{v['coverage']:.0%}")
+        (name, v["windows"], v["loss"], f"{v['coverage']:.0%}" if v["windows"] >= FEWEST else "-")
         for name, v in answer["voyages"].items()
     ]
     return table(("voyage", "windows", "L", "covered"), rows)
