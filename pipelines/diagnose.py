@@ -14,7 +14,7 @@ from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
-from shiplog import diagnose, page, runs, segments
+from shiplog import diagnose, page, parts, runs, segments
 from shiplog.decision import Decision
 from shiplog.diagnosis import placebo, refutation, search
 from shiplog.diagnosis import trial as diagnosis_trial
@@ -58,7 +58,7 @@ def diagnose_run(
             hint="diagnose a ship with a model of her own.",
         )
     recorded = trial.record_of(store, names, profile)
-    before_effect = not set(names) & set(run.made_on) and not run.given
+    before_effect = not parts.overlapping(names, run.made_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
     if not former:
         nominal, recorded = trial.in_ship_time(run, nominal, recorded)
@@ -152,8 +152,7 @@ def diagnose_run(
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     """The voyages that the run was made on; None where they are not there."""
-    stored = {entry.name for entry in store.entries()}
-    there = [n for n in run.made_on if n in stored]
+    there = store.there(run.made_on)
     if not there:
         return None
     return trial.record_of(store, there, profile)

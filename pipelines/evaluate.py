@@ -13,7 +13,7 @@ import torch
 
 from pipelines.prepare import seconds
 from pipelines.split import plan
-from shiplog import band, evaluate, floors, report, runs, table, windows
+from shiplog import band, evaluate, floors, parts, report, runs, table, windows
 from shiplog import coverage as covering
 from shiplog.channels import STATE
 from shiplog.comparison import BAND, Actuator, Comparison
@@ -217,15 +217,15 @@ def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
     used = {*run.config.split.training, *run.config.split.validation}
     if voyages:
         names = store.select(list(voyages))
-        seen = [n for n in names if n in used]
+        seen = parts.overlapping(names, used)
         if seen:
             log.warning(
                 "%s was trained or validated on: its errors there are no test", listed(seen)
             )
         return names
     stored = store.select()
-    names = [n for n in run.config.split.test if n in stored]
-    names = names or [n for n in stored if n not in used]
+    names = store.there(run.config.split.test)
+    names = names or [n for n in stored if not parts.overlapping([n], used)]
     if not names:
         raise StoreError(
             f"Every voyage in {store.path} was used to train or validate {run.name}.",

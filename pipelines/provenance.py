@@ -28,7 +28,6 @@ class Answer:
 
 def provenance(store: Store, split: Split, began: float) -> dict:
     """Versions, commit, log hashes, device and times."""
-    hashes = {e.name: e.sha256 for e in store.entries()}
     used = [*split.training, *split.validation]
     return {
         "shiplog": version("shiplog"),
@@ -38,7 +37,7 @@ def provenance(store: Store, split: Split, began: float) -> dict:
         "polars": pl.__version__,
         "machine": platform.machine(),
         "device": "cpu",
-        "logs_sha256": {name: hashes.get(name) for name in used},
+        "logs_sha256": store.hashes(used),
         "began": _utc(began),
         "ended": _utc(time.time()),
         "command": sys.argv,

@@ -1,16 +1,19 @@
-"""Which voyages train, validate and test: whole voyages, never parts of one on both sides."""
+"""Which voyages train, validate and test: whole voyages, or parts of the only one by time."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from itertools import pairwise
 
+import numpy as np
 import polars as pl
 
 from pipelines.prepare import seconds
 from shiplog import table, windows
 from shiplog.config import Split
 from shiplog.exceptions import StoreError, listed
+from shiplog.parts import Part
 from shiplog.store import Store
 from shiplog.windows import AUGMENTATIONS
 
@@ -19,6 +22,7 @@ log = logging.getLogger(__name__)
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
 HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
+SHORTER = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed instead
 
 
 def choose_split(
@@ -88,11 +92,13 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     groups: dict[str, list[str]] = {}
     for name in usable:
         groups.setdefault(twin.get(name, name), []).append(name)
-    if len(groups) < 2:
+    _say_what_is_left_out(rows, names, usable, size)
+    if len(groups) == 1:
+        return _in_time(rows, usable[0], size)
+    if not groups:
         raise StoreError(
-            f"{len(groups)} voyage(s) with a window of {size} s cannot be split into training and "
-            f"validation.",
-            hint="ingest at least two voyages, or choose a shorter --window.",
+            f"No voyage has a window of {size} s without a gap.",
+            hint=proposed(rows, size) or "see `shiplog check` for why.",
         )
     sides: dict[str, list[str]] = {"training": [], "validation": [], "test": []}
     taken = dict.fromkeys(sides, 0)
@@ -112,6 +118,59 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     return Split(
         **{side: tuple(members) for side, members in sides.items()},
         chosen_by="whole voyages dealt out in order of time",
+    )
+
+
+def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
+    """One voyage by time: its first part trains, then validates, its last part tests. Windows are
+    cut in each part by itself, so that none crosses."""
+    own = table.with_elapsed(rows.filter(pl.col("voyage") == name))
+    elapsed = own["elapsed"].to_numpy()
+    used = np.arange(1, len(elapsed) + 1) / len(elapsed)  # share of the usable seconds
+    ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]
+    at = [0, *(int(elapsed[np.searchsorted(used, end)]) for end in ends), int(elapsed[-1]) + 1]
+    named = [str(Part(name, begin, end)) for begin, end in pairwise(at) if begin < end]
+    windows_of = [
+        plan(own.filter(pl.col("elapsed").is_between(a, b, closed="left")), "ref", size).height
+        for a, b in pairwise(at)
+    ]
+    if len(named) < 3 or min(windows_of) == 0:
+        longest = int(HELD_OUT_SHARE * len(elapsed))
+        raise StoreError(
+            f"{name} is the only voyage with a window of {size} s, and too short to be split in "
+            f"time: {HELD_OUT_SHARE:.0%} of its {len(elapsed)} usable seconds hold no window.",
+            hint=f"choose --window {max(longest, 2)} or shorter, or ingest a second voyage.",
+        )
+    return Split(
+        training=(named[0],), validation=(named[1],), test=(named[2],),
+        chosen_by="time, since there is but one voyage: the first part trains, the last one tests",
+    )  # fmt: skip
+
+
+def _say_what_is_left_out(
+    rows: pl.DataFrame, names: Sequence[str], usable: Sequence[str], size: int
+) -> None:
+    left = [name for name in names if name not in usable]
+    if left and usable:
+        log.info(
+            "left out, without a window of %d s: %s. %s", size, listed(left), proposed(rows, size)
+        )
+
+
+def proposed(rows: pl.DataFrame, size: int) -> str:
+    """Which shorter window more voyages have; empty where none has one."""
+    longest = rows.group_by("voyage", "segment").len().group_by("voyage").agg(pl.col("len").max())
+    lengths = longest["len"].to_numpy()
+    now = int((lengths >= size).sum())
+    shorter = [w for w in SHORTER if w < size and (lengths >= w).sum() > now]
+    if not shorter:
+        return ""
+    best = max(shorter, key=lambda w: (int((lengths >= w).sum()), w))
+    count = int((lengths >= best).sum())
+    uses = "all" if count == len(lengths) else f"{count}"
+    return (
+        f"{len(lengths) - now} of {len(lengths)} voyages are shorter than {size} s; "
+        f"`--window {best}` uses {uses}."
     )
 
 

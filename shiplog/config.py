@@ -67,7 +67,7 @@ class Physics(Section):
 
 
 class Split(Section):
-    """Whole voyages, never parts of one on both sides."""
+    """Whole voyages; of a single voyage parts by time (`parts`), which share no second."""
 
     training: tuple[str, ...]
     validation: tuple[str, ...]

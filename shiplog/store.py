@@ -23,6 +23,7 @@ from urllib.parse import quote
 
 import polars as pl
 
+from shiplog import parts
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.findings import CONTRACT, VoyageReport
 from shiplog.ingest import Voyage
@@ -61,7 +62,8 @@ class Store:
         return [Entry(**row) for row in pl.read_parquet(catalogue).to_dicts()]
 
     def select(self, patterns: Sequence[str] | None = None) -> list[str]:
-        """Names that match any of the shell patterns, each name once; all when none is given.
+        """Names that match any of the shell patterns, each name once; all when none is given. A
+        part of a voyage (`parts`) is a name of its own, where it is given as it is.
 
         In the order of the patterns, then by name. Raises StoreError where one matches nothing.
         """
@@ -73,9 +75,7 @@ class Store:
             )
         chosen: dict[str, None] = {}
         for pattern in patterns or ["*"]:
-            matching = [n for n in names if n == pattern] or [
-                n for n in names if fnmatchcase(n, pattern)
-            ]
+            matching = self.there([pattern], names) or [n for n in names if fnmatchcase(n, pattern)]
             if not matching:
                 raise StoreError(
                     f"No voyage matches {pattern!r}{nearest(pattern, names)}. "
@@ -84,6 +84,11 @@ class Store:
                 )
             chosen.update(dict.fromkeys(matching))
         return list(chosen)
+
+    def there(self, names: Iterable[str], stored: Sequence[str] | None = None) -> list[str]:
+        """Those of these voyages, and parts of voyages, that the store holds."""
+        known = {entry.name for entry in self.entries()} if stored is None else set(stored)
+        return [n for n in names if n in known or ((p := parts.parse(n)) and p.whole in known)]
 
     def add(self, voyage: Voyage) -> str:
         """Take a voyage: "added", "unchanged" or "replaced" (same log, otherwise ingested).
@@ -142,7 +147,8 @@ class Store:
         chosen: Profile | None = None
         first = ""
         for name in names:
-            facts = _facts(self._folder(name))
+            part = self._part(name)
+            facts = _facts(self._folder(part.whole if part else name))
             source = facts.get("profile_source", "")
             profile = Profile.model_validate(facts["profile"] | {"source": source})
             if chosen is None:
@@ -160,8 +166,25 @@ class Store:
 
     def tables(self, names: Sequence[str]) -> list[pl.LazyFrame]:
         """The 10 Hz rows, a lazy table a voyage: voyage, time, the ship's columns, quality."""
-        files = [self._folder(name) / "table.parquet" for name in names]
-        return [pl.scan_parquet(file, hive_partitioning=False) for file in files]
+        return [self._table(name) for name in names]
+
+    def _table(self, name: str) -> pl.LazyFrame:
+        part = self._part(name)
+        if part is None:
+            return pl.scan_parquet(self._folder(name) / "table.parquet", hive_partitioning=False)
+        elapsed = (pl.col("time") - pl.col("time").min()).dt.total_nanoseconds() * 1e-9
+        inside = (elapsed >= part.begin) & (elapsed < part.end)
+        return self._table(part.whole).filter(inside).with_columns(voyage=pl.lit(name))
+
+    def _part(self, name: str) -> parts.Part | None:
+        """None where the name is that of a whole voyage, whatever it looks like."""
+        return None if self._folder(name).is_dir() else parts.parse(name)
+
+    def hashes(self, names: Iterable[str]) -> dict[str, str | None]:
+        """Name → SHA-256 of its log; of a part, that of its voyage."""
+        known = {entry.name: entry.sha256 for entry in self.entries()}
+        of = {name: self._part(name) for name in names}
+        return {name: known.get(part.whole if part else name) for name, part in of.items()}
 
     def _folder(self, name: str) -> Path:
         return self.path / f"voyage={quote(name, safe=' ()+,')}"

@@ -38,7 +38,9 @@ def test_a_model_is_judged_against_each_baseline():
 
 
 def test_seeds_are_averaged_window_by_window():
-    both = pl.concat([errors([1.0] * 8), errors([3.0] * 8).with_columns(seed=pl.lit(2, dtype=pl.Int64))])
+    both = pl.concat(
+        [errors([1.0] * 8), errors([3.0] * 8).with_columns(seed=pl.lit(2, dtype=pl.Int64))]
+    )
     found = judge("ref", both, {"hold": np.full(8, 4.0)}, 3.0, 100)
     assert found.windows == 8 and found.against[0].share == pytest.approx(0.5)
 

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import sailing
 
+from pipelines.prepare import seconds
 from pipelines.split import choose_split
 from pipelines.train import train_run
 from shiplog.config import Config, Split
 from shiplog.exceptions import StoreError
 from shiplog.ingest import ingest
+from shiplog.parts import overlap, parse
 from shiplog.store import Store
 
 
@@ -71,6 +73,72 @@ def test_the_same_data_on_both_sides_is_refused(tmp_path):
     assert not list(tmp_path.glob("run*"))
 
 
-def test_one_voyage_cannot_be_split(tmp_path):
-    with pytest.raises(StoreError, match="at least two voyages"):
-        choose_split(store_of(tmp_path, ["only"]), (), (), "ref", 40)
+def test_one_voyage_is_split_in_time(tmp_path):
+    """130 s: the first 70 % train, the last 15 % test, and no second is on two sides."""
+    store = store_of(tmp_path, ["only"])
+    split = choose_split(store, (), (), "ref", 10)
+    sides = [*split.training, *split.validation, *split.test]
+    found = [parse(name) for name in sides]
+    assert [p.whole for p in found] == ["only"] * 3 and "one voyage" in split.chosen_by
+    assert found[0].begin == 0 and found[2].end >= 129
+    assert [a.end for a in found[:2]] == [b.begin for b in found[1:]]
+    assert [found[0].end, found[1].end] == pytest.approx([91, 111], abs=2)
+    rows = seconds(store, sides, store.profile(sides))
+    assert set(rows["voyage"]) == set(sides)
+    assert rows["time"].is_unique().all()
+    whole = seconds(store, ["only"], store.profile(["only"]))
+    assert whole.height - 3 <= rows.height <= whole.height  # a second at each seam may be cut
+
+
+@pytest.mark.parametrize(("size", "left"), ((40, 19), (100, 19)))
+def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, left):
+    with pytest.raises(StoreError, match="the only voyage") as caught:
+        choose_split(store_of(tmp_path, ["only"]), (), (), "ref", size)
+    window = int(caught.value.hint.split("--window ")[1].split(" ")[0])
+    assert window == pytest.approx(left, abs=1)
+    split = choose_split(Store(tmp_path / "store"), (), (), "ref", window - 2)
+    assert len(split.training) == len(split.validation) == len(split.test) == 1
+
+
+def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_path, caplog):
+    store = store_of(tmp_path, ["a", "b", "c"])
+    short = store_of(tmp_path, ["d"], seconds=35.0)
+    assert short.path == store.path
+    caplog.set_level("INFO")
+    split = choose_split(store, (), (), "ref", 40)
+    assert "d" not in [*split.training, *split.validation, *split.test]
+    assert "left out, without a window of 40 s: d" in caplog.text
+    assert "1 of 4 voyages are shorter than 40 s; `--window 30` uses all" in caplog.text
+
+
+def test_no_voyage_long_enough_is_said_with_what_would_do(tmp_path):
+    store = store_of(tmp_path, ["a", "b"], seconds=35.0)
+    with pytest.raises(StoreError, match="No voyage has a window of 100 s") as caught:
+        choose_split(store, (), (), "ref", 100)
+    assert "`--window 30` uses all" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "shared"),
+    [
+        ("a", "a", True), ("a", "b", False), ("a", "a[0:10]", True), ("a[0:10]", "a", True),
+        ("a[0:10]", "a[10:20]", False), ("a[0:11]", "a[10:20]", True),
+        ("a[0:10]", "b[0:10]", False), ("a[0:10]", "b", False), ("a[5:5]", "a", False),
+    ],
+)  # fmt: skip
+def test_parts_share_seconds_where_they_meet(one, other, shared):
+    assert overlap(one, other) is shared
+
+
+def test_a_name_that_looks_like_a_part_is_itself_where_it_is_stored(tmp_path):
+    store = store_of(tmp_path, ["trip", "trip[0:50]"])
+    assert set(store.select(["trip[[]0:50]"])) == {"trip[0:50]"}
+    (frame,) = store.tables(["trip[0:50]"])
+    assert frame.collect().height > 1000  # 130 s of it, not 50
+    assert store.select(["trip[0:60]"]) == ["trip[0:60]"]
+    (frame,) = store.tables(["trip[0:60]"])
+    assert frame.collect().height == 600
+    hashes = store.hashes(["trip[0:60]", "trip"])
+    assert hashes["trip[0:60]"] == hashes["trip"] is not None
+    with pytest.raises(StoreError):
+        store.select(["other[0:60]"])

@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.prepare import seconds
 from pipelines.split import plan
 from shiplog import causes as catalogue
-from shiplog import record, reference, remembered, table, timescale, user_causes, windows
+from shiplog import parts, record, reference, remembered, table, timescale, user_causes, windows
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
 from shiplog.extend import ExtendedSimulator, campaign
@@ -31,10 +31,13 @@ WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slow
 
 
 def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
-    """Those that are asked for, or all that the run has not seen. Raises StoreError for none."""
+    """Those that are asked for, or all that the run has not seen: of a voyage of which it has seen
+    a part, the test part. Raises StoreError for none."""
     if wanted:
         return store.select(list(wanted))
-    names = [n for n in store.select() if n not in run.made_on]
+    stored = store.select()
+    names = [n for n in stored if not parts.overlapping([n], run.made_on)]
+    names += [n for n in store.there(run.config.split.test) if n not in stored]
     if not names:
         raise StoreError(
             f"Every voyage in {store.path} was used to make {run.name}.",
