@@ -38,9 +38,11 @@ class Against:
 
     @property
     def sentence(self) -> str:
-        between = "" if self.low is None else f" ({self.low:.2g} to {self.high:.2g})"
         name = BASELINES[self.baseline]
-        return f"{self.word} than {name}, with {self.share:.2g} of its L{between}"
+        if self.low is None:
+            return f"{self.share:.2g} of the L of {name}"
+        between = f"({self.low:.2g} to {self.high:.2g})"
+        return f"{self.word} than {name}, with {self.share:.2g} of its L {between}"
 
     def as_json(self) -> dict:
         return {"share": self.share, "low": self.low, "high": self.high, "word": self.word}

@@ -71,6 +71,7 @@ def test_of_too_few_windows_there_is_no_interval(count):
     few = count < FEWEST
     assert ("Too few windows for an interval." in found.sentence) == few
     assert (found.against[0].low is None) == few
+    assert ("0.5 of the L of holding the velocity" in found.sentence) == few
     assert found.against[0].word == ("not surely better or worse" if few else "better")
 
 
