@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from pipelines.diagnosis import answer, baseline, own, pictures, setup, trial, where
@@ -68,6 +70,37 @@ def diagnose_run(
         return done
     if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
         nominal = None
+    campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
+    try:
+        done = _diagnosed(campaign, out, cause_files, former)
+    except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
+        log.info("no path of the model can be computed: %s", error, exc_info=log.isEnabledFor(10))
+        done = Diagnosis(answer.runs_away(run, before_effect), out)
+    _save(done, run, store, names, began)
+    if extend is not None:
+        _extend(run, done, extend, cause_files)
+    return done
+
+
+@dataclass(frozen=True)
+class Campaigns:
+    """A run and the voyages in question; `nominal` None where those it was made on are not there.
+
+    before_effect   whether the run was made on other voyages than these
+    """
+
+    run: Run
+    store: Store
+    names: Sequence[str]
+    profile: Profile
+    recorded: Record
+    nominal: Record | None
+    before_effect: bool
+
+
+def _diagnosed(of: Campaigns, out: Path, cause_files: Sequence[Path], former: bool) -> Diagnosis:
+    run, store, names, profile = of.run, of.store, of.names, of.profile
+    recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = []
     if before_effect and nominal is None:
         notes.append(
@@ -143,11 +176,7 @@ def diagnose_run(
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    done = Diagnosis(verdict, out, decision, tried, seen, whole, held, after)
-    _save(done, run, store, names, began)
-    if extend is not None:
-        _extend(run, done, extend, cause_files)
-    return done
+    return Diagnosis(verdict, out, decision, tried, seen, whole, held, after)
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:

@@ -167,6 +167,8 @@ def pulses_of(
     linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray
 ) -> Pulses:
     """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
+    kept = weight > 0.0  # a segment that says nothing has no likelihood
+    linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
     alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
     startless = evidence.startless(evidence.weighed(alone, unrest), unrest)

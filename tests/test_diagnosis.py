@@ -245,6 +245,20 @@ def test_too_little_is_said_and_nothing_named(sea):
     assert "Too little" in told["sentence"] and "100 s" in told["sentence"]
 
 
+def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
+    """Whatever the numerics do ends as an answer: nothing is named and nothing raised."""
+
+    def singular(*_):
+        raise np.linalg.LinAlgError("Matrix is not positive definite")
+
+    monkeypatch.setattr(pipeline.setup, "trial_of", singular)
+    done = pipeline.diagnose_run(sea.run.path, sea.store, ["trial_1"], sea.work / "away")
+    told = json.loads((sea.work / "away" / "verdict.json").read_text("utf-8"))
+    shaped(told)
+    assert (done.verdict.verdict, told["causes"]) == ("undecided", [])
+    assert "runs away" in told["sentence"] and "evaluate" in told["sentence"]
+
+
 def test_voyages_of_another_ship_are_refused(sea, tmp_path):
     log_ = sailing.write(tmp_path / "other.mcap")
     (tmp_path / "circle.toml").write_text(sailing.PROFILE, encoding="utf-8")

@@ -183,6 +183,17 @@ def enough(recorded: Record) -> bool:
     return recorded.seconds >= LEAST_S and len(segments.begins(recorded)) >= 4
 
 
+def runs_away(run: Run, before_effect: bool) -> Verdict:
+    """Where no path of the model can be computed: there is nothing to compare."""
+    said = (
+        "Nothing can be told: the model runs away on these voyages, or on those that it was made "
+        "on, so that its errors say nothing. Check signs, units and places in the profile, compare "
+        "the model with its baselines (`shiplog evaluate`), and identify it again from more "
+        "voyages."
+    )
+    return Verdict("undecided", said, run.name, before_effect)
+
+
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     short = max(LEAST_S - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
     said = (
