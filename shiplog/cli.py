@@ -225,12 +225,27 @@ def profile(
 
 
 @app.command()
-def voyages(store: StoreOption = STORE, json_to: JsonOption = None) -> None:
-    """What is in the store.
+def voyages(
+    store: StoreOption = STORE,
+    sensors: Annotated[
+        bool, typer.Option("--sensors", help="What the sensors say of each other, all voyages.")
+    ] = False,
+    voyages: Voyages = None,
+    json_to: JsonOption = None,
+) -> None:
+    """What is in the store; with --sensors, what several voyages together say of the instruments.
 
     Example: shiplog voyages --store store
+    Example: shiplog voyages --sensors --voyages 'zigzag_*'
     """
     from dataclasses import asdict
+
+    if sensors:
+        from pipelines.sensors import sensors_command
+
+        found = sensors_command(store, voyages or [])
+        _answer(found.text, found.content, json_to)
+        return
 
     from shiplog.store import Store
 

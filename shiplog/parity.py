@@ -110,7 +110,11 @@ def findings(found: Sequence[Estimate], rows: int, profile: Profile) -> list[Fin
 
 def estimates(table: pl.DataFrame, profile: Profile) -> list[Estimate]:
     """All that the voyage's manoeuvres let be estimated, notable or not: one voyage at 10 Hz."""
-    motion = measured(table, profile)
+    return of_motion(measured(table, profile), profile)
+
+
+def of_motion(motion: Motion, profile: Profile) -> list[Estimate]:
+    """The same of rows that are chosen already, such as those of a campaign."""
     return [*_of_yaw_rate(motion, profile), *_of_velocity(motion, profile)]
 
 

@@ -1,0 +1,77 @@
+"""Stored voyages to what their sensors say of each other, campaign by campaign."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+
+from pipelines.provenance import Answer
+from shiplog import parity_campaign, report
+from shiplog.findings import CONTRACT
+from shiplog.parity import Estimate
+from shiplog.parity_campaign import Campaign
+from shiplog.profile import Profile
+from shiplog.store import Store
+
+log = logging.getLogger(__name__)
+
+
+def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[Campaign, Profile]]:
+    """Voyages of one ship, apart where none was sailed for a season. Raises StoreError."""
+    chosen = store.select(list(voyages) or None)
+    begins = {
+        entry.name: datetime.fromisoformat(entry.start).timestamp()
+        for entry in store.entries()
+        if entry.name in chosen
+    }
+    found = []
+    for names in parity_campaign.seasons(begins):
+        profile = store.profile(names)
+        log.info("sensors against each other over %d voyages", len(names))
+        tables = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
+        found.append((parity_campaign.campaign(tables, profile), profile))
+    return found
+
+
+def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
+    """`shiplog voyages --sensors`."""
+    found = campaigns(Store(store_path), voyages)
+    text, content = [], []
+    for one, profile in found:
+        first, last = one.voyages[0], one.voyages[-1]
+        count = len(one.voyages)
+        text += [f"{count} voyages, {first} to {last}:" if count > 1 else f"{first}:", ""]
+        rows = [
+            (e.kind, e.channel, _cell(e), e.unit, "yes" if e.notable else "no",
+             ", ".join(d.voyage for d in one.deviating.get((e.kind, e.channel), ())) or "-")
+            for e in one.estimates
+        ]  # fmt: skip
+        head = ("kind", "channel", "value (90 % interval)", "unit", "said", "voyages that deviate")
+        text += [report.table(head, rows), ""]
+        text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
+        content.append(_json(one, profile))
+    return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})
+
+
+def _cell(e: Estimate) -> str:
+    return f"{e.value:.3f} ({e.low:.3f} to {e.high:.3f})"
+
+
+def _json(one: Campaign, profile: Profile) -> dict:
+    return {
+        "voyages": list(one.voyages),
+        "estimates": [
+            {key: asdict(e)[key] for key in ("kind", "channel", "value", "low", "high", "unit")}
+            | {"said": e.notable}
+            for e in one.estimates
+        ],
+        "findings": [asdict(finding) for finding in one.findings(profile)],
+        "deviating": [
+            {"kind": kind, "channel": channel, "voyage": d.voyage, "value": d.estimate.value,
+             "low": d.estimate.low, "high": d.estimate.high}
+            for (kind, channel), others in one.deviating.items() for d in others
+        ],
+    }  # fmt: skip
