@@ -74,6 +74,8 @@ class Discrepancy:
 
     def pushed(self, cut: Cut, g: Grid) -> np.ndarray:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        if not self.families:
+            return np.zeros((len(cut), 3 * g.knots, 0))
         knots = structure.at_knots(cut, g)
         parts = [structure.pushed(f.features(knots), self.push) for f in self.families]
         return np.concatenate(parts, axis=-1)

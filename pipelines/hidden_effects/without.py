@@ -1,0 +1,177 @@
+"""The program with one part of its decision taken out, to see what that part is for.
+
+python -m pipelines.hidden_effects.without PART diagnose RUN ...
+    as `shiplog diagnose RUN ...`, without that part
+python -m pipelines.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
+    the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/,
+    and a table: how many are right and how many are misnamed
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from pipelines.diagnosis import baseline, trial
+from pipelines.hidden_effects import replay, score
+from pipelines.hidden_effects.run import Settings
+from shiplog import cli, remembered, report
+from shiplog.diagnosis import (
+    discrepancy,
+    nominal_campaign,
+    placebo,
+    posterior,
+    refutation,
+    thresholds,
+    voyage_effects,
+)
+from shiplog.diagnosis.trial import INTERMITTENT, Trial
+
+WHOLE = "nothing"  # the decision as it is
+
+
+def _no_placebo(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {INTERMITTENT: 0.0}))
+
+
+def _no_form_error(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(thresholds, "FORM_ERROR", 0.0))
+
+
+def _no_discrepancy(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(discrepancy, "SEEN", ()))
+    _learned_anew(stack)
+
+
+def _voyages_alike(stack: ExitStack) -> None:
+    """No part of a campaign differs from another."""
+    learned = remembered.characteristics
+
+    def alike(*given):
+        found = learned(*given)
+        least = dict.fromkeys(found.deviation, voyage_effects.LEAST)
+        return replace(found, deviation=least)
+
+    stack.enter_context(patch.object(remembered, "characteristics", alike))
+
+
+def _whole_share(stack: ExitStack) -> None:
+    """A trial counts all of itself."""
+    learned = remembered.characteristics
+    whole = lambda *given: replace(learned(*given), share=1.0)  # noqa: E731
+    stack.enter_context(patch.object(remembered, "characteristics", whole))
+
+
+def _no_robust_weights(stack: ExitStack) -> None:
+    plain = lambda square, kept: np.where(kept, 1.0, 0.0)  # noqa: E731
+    for module in (nominal_campaign, sys.modules[Trial.__module__]):
+        stack.enter_context(patch.object(module, "robust_weights", plain))
+    _learned_anew(stack)
+
+
+def _no_refutation(stack: ExitStack) -> None:
+    judged = refutation.judged
+
+    def unjudged(search, held):
+        decision, found, _, refuted = judged(search, None)
+        gain = held.gain(decision) if held is not None and decision.named else None
+        return decision, found, gain, refuted
+
+    stack.enter_context(patch.object(refutation, "judged", unjudged))
+
+
+def _no_baseline(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(baseline, "lacking", lambda *given: ""))
+
+
+def _no_practical_size(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(posterior, "practical", lambda search, one: one.causes))
+
+
+def _no_share_of_causes(stack: ExitStack) -> None:
+    """A name stands beside whatever remains."""
+    stack.enter_context(patch.object(thresholds, "MOST", 0.0))
+
+
+def _fixed_time_scale(stack: ExitStack) -> None:
+    """Segments of 30 s whatever the ship."""
+    as_they_are = lambda run, nominal, recorded: (nominal, recorded)  # noqa: E731
+    stack.enter_context(patch.object(trial, "in_ship_time", as_they_are))
+
+
+def _learned_anew(stack: ExitStack) -> None:
+    """What is kept in the cache was learned with the part."""
+    learned = lambda *given: nominal_campaign.characteristics(*given)  # noqa: E731
+    stack.enter_context(patch.object(remembered, "characteristics", learned))
+
+
+PARTS: Mapping[str, Callable[[ExitStack], None]] = {
+    WHOLE: lambda stack: None,
+    "placebo": _no_placebo,
+    "form-error": _no_form_error,
+    "discrepancy": _no_discrepancy,
+    "voyage-effects": _voyages_alike,
+    "share-of-trial": _whole_share,
+    "robust-weights": _no_robust_weights,
+    "refutation": _no_refutation,
+    "baseline": _no_baseline,
+    "practical-size": _no_practical_size,
+    "share-of-causes": _no_share_of_causes,
+    "time-scale": _fixed_time_scale,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] in PARTS:
+        with ExitStack() as stack:
+            PARTS[given[0]](stack)
+            sys.argv = ["shiplog", *given[1:]]
+            cli.main()
+        return 0
+    parser = argparse.ArgumentParser(
+        prog="python -m pipelines.hidden_effects.without",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--ablate", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
+    asked = parser.parse_args(given)
+    print(table(asked.ablate, asked.only, asked.jobs))
+    return 0
+
+
+def table(source: Path, parts: Sequence[str], jobs: int) -> str:
+    """One line a part: cases, right, misnamed, and how many answers differ from the whole's."""
+    rows, whole = [], {}
+    for part in parts:
+        out = source.with_name(f"{source.name}-without") / part
+        command = (sys.executable, "-m", "pipelines.hidden_effects.without", part)
+        replay.replay(source, out, Settings(jobs=jobs, shiplog=command))
+        answers = {a.planned.label: a for a in score.read(out).answers}
+        if part == WHOLE:
+            whole = {label: _said(a) for label, a in answers.items()}
+        other = sum(label in whole and _said(a) != whole[label] for label, a in answers.items())
+        rows.append((
+            part, len(answers), sum(a.right for a in answers.values()),
+            sum(a.misnamed for a in answers.values()), other,
+        ))  # fmt: skip
+    head = ("without", "cases", "right", "misnamed", "other answer than as it is")
+    return f"{shlex.join(sys.argv)}\n\n{report.table(head, rows)}"
+
+
+def _said(answer: score.Answer) -> tuple:
+    return answer.word, answer.named, answer.family
+
+
+if __name__ == "__main__":
+    sys.exit(main())
