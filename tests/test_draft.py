@@ -167,7 +167,8 @@ def test_a_table_drafts_what_converts_it(tmp_path):
     assert not done.refused
     table = ingest(done.logs[0], profile).table
     assert table["time"][0].isoformat() == "2024-05-01T00:00:00+00:00"
-    assert table["surge"][0] == pytest.approx(4 * 1852 / 3600 * math.cos(math.radians(10)))
+    # Over ground 4 kn towards 10 deg, the bow at 100 deg: the ship goes straight to port.
+    assert table["sway"][0] == pytest.approx(-4 * 1852 / 3600)
     assert table["rudder"][0] == pytest.approx(math.radians(3.0))
     assert table["pwm_1"][10] == pytest.approx(0.5)
 
