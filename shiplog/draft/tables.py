@@ -69,7 +69,8 @@ SINGLE = {  # where the contract puts a sensor of a table: topic, fields, units
 FIELDS = {"rudder": ("angle_deg", "deg"), "azimuth": ("angle_deg", "deg"),
           "propeller": ("speed_rps", "rps"), "thruster": ("command", None)}  # fmt: skip
 TURNING = ("deg/s", "rad/s", "deg/min")
-FULL_TURN_RAD = 6.3  # an angle that never passes it may be radians
+FULL_TURN_RAD = 6.3  # a heading that never passes it may be in radians
+HARD_OVER_RAD = 1.3  # and so may a rudder angle
 PULSES_US = (800.0, 2200.0)  # a servo's pulses, neutral in the middle
 NO_ACTUATION = re.compile(r"thrust_n|torque|force|power|current|voltage|temp|zero|neutral|_kw|load")
 TWINS = 0.99999  # correlation of two columns that hold one value twice
@@ -198,7 +199,8 @@ def _found(values: pl.Series, channel: str, usual: str, table: Table) -> Found:
         "latitude", "longitude",
     ):  # fmt: skip
         most = values.cast(pl.Float64).fill_nan(None).abs().max()
-        if isinstance(most, float) and 0 < most < FULL_TURN_RAD and usual == "deg":
+        limit = FULL_TURN_RAD if channel else HARD_OVER_RAD
+        if isinstance(most, float) and 0 < most < limit and usual == "deg":
             unit = "rad"
     sure = channel in ("latitude", "longitude")
     return Found(values.name, channel, unit, check or ("" if sure else "CHECK: unit not stated"))
