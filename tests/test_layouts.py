@@ -17,6 +17,7 @@ import pytest
 from pipelines.convert import convert
 from shiplog import profile as profiles
 from shiplog.ingest import ingest
+from shiplog.logs.read import contents, read
 from shiplog.logs.write import Series, write_log
 
 START = 1_617_969_600.0  # 2021-04-09 12:00:00 UTC
@@ -271,8 +272,8 @@ def nmea(v: Voyage, i: int) -> list[str]:
     speed, day = SPEED * 3600 / 1852, iso(v.unix[i], "%d%m%y")[:6]
     return [
         sentence(f"GPGGA,{when},{where},4,12,0.7,3.0,M,40.0,M,,"),
-        sentence(f"GPRMC,{when},A,{where},{speed:.5f},{v.course_deg[i]:.4f},{day},,,A"),
         sentence(f"HEHDT,{v.heading_deg[i]:.4f},T"),
+        sentence(f"GPRMC,{when},A,{where},{speed:.5f},{v.course_deg[i]:.4f},{day},,,A"),
         sentence(f"TIROT,{np.degrees(RATE) * 60:.4f},A"),
         sentence(f"WIMWV,{v.wind_angle[i]:.3f},R,{v.wind_speed[i]:.4f},M,A"),
         sentence(f"ERRPM,S,1,{v.rps[i] * 60:.3f},,A"),
@@ -409,6 +410,7 @@ def test_5_and_6_ros_bags_of_a_usv(tmp_path, generation):
         writer = Writer2(source, version=8, storage_plugin=StoragePlugin.SQLITE3)
         ros_bag(v, writer, get_typestore(Stores.ROS2_HUMBLE))
     (path,) = converted(tmp_path, source, None)
+    assert read(path).frames["/imu/data"]["log_time"].to_list() == v.ns.tolist()
     profile = profiles.parse(ROS_PROFILE + DATUM, "usv")
     same(path, profile, ros_known(tmp_path, v))
 
@@ -522,8 +524,6 @@ Rudder = { channel = "rudder", unit = "deg" }
     profile = profile_of(*USUAL, table=table)
     (path,) = converted(tmp_path, tmp_path / "daq.txt", profile)
     same(path, profile, direct(tmp_path, profile, v))
-    from shiplog.logs.read import contents
-
     topics = contents(path).topics
     assert topics["/gnss/fix"].messages == 121 and topics["/gyro"].messages == 601
 
