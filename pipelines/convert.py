@@ -1,197 +1,107 @@
-"""Tables of other people's making to contract MCAP, through a profile's [table] section."""
+"""Tables, NMEA 0183 text and ROS bags to MCAP logs of the contract."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-import numpy as np
-import polars as pl
-
-from shiplog import units
-from shiplog.channels import WIND
-from shiplog.exceptions import ChannelMissing, ProfileError, ShiplogError, listed, nearest
+from shiplog.conversion import columns
+from shiplog.conversion.delimited import is_table, read_table
+from shiplog.conversion.heartbeat import saying
+from shiplog.conversion.nmea import is_nmea, read_nmea
+from shiplog.conversion.topics import folder_to_series
+from shiplog.draft import draft as draft_log
+from shiplog.draft import draft_table
+from shiplog.exceptions import ProfileError, ShiplogError
+from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.write import Series, write_log
-from shiplog.profile import Profile, Source
+from shiplog.profile import Profile
 
 log = logging.getLogger(__name__)
 
-SCHEMAS = {  # the contract's topic to its schema
-    "/ship/state": "shiplog.ShipState", "/wind/apparent": "shiplog.Wind", "/gyro": "shiplog.Gyro",
-    "/gnss/velocity": "shiplog.GnssVelocity", "/gnss/fix": "foxglove.LocationFix",
-}  # fmt: skip
-FAMILIES = {
-    "rudder": "shiplog.Rudder",
-    "propeller": "shiplog.Propeller",
-    "azimuth": "shiplog.Azimuth",
-    "thruster": "shiplog.Thruster",
-}
+
+@dataclass
+class Converted:
+    """The logs that were written, what was refused, and what of the others was lost."""
+
+    logs: list[Path] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
 
 
-def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path], dict[str, str]]:
-    """Each table, or each voyage in it, to one log. Returns the logs and what was refused."""
-    written: list[Path] = []
-    refused: dict[str, str] = {}
-    for path in tables:
+def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converted:
+    """Each source, or each voyage in it, to one log. One that is refused does not stop the rest.
+
+    profile  says what a single table's columns are; NMEA, bags and folders do without
+    """
+    done = Converted()
+    for path in sources:
         try:
-            if path.is_dir():
-                written.append(convert_topics(path, profile, out))
-                continue
-            for name, table in voyages(read_table(path), profile, path):
-                target = out / f"{name}.mcap"
+            with saying(f"{path.name}: converting"):
                 out.mkdir(parents=True, exist_ok=True)
-                write_log(
-                    target,
-                    series(table, profile),
-                    ship=profile.ship.name,
-                    datum=profile.site.datum,
-                    notes={"table": path.name},
-                )
-                log.info("%s: %d rows", target.name, table.height)
-                written.append(target)
+                for target in _each(path, profile, out, done):
+                    done.logs.append(target)
         except ShiplogError as error:
-            refused[str(path)] = str(error)
-    return written, refused
+            done.refused[str(path)] = str(error)
+    return done
 
 
-def read_table(path: Path) -> pl.DataFrame:
-    """A CSV or Parquet file. Raises ChannelMissing for anything else."""
-    readers = {".parquet": pl.read_parquet, ".csv": pl.read_csv}
-    if path.suffix.lower() not in readers or not path.is_file():
-        raise ChannelMissing(f"{path} is no table.", hint="give .parquet or .csv files.")
-    try:
-        return readers[path.suffix.lower()](path)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise ChannelMissing(f"{path} cannot be read: {error}.", hint="check the file.") from error
+def draft(path: Path, vessel: str | None = None) -> str:
+    """TOML text of a profile for a log, a table, or what first has to become a log."""
+    with saying(f"{path.name}: drafting"):
+        if not path.exists() or path.suffix.lower() == ".mcap":
+            return draft_log(path, vessel)
+        if is_table(path) and not is_nmea(path):
+            return draft_table(path, vessel)
+        if not (is_bag(path) or is_nmea(path) or path.is_dir()):
+            return draft_log(path, vessel)
+        with TemporaryDirectory() as folder:
+            (target,) = _each(path, None, Path(folder), Converted())
+            return draft_log(target, vessel)
 
 
-def voyages(
-    table: pl.DataFrame, profile: Profile, path: Path
-) -> Iterator[tuple[str, pl.DataFrame]]:
-    """The table in SI under canonical names, one part a voyage. Raises ChannelMissing.
-
-    Rows without a time are dropped; where the profile names no voyage column, the file is one.
-    """
-    if not profile.table:
-        raise ProfileError(
-            f"The profile {profile.source} has no [table] section.",
-            hint="say which column is which channel there.",
-        )
-    # Two sources of one ship may name a column differently; what is not in this table is left out.
-    present = {name: c for name, c in profile.table.items() if name in table.columns}
-    wanted = {"time", *profile.columns}
-    lacking = wanted - {c.channel for c in present.values()}
-    if lacking:
-        column = next((n for n, c in profile.table.items() if c.channel in lacking), "")
-        raise ChannelMissing(
-            f"{path.name} has no column for {listed(lacking)}"
-            f"{nearest(column, table.columns)}. Columns found: {listed(table.columns)}.",
-            hint=f"name the columns in the [table] section of {profile.source}.",
-        )
-    si = table.select(
-        *[
-            ((pl.col(name).cast(pl.Float64) - c.offset) * c.sign * units.factor(c.unit)).alias(
-                c.channel
-            )
-            for name, c in present.items()
-            if c.channel != "voyage"
-        ],
-        *[
-            pl.col(n).cast(pl.String).alias("voyage")
-            for n, c in present.items()
-            if c.channel == "voyage"
-        ],
-    ).filter(pl.col("time").is_not_null() & pl.col("time").is_not_nan())
-    dropped = table.height - si.height
-    if dropped:
-        log.warning("%s: %d rows without a time left out", path.name, dropped)
-    if "voyage" not in si.columns:
-        yield path.stem, si
-        return
-    for (name,), part in si.group_by("voyage", maintain_order=True):
-        yield str(name), part.drop("voyage")
-
-
-def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
-    """SI columns back into each topic's fields and units: what the profile will read again."""
-    time = np.round(table["time"].to_numpy() * 1e9).astype(np.int64)
-    sources: list[tuple[Source, tuple[str, ...]]] = []
-    state = {
-        "position": ("x0", "y0"), "velocity": ("surge", "sway"), "heading": ("heading",),
-        "yaw_rate": ("yaw_rate",), "wind": tuple(c.name for c in WIND),
-    }  # fmt: skip
-    reduced = {
-        "position": "local",
-        "velocity": "body",
-        "heading": "angle",
-        "yaw_rate": "rate",
-        "wind": "from_bow",
-    }
-    for name, sensor in profile.sensors.items():
-        if profile.sensors.kind(name) != reduced[name]:
+def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
+    ship = profile.ship.name if profile else path.stem
+    target = out / f"{path.stem if path.is_file() else path.name}.mcap"
+    if is_bag(path):
+        if left_out := bag_to_log(path, target, ship):
+            done.lost[str(path)] = "; ".join(f"{t}: {why}" for t, why in left_out.items())
+        log.info("%s written", target.name)
+        yield target
+    elif path.is_dir():
+        parts = folder_to_series(path, profile)
+        yield _written(target, parts, profile, ship, path)
+    elif is_nmea(path):
+        parts, damaged = read_nmea(path)
+        if damaged:
+            done.lost[str(path)] = f"{damaged} damaged sentences"
+        yield _written(target, parts, profile, ship, path)
+    else:
+        if profile is None:
             raise ProfileError(
-                f"The profile {profile.source} reads {name} as {profile.sensors.kind(name)!r}; a "
-                f"table holds it as {reduced[name]!r} at midship.",
-                hint="convert with a profile whose sensors read /ship/state.",
+                f"{path.name} is a table, and only a profile says what its columns are.",
+                hint=f"draft one with `shiplog profile {path} --out my-ship.toml`, look it over, "
+                "and give it with --profile.",
             )
-        sources.append((sensor, state[name]))
-    sources += [(actuator, (actuator.name,)) for actuator in profile.actuators]
-    topics: dict[str, dict[str, np.ndarray]] = {}
-    for source, names in sources:
-        columns = topics.setdefault(source.topic, {})
-        for name, path, (offset, factor) in zip(names, source.paths, source.scale(), strict=True):
-            columns[path] = table[name].fill_null(np.nan).to_numpy() / factor + offset
-    rate = 1e9 / float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    return [
-        Series(
-            topic,
-            _schema(topic),
-            time,
-            columns,
-            frame_id="midship",
-            metadata={"nominal_hz": f"{rate:.3g}", "clock": "of the table"},
-        )
-        for topic, columns in topics.items()
-    ]
+        for name, part in columns.voyages(read_table(path, profile.table), profile, path):
+            series = columns.series(part, profile)
+            yield _written(out / f"{name}.mcap", series, profile, ship, path)
 
 
-def convert_topics(folder: Path, profile: Profile, out: Path) -> Path:
-    """A folder with one table a topic (`a__b.parquet` is /a/b), as dumped from a ROS bag.
-
-    Columns `log_time_ns` and `stamp_ns` are the recorder's and the message's clock; every other
-    numeric column becomes a field. Nothing is aligned here: that is what ingest is for.
-    """
-    parts: list[Series] = []
-    for path in sorted(folder.glob("*.parquet")):
-        table = pl.read_parquet(path)
-        if "log_time_ns" not in table.columns:
-            continue
-        table = table.filter(pl.col("log_time_ns").is_not_null()).sort("log_time_ns")
-        stamp = "stamp_ns" if "stamp_ns" in table.columns else "log_time_ns"
-        fields = [n for n, t in table.schema.items() if t.is_numeric() and not n.endswith("_ns")]
-        if not fields or table.height == 0:
-            continue
-        parts.append(
-            Series(
-                topic="/" + path.stem.replace("__", "/"),
-                schema=f"shiplog.table.{path.stem.replace('__', '_')}",
-                time=table[stamp].fill_null(strategy="forward").to_numpy(),
-                columns={n: table[n].cast(pl.Float64).fill_null(np.nan).to_numpy() for n in fields},
-                log_time=table["log_time_ns"].to_numpy(),
-            )
-        )
-    if not parts:
-        raise ChannelMissing(
-            f"{folder} holds no table with a column log_time_ns.",
-            hint="give one .parquet a topic, or a single table.",
-        )
-    target = out / f"{folder.name}.mcap"
-    out.mkdir(parents=True, exist_ok=True)
-    write_log(target, parts, ship=profile.ship.name, datum=profile.site.datum)
-    log.info("%s: %d topics", target.name, len(parts))
+def _written(
+    target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
+) -> Path:
+    there = target.exists()
+    datum = profile.site.datum if profile else None
+    write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
+    log.info(
+        "%s: %d topics, %d rows%s",
+        target.name,
+        len(parts),
+        max((len(p.time) for p in parts), default=0),
+        ", in place of the one that was there" if there else "",
+    )
     return target
-
-
-def _schema(topic: str) -> str:
-    return SCHEMAS.get(topic) or FAMILIES.get(topic.strip("/").split("/")[0], "shiplog.Values")

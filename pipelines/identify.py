@@ -43,6 +43,7 @@ def identify_run(
     split, began = config.split, time.time()
     used = [*split.training, *split.validation]
     profile = store.profile(used)
+    profile.require_actuators()
     rows = seconds(store, used, profile)
     refuse_shared_rows(rows, split)
     learnt = rows.filter(pl.col("voyage").is_in(split.training))

@@ -81,6 +81,7 @@ def choose_physical_split(
 
 def _deal(store: Store, names: list[str], size: int) -> Split:
     profile = store.profile(names)
+    profile.require_actuators()
     rows = seconds(store, names, profile)
     whole = plan(rows, "ref", size).group_by("voyage").len()
     counts = dict(whole.iter_rows())

@@ -38,6 +38,7 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     """Train every seed of a run; goes on where an interrupted one stopped. Raises ShiplogError."""
     split = config.split
     profile = store.profile([*split.training, *split.validation])
+    profile.require_actuators()
     rows = seconds(store, [*split.training, *split.validation], profile)
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))

@@ -179,42 +179,56 @@ def _leave(done) -> None:
 @app.command()
 def convert(
     tables: Annotated[
-        list[Path], typer.Argument(help="CSV or Parquet tables, or folders of one table a topic.")
-    ],
-    profile: Annotated[
-        str, typer.Option("--profile", help="The profile whose [table] section names the columns.")
+        list[Path],
+        typer.Argument(
+            help="CSV or Parquet tables, folders of one table a topic, NMEA 0183 text, ROS bags."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--profile",
+            help="The profile whose [table] section names the columns; NMEA and bags need none.",
+        ),
+    ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables to contract MCAP.
+    """Tables, NMEA 0183 text and ROS bags to contract MCAP.
 
     Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
     """
     from pipelines.convert import convert as convert_tables
     from shiplog import profile as profiles
 
-    written, refused = convert_tables(tables, profiles.load(profile), out)
-    content = {"contract": 1, "logs": [str(path) for path in written], "refused": refused}
-    _answer(f"{len(written)} logs in {out}", content, json_to)
-    for path, why in refused.items():
+    done = convert_tables(tables, profiles.load(profile) if profile else None, out)
+    content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}
+    _answer(f"{len(done.logs)} logs in {out}", content | {"lost": done.lost}, json_to)
+    for path, why in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {why}", err=True)
-    if refused:
-        raise typer.Exit(LOST if written else 1)
+    for path, what in done.lost.items():
+        typer.echo(f"{Path(path).name}: not converted: {what}", err=True)
+    if done.refused or done.lost:
+        raise typer.Exit(LOST if done.logs else 1)
 
 
 @app.command()
 def profile(
-    log: Annotated[Path, typer.Argument(help="An MCAP log of an unknown ship.")],
+    log: Annotated[
+        Path, typer.Argument(help="A log, table, folder of tables, NMEA text or bag of some ship.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Write the draft here, not to stdout.")] = None,
+    vessel: Annotated[
+        str | None, typer.Option(help="Which ship, where the log holds many: its MMSI or name.")
+    ] = None,
 ) -> None:
-    """Draft a ship profile from a log's topics, schemas and units.
+    """Draft a ship profile from a log's topics, or a table's columns.
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
-    from shiplog.draft import draft
+    from pipelines.convert import draft
 
-    text = draft(log)
+    text = draft(log, vessel)
     if out is None:
         typer.echo(text)
     elif out.exists():

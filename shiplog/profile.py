@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -120,6 +120,28 @@ WIDTH = {
 }
 
 
+# What a table's column may hold, sensor by sensor and kind by kind, in the order of its fields.
+TABLE_CHANNELS = {
+    ("position", "geodetic"): ("latitude", "longitude"),
+    ("position", "local"): ("x0", "y0"),
+    ("velocity", "sog_cog"): ("sog", "cog"),
+    ("velocity", "body"): ("surge", "sway"),
+    ("velocity", "ned"): ("velocity_north", "velocity_east"),
+    ("velocity", "enu"): ("velocity_east", "velocity_north"),
+    ("heading", "angle"): ("heading",),
+    ("heading", "quaternion_enu"): ("quaternion_z", "quaternion_w"),
+    ("heading", "quaternion_ned"): ("quaternion_z", "quaternion_w"),
+    ("yaw_rate", "rate"): ("yaw_rate",),
+    ("wind", "from_bow"): ("wind_speed", "wind_angle"),
+}
+LABELS = (
+    "time",
+    "date",
+    "voyage",
+    "vessel",
+)  # columns of a table that say whose row it is, and when
+
+
 class Sensors(Section):
     position: Sensor
     velocity: Sensor
@@ -193,20 +215,40 @@ class Site(Section):
 
 
 class Column(Section):
-    """One column of a table that `convert` turns into a log."""
+    """One column of a table that `convert` turns into a log: a key of [table] is its name.
+
+    channel  what it holds. Position: `latitude` and `longitude`, or `x0` and `y0` (north and east
+             of a datum). Velocity: `sog` and `cog`, `velocity_north` and `velocity_east`, or
+             `surge` and `sway`. `heading`, or `quaternion_z` and `quaternion_w`; `yaw_rate`;
+             `wind_speed` and `wind_angle`; any actuator by its name. Which of them are needed
+             follows from the `kind` of each sensor. `time` is the row's time; `date` stands beside
+             a `time` that is a time of day; `voyage` cuts the table into one log a value; `vessel`
+             tells the ships of a table apart
+    unit     of numbers, such as "deg" or "kn". Of a time "s", "ms", "us" or "ns"; without one it is
+             Unix time by its size, or else seconds from any start
+    sign     -1 turns the column round
+    offset   the value that stands for zero, in the column's unit
+    format   of a time or date that is no ISO text, in strptime's letters: "%d.%m.%Y %H:%M:%S"
+    only     of a `vessel` column: the one value whose rows are this ship's
+    """
 
     channel: str
-    unit: str = "1"
+    unit: str | None = None
     sign: float = 1.0
     offset: float = 0.0
+    format: str | None = None
+    only: str | int | None = None
 
 
 class Profile(Section):
-    """A ship, its sensors and actuators, and where they are measured."""
+    """A ship, its sensors and actuators, and where they are measured.
+
+    Without actuators a log can be ingested and its sensors checked; no model can be trained.
+    """
 
     ship: Ship
     sensors: Sensors
-    actuators: Annotated[tuple[Actuator, ...], Field(min_length=1)]
+    actuators: tuple[Actuator, ...] = ()
     site: Site = Site()
     table: dict[str, Column] = {}
     source: str = Field(default="", exclude=True)  # name or path it was loaded from
@@ -214,22 +256,35 @@ class Profile(Section):
     @model_validator(mode="after")
     def _names(self) -> Profile:
         names = [actuator.name for actuator in self.actuators]
-        canonical = {c.name for c in (*channels.STATE, *channels.WIND)} | {"time", "quality"}
-        doubled = {name for name in names if names.count(name) > 1 or name in canonical}
+        canonical = {c.name for c in (*channels.STATE, *channels.WIND)} | {"quality"}
+        columns = {name for pair in TABLE_CHANNELS.values() for name in pair} | {*LABELS}
+        taken = canonical | columns
+        doubled = {name for name in names if names.count(name) > 1 or name in taken}
         if doubled:
             raise ValueError(f"actuator name(s) already taken: {listed(doubled)}")
-        known = canonical - {"quality"} | set(names) | {"voyage"}
+        known = columns | set(names)
         for column, entry in self.table.items():
             if entry.channel not in known:
                 raise ValueError(
                     f"[table] {column!r} is meant for the channel {entry.channel!r}, which this "
-                    f"ship does not have{nearest(entry.channel, known)}"
+                    f"ship does not have{nearest(entry.channel, known)}. "
+                    f"Its channels: {listed(known, most=len(known))}"
                 )
         return self
 
     @property
     def actuator_names(self) -> tuple[str, ...]:
         return tuple(actuator.name for actuator in self.actuators)
+
+    def require_actuators(self) -> None:
+        """Raises ProfileError where there is none: a model's inputs are the actuators."""
+        if not self.actuators:
+            raise ProfileError(
+                f"The profile of {self.ship.name} has no actuators, and a model needs at least "
+                "one: without them its voyages can be ingested and its sensors checked, no more.",
+                hint="add an [[actuators]] section for each rudder, propeller or thruster to "
+                f"{self.source or 'the profile'}, and ingest the logs again.",
+            )
 
     @property
     def has_wind(self) -> bool:
@@ -314,7 +369,7 @@ def parse(text: str, source: str) -> Profile:
         for item in (*(s for _, s in profile.sensors.items()), *profile.actuators):
             item.scale()  # a unit that is not known is said now, not in the middle of a log
         for column in profile.table.values():
-            units.factor(column.unit)
+            units.factor(column.unit or "1")
         return profile
     except ValidationError as error:
         raise ProfileError(

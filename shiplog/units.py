@@ -8,7 +8,7 @@ from shiplog.exceptions import ProfileError, listed, nearest
 TO_SI = {
     "1": 1.0, "%": 0.01, "permille": 0.001,
     "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048,
-    "m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6,
+    "m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6, "mph": 0.44704,
     "kn": 1852 / 3600, "knots": 1852 / 3600,
     "rad": 1.0, "deg": DEGREE,
     "rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60,

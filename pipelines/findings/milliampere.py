@@ -89,7 +89,7 @@ def _from_motion(folder: Path, out: Path, voyages: Sequence[str]) -> str:
         ordered = variant("milliampere", out / "milliampere-ordered.toml", _as_ordered)
         for name, prefix in (("milliampere", ""), (str(ordered), "ordered_")):
             logs = out / f"milliampere-logs{prefix}"
-            made, _ = convert([folder / v for v in voyages], profiles.load(name), logs)
+            made = convert([folder / v for v in voyages], profiles.load(name), logs).logs
             named = [p.rename(p.with_name(f"{prefix}{p.name}")) for p in made]
             ingest_logs(named, name, store)
     there = [e.name for e in store.entries()]

@@ -1,0 +1,157 @@
+"""The times of a table, in whatever form they stand there, as nanoseconds since 1970."""
+
+from __future__ import annotations
+
+import polars as pl
+
+from shiplog import units
+from shiplog.exceptions import ProfileError
+
+NANOS = 1_000_000_000
+DAY_NS = 86_400 * NANOS
+# A number without a unit is Unix time if it then lies between 2000 and 2100; these ranges do not
+# overlap. Anything else is seconds from a start of its own.
+UNIX = (("s", 1), ("ms", 1_000), ("us", 1_000_000), ("ns", 1_000_000_000))
+YEAR_2000, YEAR_2100 = 946_684_800, 4_102_444_800  # s
+LONGEST_STEP_S = 60.0  # no ship's motion is recorded more slowly: the numbers are not seconds
+# A date must come whole: "3/4/2024" is two days, and only the other rows can say which.
+DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
+SLASHED = ("%d/%m/%Y", "%m/%d/%Y")
+TIMES = ("%H:%M:%S%.f", "%H:%M")
+
+
+def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
+    """Times [Int64, ns], null where there is none.
+
+    values  datetimes, ISO or other texts, or numbers
+    unit    of numbers; without one, Unix seconds, ms, µs or ns by their size, else seconds
+    form    how a text is written, in strptime's letters, where it is not ISO
+
+    A time without a zone is taken as UTC. A time of day without a date counts from 1970-01-01
+    and goes on past midnight. Raises ProfileError where a text can be read in two ways or in none.
+    """
+    dtype = values.dtype
+    if isinstance(dtype, pl.Datetime):
+        return values.cast(pl.Datetime("ns", dtype.time_zone)).to_physical()
+    if isinstance(dtype, pl.Duration):
+        return values.cast(pl.Duration("ns")).to_physical()
+    if dtype == pl.Date:
+        return values.cast(pl.Datetime("ns")).to_physical()
+    if dtype == pl.Time:
+        return past_midnight(values.to_physical())
+    if dtype == pl.String:
+        number = number_of(values)
+        if form is None and number.null_count() == _blank(values):
+            return _counted(number, unit)
+        return _written(values, form)
+    if not dtype.is_numeric():
+        raise ProfileError(
+            f"The column {values.name!r} holds {dtype}, which is no time.",
+            hint='name another column as { channel = "time" } in [table].',
+        )
+    return _counted(values, unit)
+
+
+def dates(values: pl.Series, form: str | None = None) -> pl.Series:
+    """Midnights [Int64, ns] of a column of dates. Raises ProfileError."""
+    if values.dtype == pl.Date or isinstance(values.dtype, pl.Datetime):
+        return values.cast(pl.Date).cast(pl.Datetime("ns")).to_physical()
+    if values.dtype.is_numeric():
+        values = values.cast(pl.Int64).cast(pl.String).str.zfill(6)
+    return _best(values, (form,) if form else (*DATES, *SLASHED), pl.Date)
+
+
+def past_midnight(of_day: pl.Series) -> pl.Series:
+    """Times of day [ns] that go on counting past midnight.
+
+    Half a day back is a midnight: a step back by less is a late row, and stays one.
+    """
+    rises = (of_day.forward_fill().diff().fill_null(0) < -DAY_NS // 2).cast(pl.Int64).cum_sum()
+    return of_day + rises * DAY_NS
+
+
+def number_of(texts: pl.Series) -> pl.Series:
+    """Texts as numbers, decimal commas too; null where a text is none."""
+    stripped = texts.str.strip_chars()
+    number = stripped.cast(pl.Float64, strict=False)
+    if number.null_count() == _blank(texts):
+        return number
+    comma = stripped.str.replace(r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", "$1.$2")
+    return comma.cast(pl.Float64, strict=False)
+
+
+def _blank(texts: pl.Series) -> int:
+    return int((texts.is_null() | (texts.str.strip_chars() == "")).sum())
+
+
+def _counted(values: pl.Series, unit: str | None) -> pl.Series:
+    """Numbers to ns; whole ones exactly: a float of seconds holds this century to 0.2 µs."""
+    if unit is None:
+        most = float(values.cast(pl.Float64).fill_nan(None).abs().median() or 0.0)  # type: ignore[arg-type]
+        fitting = [n for n, per in UNIX if YEAR_2000 <= most / per < YEAR_2100]
+        step = float(values.cast(pl.Float64).diff().abs().median() or 0.0)  # type: ignore[arg-type]
+        if not fitting and step > LONGEST_STEP_S:
+            raise ProfileError(
+                f"The times of column {values.name!r} step by {step:g}, and are no Unix time.",
+                hint=f'say their unit in [table]: {values.name} = {{ channel = "time", '
+                'unit = "us" }, or "ms", or "ns".',
+            )
+        unit = fitting[0] if fitting else "s"
+    nanos = units.factor(unit) * 1e9
+    if values.dtype.is_integer() and nanos >= 1.0:
+        return values.cast(pl.Int64) * round(nanos)
+    exact = values.cast(pl.Float64).fill_nan(None)
+    whole = exact.floor()
+    rest = ((exact - whole) * nanos).round().cast(pl.Int64, strict=False)
+    if nanos >= 1.0:
+        return whole.cast(pl.Int64, strict=False) * round(nanos) + rest
+    return (exact * nanos).round().cast(pl.Int64, strict=False)
+
+
+def _written(values: pl.Series, form: str | None) -> pl.Series:
+    if form:
+        whole = any(part in form for part in ("%d", "%j", "%F", "%s", "%D", "%+"))
+        return _best(values, (form,), pl.Datetime) if whole else _of_day(values, (form,))
+    texts = values.str.strip_chars().str.replace(r"^(\S+) UTC$", "${1}Z")
+    clock = texts.drop_nulls().head(50)
+    if len(clock) and clock.str.contains(r"^\d{1,2}:\d\d(:\d\d)?").all():
+        return _of_day(texts, TIMES)
+    texts = texts.str.replace(r"^(\S+)[T ](\d{1,2}:)", "${1}T$2").str.replace(r" ?UTC$", "Z")
+    zoned = texts.drop_nulls().head(50).str.contains(r"T.*(Z|[+-]\d\d:?\d\d)$").all()
+    tail = "T%H:%M:%S%.f" + ("%#z" if zoned else "")
+    return _best(texts, [day + tail for day in (*DATES[:3], *SLASHED)], pl.Datetime)
+
+
+def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:
+    """Times of day; the day is put before them, since a text without one is no datetime."""
+    dated = ("1970-01-01T" + texts).rename(texts.name)
+    return past_midnight(_best(dated, ["%Y-%m-%dT" + form for form in forms], pl.Datetime))
+
+
+def _best(texts: pl.Series, forms, kind) -> pl.Series:
+    """The texts by the form that reads most of them. Raises ProfileError."""
+    read: list[tuple[int, str, pl.Series]] = []
+    for form in forms:
+        try:
+            if kind is pl.Date:
+                made = texts.str.to_date(form, strict=False).cast(pl.Datetime("ns"))
+            else:
+                zone = "UTC" if "%#z" in form or "%z" in form or form == "%+" else None
+                made = texts.str.to_datetime(form, strict=False, time_unit="ns", time_zone=zone)
+        except pl.exceptions.PolarsError:
+            continue  # a form that polars takes for nothing
+        read.append((len(made) - made.null_count(), form, made.to_physical()))
+    read.sort(key=lambda item: -item[0])
+    sample = next(iter(texts.drop_nulls()), "")
+    if not read or read[0][0] == 0:
+        raise ProfileError(
+            f"The times of column {texts.name!r}, such as {sample!r}, are in no known form.",
+            hint="say the form in [table], as format = '%d.%m.%Y %H:%M:%S'.",
+        )
+    if len(read) > 1 and read[0][0] == read[1][0] and not read[0][2].equals(read[1][2]):
+        raise ProfileError(
+            f"The times of column {texts.name!r}, such as {sample!r}, can be read with the day or "
+            "with the month first.",
+            hint=f"say which in [table]: format = {read[0][1]!r} or {read[1][1]!r}.",
+        )
+    return read[0][2].rename(texts.name)

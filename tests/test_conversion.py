@@ -1,0 +1,226 @@
+"""Times in every form, tables in every cut, and what is said of what cannot be converted."""
+
+import logging
+import time
+from datetime import datetime
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipelines.convert import convert
+from shiplog import profile as profiles
+from shiplog.conversion import clock, heartbeat
+from shiplog.conversion.delimited import read_table
+from shiplog.conversion.nmea import is_nmea, read_nmea
+from shiplog.exceptions import ChannelMissing, ProfileError
+from shiplog.ingest import ingest
+
+NOON = 1_617_969_600_000_000_000  # 2021-04-09 12:00:00 UTC, ns
+
+
+@pytest.mark.parametrize(
+    ("values", "unit"),
+    [
+        (["2021-04-09T12:00:00Z", "2021-04-09T12:00:00.500Z"], None),
+        (["2021-04-09T14:00:00+02:00", "2021-04-09T14:00:00.5+02:00"], None),
+        (["2021-04-09 12:00:00", "2021-04-09 12:00:00.5"], None),
+        (["2021/04/09 12:00:00", "2021/04/09 12:00:00.5"], None),
+        (["09.04.2021 12:00:00", "09.04.2021 12:00:00.5"], None),
+        ([1617969600, 1617969600.5], None),
+        ([1617969600000, 1617969600500], None),
+        ([1617969600000000, 1617969600500000], None),
+        ([NOON, NOON + 500_000_000], None),
+        (["1617969600,0", "1617969600,5"], None),
+        ([1617969600 / 60, 1617969600.5 / 60], "min"),
+    ],
+)
+def test_a_time_is_itself_in_every_form(values, unit):
+    found = clock.instants(pl.Series("t", values, strict=False), unit)
+    # A float of seconds or minutes holds this century to a fraction of a microsecond.
+    assert (found - pl.Series([NOON, NOON + 500_000_000])).abs().max() <= 5_000
+
+
+def test_datetimes_keep_their_instant_and_count_from_start_keep_theirs():
+    noon = datetime(2021, 4, 9, 12)
+    assert clock.instants(pl.Series([noon])).to_list() == [NOON]
+    zoned = pl.Series([noon]).dt.replace_time_zone("Europe/Oslo")
+    assert clock.instants(zoned).to_list() == [NOON - 2 * 3600 * 10**9]
+    assert clock.instants(pl.Series([0.0, 0.1, 0.25])).to_list() == [0, 10**8, 25 * 10**7]
+
+
+def test_a_time_of_day_goes_on_past_midnight():
+    found = clock.instants(pl.Series("t", ["23:59:59.5", "00:00:00.5"]))
+    assert found.diff().to_list()[1] == 10**9
+
+
+def test_times_that_can_be_read_in_two_ways_are_asked_for():
+    with pytest.raises(ProfileError, match="day or with the month first"):
+        clock.instants(pl.Series("t", ["03/04/2024 10:00:00", "03/04/2024 10:00:01"]))
+    (told,) = clock.instants(pl.Series("t", ["25/04/2024 10:00:00"]))
+    assert datetime.fromtimestamp(told / 1e9).month == 4
+    with pytest.raises(ProfileError, match="step by 100000"):
+        clock.instants(pl.Series("timestamp", [1_000_000, 1_100_000, 1_200_000]))
+    with pytest.raises(ProfileError, match="no known form"):
+        clock.instants(pl.Series("t", ["yesterday", "today"]))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a,b\n1.5,2\n2.5,3\n", "a;b\n1,5;2\n2,5;3\n", "a\tb\n1.5\t2\n2.5\t3\n",
+        "a|b\n1.5|2\n2.5|3\n",
+        "# a  b\n 1.5   2\n 2.5   3\n", "made by hand\n\na;b\n[m];[s]\n1,5;2\n2,5;3\n",
+        '"a","b"\r\n"1.5","2"\r\n"2.5","3"\r\n',
+    ],
+)  # fmt: skip
+def test_a_table_is_the_same_however_it_is_cut(tmp_path, text):
+    (tmp_path / "t.csv").write_bytes(text.encode())
+    frame = read_table(tmp_path / "t.csv").frame
+    assert frame.to_dict(as_series=False) == {"a": [1.5, 2.5], "b": [2, 3]}
+
+
+PROFILE = """[ship]
+name = "s"
+length_m = 5.0
+[sensors.position]
+kind = "local"
+topic = "/ship/state"
+fields = ["x0_m", "y0_m"]
+[sensors.velocity]
+kind = "body"
+topic = "/ship/state"
+fields = ["surge_mps", "sway_mps"]
+[sensors.heading]
+topic = "/gyro"
+field = "heading_deg"
+unit = "deg"
+[sensors.yaw_rate]
+topic = "/gyro"
+field = "yaw_rate_degps"
+unit = "deg/s"
+[table]
+t = "time"
+x = "x0"
+y = "y0"
+u = "surge"
+v = "sway"
+psi = { channel = "heading", unit = "deg" }
+sog = "sog"
+cog = { channel = "cog", unit = "deg" }
+"""
+
+
+def test_a_missing_yaw_rate_is_differentiated_and_said(tmp_path, caplog):
+    count = 100
+    turned = 350.0 + 2.0 * np.arange(count) / 10  # deg, through north
+    columns = {"t": np.arange(count) / 10, "psi": turned % 360}
+    pl.DataFrame(columns | {n: np.zeros(count) for n in "xyuv"}).write_csv(tmp_path / "t.csv")
+    profile = profiles.parse(PROFILE, "mine")
+    with caplog.at_level(logging.WARNING):
+        done = convert([tmp_path / "t.csv"], profile, tmp_path)
+    assert "no yaw rate" in caplog.text and "heading's derivative" in caplog.text
+    rate = ingest(done.logs[0], profile).table["yaw_rate"].to_numpy()
+    assert np.degrees(rate) == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_velocity_of_another_kind_says_which_kind_to_write(tmp_path):
+    (tmp_path / "t.csv").write_text("t,x,y,psi,sog,cog\n0,0,0,0,1,0\n1,1,0,0,1,0\n")
+    done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "mine"), tmp_path)
+    (why,) = done.refused.values()
+    assert "no column for surge, sway" in why and 'kind = "sog_cog"' in why
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_a_channel_that_does_not_exist_is_answered_with_those_that_do():
+    with pytest.raises(ProfileError, match="latitud") as refused:
+        profiles.parse(PROFILE + 'lat = "latitud"\n', "mine")
+    for channel in ("latitude", "longitude", "sog", "velocity_north", "heading", "time", "vessel"):
+        assert channel in str(refused.value).split("Its channels:")[1]
+
+
+def test_words_among_numbers_are_blanks_and_said(tmp_path, caplog):
+    rows = [f"{i / 10},{i},0,1,0,{'---' if i == 3 else 5.0}" for i in range(30)]
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *rows]))
+    profile = profiles.parse(PROFILE, "mine")
+    done = convert([tmp_path / "t.csv"], profile, tmp_path)
+    assert "1 values of psi are no numbers, such as '---'" in caplog.text
+    assert ingest(done.logs[0], profile).table["heading"].null_count() >= 1
+    assert not done.refused
+
+
+def test_rows_that_go_back_in_time_are_sorted_and_said(tmp_path, caplog):
+    rows = [f"{i / 10},{i},0,1,0,5" for i in range(30)]
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *reversed(rows)]))
+    profile = profiles.parse(PROFILE, "mine")
+    done = convert([tmp_path / "t.csv"], profile, tmp_path)
+    assert "goes back in time 29 times" in caplog.text
+    assert ingest(done.logs[0], profile).table["x0"].is_sorted()
+
+
+def test_a_table_without_rows_or_profile_is_refused(tmp_path):
+    (tmp_path / "t.csv").write_text("t,x\n")
+    assert "no row" in str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path))
+    assert "only a profile says" in str(convert([tmp_path / "t.csv"], None, tmp_path).refused)
+
+
+BURST = ["$GPGGA,101010.00,6326.4000,N,01025.2000,E,4,19,0.6,2.9,M,40.9,M,,",
+         "$GPRMC,101010.00,A,6326.4000,N,01025.2000,E,2.0,90.0,110425,,,A",
+         "$HEHDT,345.0,T", "$GPHDT,346.0,T", "$WIMWV,30.0,R,10.0,K,A", "$IIMWV,,R,,N,V",
+         "$AGRSA,-5.0,A,4.0,A", "$XXABC,1,2"]  # fmt: skip
+
+
+def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
+    """By hand: knots, minutes of arc, km/h; two headings are two topics; what is broken is said."""
+    caplog.set_level(logging.INFO)
+    lines = [*BURST, "$HEHDT,350.0,T*00", "!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24"]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    assert is_nmea(tmp_path / "a.nmea")
+    series, damaged = read_nmea(tmp_path / "a.nmea")
+    topics = {s.topic: {n: c.tolist() for n, c in s.columns.items()} for s in series}
+    assert topics["/gnss/fix"]["latitude"] == pytest.approx([63 + 26.4 / 60])
+    assert topics["/gnss/fix"]["longitude"] == pytest.approx([10 + 25.2 / 60])
+    assert topics["/gnss/velocity"]["sog_mps"] == pytest.approx([2 * 1852 / 3600])
+    assert topics["/gyro/he"] == {"heading_deg": [345.0]}
+    assert topics["/gyro/gp"] == {"heading_deg": [346.0]}
+    assert topics["/wind/apparent"] == {"speed_mps": [pytest.approx(10 / 3.6)],
+                                        "direction_deg": [30.0]}  # fmt: skip
+    assert topics["/rudder/starboard"] == {"angle_deg": [-5.0]}
+    assert topics["/rudder/port"] == {"angle_deg": [4.0]}
+    assert damaged == 1 and "1 damaged" in caplog.text and "not valid" in caplog.text
+    assert "VDM (1)" in caplog.text and "ABC (1)" in caplog.text
+    assert {int(t) for s in series for t in s.time} == {1_744_366_210_000_000_000}
+    done = convert([tmp_path / "a.nmea"], None, tmp_path)
+    assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
+
+
+def test_headings_between_two_fixes_are_spread_over_the_time_between_them(tmp_path):
+    lines = []
+    for second in range(3):
+        lines.append(f"$GPRMC,1010{second:02d}.00,A,6326.4,N,01025.2,E,2.0,90.0,110425,,,A")
+        lines += [f"$HEHDT,{10 * second + k}.0,T" for k in range(4)]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    series, _ = read_nmea(tmp_path / "a.nmea")
+    (heading,) = [s for s in series if s.topic == "/gyro"]
+    assert np.diff(heading.time).tolist() == [250_000_000] * 11
+
+
+def test_nmea_that_says_nothing_or_has_no_time_is_refused(tmp_path):
+    (tmp_path / "a.nmea").write_text("$XXABC,1,2\n")
+    with pytest.raises(ChannelMissing, match="Sentences found: ABC"):
+        read_nmea(tmp_path / "a.nmea")
+    (tmp_path / "b.nmea").write_text("$HEHDT,1.0,T\n")
+    with pytest.raises(ChannelMissing, match="has no time"):
+        read_nmea(tmp_path / "b.nmea")
+
+
+def test_long_work_speaks_and_short_work_does_not(caplog):
+    caplog.set_level(logging.INFO)
+    with heartbeat.saying("reading", every_s=0.01):
+        while "reading" not in caplog.text:
+            time.sleep(0.01)
+    spoken = len(caplog.records)
+    with heartbeat.saying("brief", every_s=60.0):
+        pass
+    assert len(caplog.records) == spoken
+    assert heartbeat.EVERY_S <= 2.0
