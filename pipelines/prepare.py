@@ -50,6 +50,7 @@ def ingest_logs(
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
     said: set[str] = set()
+    store.mend()  # or what a killed ingest left out of the catalogue stayed so, being "unchanged"
     for path in paths:
         try:
             found = contents(path)

@@ -18,6 +18,12 @@ LEAST_TOLERANCE_S = 0.15
 AROUND = 10  # samples on either side of a span that say whether a message is missing in it
 MOST_PERIODS = 3.0  # a longer span is a gap whatever the samples around it say
 
+# A stamp that is far from the others is another clock's: of a receiver before its first fix
+# (1970, 1980), of a week counter that rolled over, or of a damaged byte.
+STRAY_S = 60.0  # a silence that the recorder may not have heard; shorter ones cost 600 rows
+STRAY_SHARE = 0.01  # of the samples: as many across a shorter silence than a day are a voyage's
+DAY_S = 86_400.0  # no voyage is silent for so long, whatever any clock says
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -47,6 +53,39 @@ class OnGrid:
     gap: np.ndarray
     blank: np.ndarray
     spike: np.ndarray
+
+
+def strays(time: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Stamps [n] bool that cannot be of this voyage.
+
+    time, other  [n] ns: by the clock that counts, and by the recorder's or the publisher's
+
+    Silences of a minute and more cut the stamps into groups, and the largest is the voyage's. More
+    than a day from it, none belongs. A nearer group of a few samples belongs where the other clock
+    tells the same silence: a sensor that fell out and came back for a moment is data.
+    """
+    if len(time) < 2:
+        return np.zeros(len(time), bool)
+    order = np.argsort(time, kind="stable")
+    begins = np.flatnonzero(np.diff(time[order]) > STRAY_S * 1e9) + 1
+    groups = np.split(order, begins)
+    main = int(np.argmax([len(group) for group in groups]))
+    stray = np.zeros(len(time), bool)
+    difference = time - other
+    usual = np.median(difference[groups[main]])
+    for side in (range(main - 1, -1, -1), range(main + 1, len(groups))):
+        apart, near = False, groups[main]
+        for i in side:
+            group = groups[i]
+            silence = max(time[group].min() - time[near].max(), time[near].min() - time[group].max())
+            apart |= silence > DAY_S * 1e9
+            few = len(group) < STRAY_SHARE * len(time)
+            heard = abs(np.median(difference[group]) - usual) <= STRAY_S * 1e9
+            if apart or (few and not heard):
+                stray[group] = True
+            else:
+                near = group
+    return stray
 
 
 def ordered(time: np.ndarray, value: np.ndarray, tolerance_s: float | None) -> Samples:
