@@ -18,6 +18,7 @@ from shiplog.logs.check import check
 from shiplog.logs.read import Contents, contents
 from shiplog.profile import Profile
 from shiplog.store import Store
+from shiplog.unexpected import unexpected
 
 log = logging.getLogger(__name__)
 
@@ -71,6 +72,9 @@ def ingest_logs(
             state = store.add(voyage)
         except ShiplogError as error:
             refused[str(path)] = error
+            continue
+        except Exception as error:  # one bad log never ends the others
+            refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
         log.info(
@@ -131,6 +135,9 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
         except ShiplogError as error:
             refused[str(path)] = error
             continue
+        except Exception as error:  # one bad log never ends the others
+            refused[str(path)] = unexpected(error, path.name)
+            continue
         reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
     return Ingested(reports, refused)
 
@@ -139,7 +146,8 @@ def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
     """What ingest would say of the sensors against each other; nothing where it would refuse."""
     try:
         voyage = ingest(path, chosen or fitting_profile(contents(path)))
-    except ShiplogError as error:
-        log.info("%s: sensors not held against each other: %s", path.stem, error.message)
+    except Exception as error:
+        why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
+        log.info("%s: sensors not held against each other: %s", path.stem, why.message)
         return []
     return parity.findings(voyage.estimates, voyage.table.height, voyage.profile)

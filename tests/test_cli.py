@@ -177,6 +177,28 @@ def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
     assert code == 1 and not (tmp_path / "other").exists()
 
 
+def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path, monkeypatch):
+    """Its trace is kept, and its sentence says where."""
+    from pipelines import prepare
+
+    def broken(path, profile):
+        if path.stem == "trip_1":
+            raise ZeroDivisionError("of a kind that nobody foresaw")
+        return ingest(path, profile)
+
+    ingest = prepare.ingest
+    monkeypatch.setattr(prepare, "ingest", broken)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    code, _, said = call("ingest", logs, "--store", tmp_path / "store")
+    assert code == 3 and "trip_1.mcap refused" in said and "ZeroDivisionError" in said
+    assert "Traceback" not in said
+    (trace,) = (tmp_path / "cache").rglob("*.txt")
+    assert str(trace) in said and "in broken" in trace.read_text()
+    names = [v["name"] for v in json.loads(call("voyages", "--store", tmp_path / "store",
+                                                "--json", "-")[1])["voyages"]]  # fmt: skip
+    assert names == ["trip_2", "trip_3"]
+
+
 def test_the_same_name_with_other_content_is_refused_by_name(logs, store, tmp_path):
     clash = tmp_path / "trip_1.mcap"
     clash.write_bytes((logs / "trip_2.mcap").read_bytes())

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROWS = (  # each may import its own row (a package its own modules) and the rows above
     {"exceptions", "channels", "seeds", "cache"},
-    {"units", "findings", "traced"},
+    {"units", "findings", "traced", "unexpected"},
     {"profile", "config", "logs", "comparison", "exhibit"},
     {"align", "midship", "quality", "draft"},
     {"grid", "table", "parity", "parity_fit", "record", "variational"},
