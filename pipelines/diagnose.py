@@ -14,7 +14,7 @@ from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
-from shiplog import diagnose, page, runs, segments
+from shiplog import diagnose, page, runs, segments, user_causes
 from shiplog.decision import Decision
 from shiplog.diagnosis import placebo, refutation, search
 from shiplog.diagnosis import trial as diagnosis_trial
@@ -48,7 +48,10 @@ def diagnose_run(
     former   decide as the program did before hypotheses were weighed by one posterior
     """
     began = time.time()
-    run = runs.load(run_path)
+    if extend is not None:
+        runs.refuse_taken(extend, "--extend")
+    causes = user_causes.load(cause_files)
+    run = runs.load(run_path, causes)
     names = trial.voyages_of(run, store, voyages)
     profile = store.profile(names)
     if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
@@ -75,10 +78,10 @@ def diagnose_run(
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
     if former:
-        tried, untested = trial.trial_of(run, nominal, recorded, cause_files)
+        tried, untested = trial.trial_of(run, nominal, recorded, causes)
     else:
         lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
-        made = setup.trial_of(run, nominal, recorded, cause_files, lacking)
+        made = setup.trial_of(run, nominal, recorded, causes, lacking)
         tried, untested = made.trial, dict(made.untested)
         notes += [lacking] if lacking else []
     log.info(

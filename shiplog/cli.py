@@ -40,6 +40,10 @@ Voyages = Annotated[
     list[str] | None,
     typer.Option("--voyages", help="Names or shell patterns; can be given several times."),
 ]
+Causes = Annotated[
+    list[Path] | None,
+    typer.Option("--cause", help="A Python file with causes of your own; several times."),
+]
 STORE = Path("store")
 
 
@@ -348,6 +352,7 @@ def evaluate(
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
     voyages: Voyages = None,
     store: StoreOption = STORE,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """L, RMSE per channel, end errors, coverage, against two floors.
@@ -357,7 +362,7 @@ def evaluate(
     from pipelines.evaluate import evaluate_runs, save
     from shiplog.store import Store
 
-    found = evaluate_runs([run], Store(store), voyages or [])
+    found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     save(found)
     _answer(found.text(), found.answer(found.runs[0]), json_to)
 
@@ -371,6 +376,7 @@ def compare(
         Path | None, typer.Option(help="Write the recording here and open nothing.")
     ] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve it on 127.0.0.1.")] = False,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """Measured against simulated in Rerun.
@@ -380,7 +386,7 @@ def compare(
     from pipelines.evaluate import compare_runs
     from shiplog.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], save)
+    result = compare_runs(runs, Store(store), voyages or [], save, cause or [])
     _answer(result.text, result.content, json_to)
     if save is None:
         try:
@@ -401,10 +407,7 @@ def diagnose(
     extend: Annotated[
         Path | None, typer.Option(help="Write the model with the named causes as this run.")
     ] = None,
-    cause: Annotated[
-        list[Path] | None,
-        typer.Option("--cause", help="A Python file with causes of your own; several times."),
-    ] = None,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """What the simulation gets wrong, why, the extended model, and the gain on held-out voyages.

@@ -58,7 +58,7 @@ class Physics(Section):
     parameters: str = ""  # where the starting values are from
     without: tuple[str, ...] = ()  # forces switched off
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
-    substeps: int = Field(default=1, ge=1)  # Euler steps within each measured one
+    substeps: int = Field(default=1, ge=1, le=1000)  # Euler steps within each measured one
     folds: int = Field(default=5, ge=0)  # that voyages are held out in; below 2, none is
     # on the plausible spreads, for the ridge; to choose from on validation voyages
     ridges: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
@@ -120,7 +120,8 @@ def load(path: Path) -> Config:
     """A config from TOML. Raises RunError naming what is wrong."""
     try:
         return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: TOML's, UTF-8's, pydantic's
+        first = str(error).splitlines()[0] if isinstance(error, ValidationError) else error
         raise RunError(
-            f"{path} is no configuration of a run: {error}.", hint="train the run again."
+            f"{path} is no configuration of a run: {first}.", hint="train the run again."
         ) from error

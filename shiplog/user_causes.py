@@ -30,7 +30,7 @@ def load(paths: Sequence[Path]) -> tuple[Cause, ...]:
 def _of(path: Path) -> list[Cause]:
     name = f"shiplog_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None or not path.is_file():
+    if spec is None or spec.loader is None or not path.is_file() or path.suffix != ".py":
         raise RunError(
             f"{path} is no Python file.", hint="give --cause a file such as my_cause.py."
         )
