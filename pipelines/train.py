@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +61,10 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
     workers = max(1, min(cores, len(todo)))
-    with _one_thread(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with (
+        _one_thread(),
+        ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool,
+    ):
         futures = {pool.submit(train_seed, run.path, seed): seed for seed in todo}
         try:
             for future in as_completed(futures):
@@ -76,6 +81,10 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
                 "A training process was ended from outside, perhaps for want of memory.",
                 hint="give the same command again: finished seeds and checkpoints are kept.",
             ) from error
+        except BaseException:  # or the pool waits for seeds that may take hours
+            for process in active_children():
+                process.terminate()
+            raise
     run.save_band(_band(run, held))
     return run.finish(provenance(store, split, began))
 
@@ -87,6 +96,20 @@ def _band(run: Run, held: pl.DataFrame) -> band.Band:
     error = np.concatenate([states - unseen.state.numpy() for states in simulated])
     spread = np.concatenate([band.seeds_spread(simulated)] * len(simulated))
     return band.calibrate(error, spread, len(run.config.split.validation))
+
+
+def _end_with_parent() -> None:
+    """In a training process: whatever ends the command ends this too, and Ctrl-C is the command's
+    to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 @contextmanager
@@ -121,12 +144,9 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
     training, validation = (engine.batch(w, scale, shape, torch.float32) for w in (learnt, held))
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
-    parent = os.getppid()
 
     def keep(progress: Progress) -> None:
         run.save_checkpoint(seed, progress)
-        if os.getppid() != parent:  # the command was killed: hours of orphaned work help nobody
-            raise SystemExit(1)
 
     if config.recipe == "paper":
         progress = train.paper(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -56,6 +57,9 @@ def main() -> None:
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, _stopped)
     try:
         app()
     except ShiplogError as error:
@@ -63,6 +67,13 @@ def main() -> None:
     except KeyboardInterrupt:
         typer.echo("stopped; what was finished is kept", err=True)
         sys.exit(130)
+
+
+def _stopped(number: int, _frame: object) -> NoReturn:
+    """Asked to end: everything that was started is ended on the way out."""
+    signal.signal(number, signal.SIG_IGN)
+    typer.echo("stopped; what was finished is kept", err=True)
+    sys.exit(128 + number)
 
 
 def _fail(error: ShiplogError) -> NoReturn:

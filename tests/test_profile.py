@@ -26,7 +26,7 @@ def test_every_shipped_profile_is_taken(name):
         (SIGMA, "sigma = [0.1, -0.1]", "sensors.position.sigma.1 has to be greater than or equal"),
         (SIGMA, "sigma = nan", f"sensors.position.sigma {FINITE}"),
         (SIGMA, "sigma = []", "sensors.position.sigma is missing"),
-        (SIGMA, "sigma = 'a'", "sensors.position.sigma has to be a number or a list of numbers"),
+        (SIGMA, "sigma = 'a'", "sensors.position.sigma has to be a number"),
         ("sign = -1.0", "sign = inf", f"actuators.0.sign {FINITE}"),
         ("[-35.0, 35.0]", "[35.0, -35.0]", "the lower one stands first"),
         ("[-35.0, 35.0]", "[-inf, inf]", f"actuators.0.limits.0 {FINITE}"),
