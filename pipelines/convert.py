@@ -14,6 +14,7 @@ from shiplog.channels import WIND
 from shiplog.exceptions import ChannelMissing, ProfileError, ShiplogError, listed, nearest
 from shiplog.logs.write import Series, write_log
 from shiplog.profile import Profile, Source
+from shiplog.unexpected import unexpected
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +40,7 @@ def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path]
                 written.append(convert_topics(path, profile, out))
                 continue
             for name, table in voyages(read_table(path), profile, path):
-                target = out / f"{name}.mcap"
+                target = _free(out / f"{name}.mcap", out)
                 out.mkdir(parents=True, exist_ok=True)
                 write_log(
                     target,
@@ -52,7 +53,23 @@ def convert(tables: list[Path], profile: Profile, out: Path) -> tuple[list[Path]
                 written.append(target)
         except ShiplogError as error:
             refused[str(path)] = str(error)
+        except Exception as error:  # one bad table never ends the others
+            refused[str(path)] = str(unexpected(error, path.name))
     return written, refused
+
+
+def _free(target: Path, out: Path) -> Path:
+    """Raises ShiplogError for a log that is there already, which may be the only one of its kind,
+    and for the name of a voyage that would lead elsewhere."""
+    if set(target.stem) & set("/\\\0") or len(target.relative_to(out).parts) != 1:
+        raise ShiplogError(
+            f"A voyage is called {target.stem!r}, which no file can be.", hint="rename it."
+        )
+    if target.exists():
+        raise ShiplogError(
+            f"{target} exists already.", hint="choose another --out, or remove that log."
+        )
+    return target
 
 
 def read_table(path: Path) -> pl.DataFrame:
@@ -89,6 +106,9 @@ def voyages(
             f"{nearest(column, table.columns)}. Columns found: {listed(table.columns)}.",
             hint=f"name the columns in the [table] section of {profile.source}.",
         )
+    for name, column in present.items():
+        if column.channel != "voyage":
+            _refuse_words(table[name], path)
     si = table.select(
         *[
             ((pl.col(name).cast(pl.Float64) - c.offset) * c.sign * units.factor(c.unit)).alias(
@@ -103,6 +123,8 @@ def voyages(
             if c.channel == "voyage"
         ],
     ).filter(pl.col("time").is_not_null() & pl.col("time").is_not_nan())
+    if si.is_empty():
+        raise ChannelMissing(f"{path.name} has no row with a time.", hint="check the file.")
     dropped = table.height - si.height
     if dropped:
         log.warning("%s: %d rows without a time left out", path.name, dropped)
@@ -111,6 +133,26 @@ def voyages(
         return
     for (name,), part in si.group_by("voyage", maintain_order=True):
         yield str(name), part.drop("voyage")
+
+
+def _refuse_words(column: pl.Series, path: Path) -> None:
+    """Raises ChannelMissing for a column that holds anything but numbers."""
+    if column.dtype.is_numeric() or column.dtype == pl.Null:
+        return
+    hint = "give numbers in the unit that the profile's [table] section says; time in seconds."
+    if column.dtype != pl.String:
+        raise ChannelMissing(
+            f"{path.name}: the column {column.name!r} holds {column.dtype} and no numbers.",
+            hint=hint,
+        )
+    words = column.is_not_null() & column.cast(pl.Float64, strict=False).is_null()
+    if words.any():
+        row = words.arg_max() or 0
+        raise ChannelMissing(
+            f"{path.name}: the column {column.name!r} holds {column[row]!r} in row {row + 1} where "
+            "a number has to be.",
+            hint=hint,
+        )
 
 
 def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
@@ -186,7 +228,7 @@ def convert_topics(folder: Path, profile: Profile, out: Path) -> Path:
             f"{folder} holds no table with a column log_time_ns.",
             hint="give one .parquet a topic, or a single table.",
         )
-    target = out / f"{folder.name}.mcap"
+    target = _free(out / f"{folder.name}.mcap", out)
     out.mkdir(parents=True, exist_ok=True)
     write_log(target, parts, ship=profile.ship.name, datum=profile.site.datum)
     log.info("%s: %d topics", target.name, len(parts))

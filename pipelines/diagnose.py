@@ -15,6 +15,7 @@ from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
 from shiplog import diagnose, page, runs, segments, user_causes
+from shiplog.arguments import refuse_taken
 from shiplog.decision import Decision
 from shiplog.diagnosis import placebo, refutation, search
 from shiplog.diagnosis import trial as diagnosis_trial
@@ -49,7 +50,7 @@ def diagnose_run(
     """
     began = time.time()
     if extend is not None:
-        runs.refuse_taken(extend, "--extend")
+        refuse_taken(extend, "--extend")
     causes = user_causes.load(cause_files)
     run = runs.load(run_path, causes)
     names = trial.voyages_of(run, store, voyages)

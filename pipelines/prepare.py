@@ -117,10 +117,10 @@ def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFram
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
-    """Folders stand for the logs in them."""
+    """Folders stand for the logs in them; one without logs for itself, which no reader takes."""
     found: list[Path] = []
     for path in paths:
-        found += sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        found += (sorted(path.glob("*.mcap")) or [path]) if path.is_dir() else [path]
     return found
 
 

@@ -22,16 +22,16 @@ from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import choose_split, plan, refuse_shared_rows, say
 from shiplog import band, engine, runs, seeds, train, windows
+from shiplog.arguments import refuse_taken
 from shiplog.config import Config
-from shiplog.exceptions import RunError, listed, nearest
+from shiplog.exceptions import RunError, listed
 from shiplog.findings import CONTRACT
-from shiplog.models import MODELS
 from shiplog.models.feedforward import scaling
 from shiplog.runs import Run
 from shiplog.simulate import simulate
 from shiplog.store import Store
 from shiplog.train import Progress
-from shiplog.windows import AUGMENTATIONS, Windows
+from shiplog.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -169,21 +169,6 @@ def _cut(run: Run, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
     return windows.cut(rows, planned, run.config.window, *names)
 
 
-def check_choices(model: str, data: str, recipe: str, wind_input: str | None) -> None:
-    """Raises RunError for a word that names nothing."""
-    for value, allowed, option in (
-        (model, tuple(MODELS), "--model"),
-        (data, tuple(AUGMENTATIONS), "--data"),
-        (recipe, ("fast", "paper"), "--recipe"),
-        (wind_input or "angle", ("angle", "components"), "--wind-input"),
-    ):
-        if value not in allowed:
-            raise RunError(
-                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
-                hint=f"{option} can be {listed(allowed)}.",
-            )
-
-
 def train_command(
     store_path: Path,
     out: Path,
@@ -200,6 +185,7 @@ def train_command(
     epochs: int | None,
 ) -> Answer:
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
+    refuse_taken(out)
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
     say(split)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +11,25 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from shiplog.exceptions import RunError
+
+RECIPES = ("fast", "paper")
+WIND_INPUTS = ("angle", "components")
+
+
+@dataclass(frozen=True)
+class Augmentation:
+    """How many times over the same rows are used: every `step` rows, `copies` noisy ones."""
+
+    step: int
+    copies: int = 0
+
+
+AUGMENTATIONS = {  # Table 4 of the paper: step S and copies M, for windows of I = 100
+    "ref": Augmentation(100), "sli2": Augmentation(50), "sli10": Augmentation(10),
+    "jit2": Augmentation(100, 2), "jit10": Augmentation(100, 10),
+    "sli2xjit2": Augmentation(50, 2), "sli10xjit10": Augmentation(10, 10),
+    "d-ref": Augmentation(100),
+}  # fmt: skip
 
 
 class Section(BaseModel):
@@ -120,7 +140,7 @@ def load(path: Path) -> Config:
     """A config from TOML. Raises RunError naming what is wrong."""
     try:
         return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, RecursionError) as error:  # ValueError: TOML's, UTF-8's, pydantic's
+    except (OSError, ValueError, RecursionError) as error:  # of TOML, UTF-8 and pydantic
         first = str(error).splitlines()[0] if isinstance(error, ValidationError) else error
         raise RunError(
             f"{path} is no configuration of a run: {first}.", hint="train the run again."

@@ -21,7 +21,6 @@ from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.parity import Estimate
 from shiplog.profile import Actuator, Profile, Sensor, Source
 
-
 CLOCKS = {  # of a source: its column, and the one that it is held against
     "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
     "publish": ("publish_time", "log_time"),
@@ -173,9 +172,7 @@ def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[F
             f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
             f"cannot be of this voyage, being up to {how} away."
         )
-        findings.append(
-            Finding("jump", source.topic, sentence, value=round(far, 3), unit="s")
-        )
+        findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
     return replace(reading, frames=frames), findings
 
 

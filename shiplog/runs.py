@@ -40,6 +40,7 @@ from safetensors.torch import load_file, save_file
 
 from shiplog import config as configuration
 from shiplog import earlier_runs
+from shiplog.arguments import check_run, refuse_taken
 from shiplog.band import Band
 from shiplog.causes import CATALOGUE, Cause
 from shiplog.config import Config
@@ -454,26 +455,13 @@ def create(
     return Run(partial, config, profile)
 
 
-def refuse_taken(path: Path, option: str = "--out") -> None:
-    """Raises RunError where a run cannot be written because something is there already."""
-    if path.exists():
-        raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
-
-
 def load(path: str | Path, causes: Sequence[Cause] = ()) -> Run:
     """A finished run. Raises RunError.
 
     causes   of the user's own, for a run that was extended by them; see `user_causes.load`
     """
     path = Path(path)
-    if not (path / "config.toml").is_file():
-        begun = path.with_name(f"{path.name}.partial")
-        if begun.is_dir():
-            raise RunError(
-                f"The run {path} is not finished.",
-                hint="give the same `shiplog train` again: it goes on.",
-            )
-        raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+    check_run(path)
     return replace(open_folder(path), causes=tuple(causes))
 
 

@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote, unquote
 
 import polars as pl
@@ -31,11 +32,14 @@ from pydantic import ValidationError
 
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.findings import CONTRACT, VoyageReport
-from shiplog.ingest import Voyage
 from shiplog.profile import Profile, advice
+
+if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second
+    from shiplog.ingest import Voyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
 INGEST_VERSION = 3  # raised when the same log would become another table or report
+LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
 NEW, OLD = ".new", ".old"  # of a voyage's folder, hidden: while it is written, or replaced
 FACTS = ("sha256", "fingerprint", "source", "start", "profile", "report")  # every voyage.json
 
@@ -118,8 +122,7 @@ class Store:
             raise StoreError(
                 f"The voyage {voyage.name!r} cannot be written into the store {self.path}: "
                 f"{error}.",
-                hint="give a --store on a disk with room that you may write to, and a log whose "
-                "name is shorter than 80 letters.",
+                hint="give a --store on a disk with room that you may write to.",
             ) from error
 
     def _add(self, voyage: Voyage, folder: Path) -> str:
@@ -138,7 +141,7 @@ class Store:
                 self._list()
                 return "unchanged"
             state = "replaced"
-        new, old = folder.with_name(f".{folder.name}{NEW}"), folder.with_name(f".{folder.name}{OLD}")
+        new, old = (folder.with_name(f".{folder.name}{end}") for end in (NEW, OLD))
         try:
             new.mkdir()
             voyage.table.select(pl.lit(voyage.name).alias("voyage"), pl.all()).write_parquet(
@@ -222,12 +225,19 @@ class Store:
         return [pl.scan_parquet(file, hive_partitioning=False) for file in files]
 
     def _folder(self, name: str) -> Path:
+        """A voyage's folder. Raises StoreError for a name that no folder can have."""
         try:
-            return self.path / f"voyage={quote(name, safe=' ()+,')}"
+            folder = f"voyage={quote(name, safe=' ()+,')}"
         except UnicodeEncodeError as error:
             raise StoreError(
                 f"The name {name!a} of the log is not text.", hint="rename the log file."
             ) from error
+        if len(folder) > LONGEST:
+            raise StoreError(
+                f"The name {name!r} of the log is too long for a folder.",
+                hint="rename the log file.",
+            )
+        return self.path / folder
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -22,7 +22,7 @@ def call(*arguments):
     """Exit code, stdout and stderr, with a ShiplogError handled as `main` does."""
     result = CliRunner().invoke(cli.app, [str(a) for a in arguments])
     if isinstance(result.exception, ShiplogError):
-        return 1, result.stdout, str(result.exception)
+        return result.exception.exit_code, result.stdout, str(result.exception)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result.exit_code, result.stdout, result.stderr
@@ -138,19 +138,20 @@ def test_a_finished_run_is_not_trained_over(run, store):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "expected"),
+    ("expected_code", "arguments", "expected"),
     [
-        (("--model", "feedfoward"), "did you mean 'feedforward'"),
-        (("--data", "sli3"), "--data can be"),
-        (("--recipe", "papr"), "did you mean 'paper'"),
-        (("--voyages", "trp_1"), "did you mean 'trip_1'"),
-        (("--window", "400"), "cannot be split"),
-        (("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"), "longer than every"),
+        (2, ("--model", "feedfoward"), "did you mean 'feedforward'"),
+        (2, ("--data", "sli3"), "--data can be"),
+        (2, ("--recipe", "papr"), "did you mean 'paper'"),
+        (1, ("--voyages", "trp_1"), "did you mean 'trip_1'"),
+        (1, ("--window", "400"), "cannot be split"),
+        (1, ("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"),
+         "longer than every"),
     ],
-)
-def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, expected):
+)  # fmt: skip
+def test_a_wrong_choice_names_the_right_ones(store, tmp_path, expected_code, arguments, expected):
     code, _, said = call("train", "--store", store, "--out", tmp_path / "r", *arguments)
-    assert code == 1 and expected in said
+    assert code == expected_code and expected in said
     assert not list(tmp_path.iterdir())
 
 

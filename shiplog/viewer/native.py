@@ -101,9 +101,7 @@ def serve(path: str | Path, port: int = 9090) -> Served:
     return Served(f"http://{HOST}:{web}/?url={source}", process)
 
 
-def start(
-    arguments: list[str], said: IO[bytes], supervised: bool = False
-) -> subprocess.Popen:
+def start(arguments: list[str], said: IO[bytes], supervised: bool = False) -> subprocess.Popen:
     """Start Rerun's program in a group of its own, so that Ctrl-C here does not close a window.
 
     supervised   it ends when this process ends, however that comes about
