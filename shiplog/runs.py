@@ -46,7 +46,7 @@ from shiplog.causes import CATALOGUE, Cause
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
 from shiplog.extend import ExtendedSimulator, Extension, campaign
-from shiplog.models import mmg, network
+from shiplog.models import MODELS, mmg, network
 from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
@@ -468,6 +468,12 @@ def load(path: str | Path, causes: Sequence[Cause] = ()) -> Run:
 def open_folder(path: Path) -> Run:
     """A run folder as it stands, finished or partial. Raises RunError for one that is spoilt."""
     config = configuration.load(path / "config.toml")
+    if config.model not in MODELS:
+        raise RunError(
+            f"{path / 'config.toml'} is no configuration of a run: there is no model "
+            f"{config.model!r}.",
+            hint="train the run again, or open it with the shiplog that made it.",
+        )
     try:
         profile = Profile.model_validate(_json(path / "profile.json"))
     except ValidationError as error:

@@ -152,7 +152,8 @@ PROFILES = {
     "not UTF-8": (1, ["UTF-8"], lambda d: d.ingest(
         d.log, "--profile", d.file("p.toml", b"\xff\xfe[ship]"))),
     "empty": (1, ["ship is missing"], lambda d: d.ingest(d.log, "--profile", d.file("p.toml"))),
-    "6000 digits": (1, ["not valid TOML"], lambda d: d.through("[ship]", f"x = {'9' * 6000}\n[ship]")),
+    "6000 digits": (1, ["not valid TOML"],
+        lambda d: d.through("[ship]", f"x = {'9' * 6000}\n[ship]")),
     "20 000 brackets": (1, ["not valid TOML"], lambda d: d.through(
         "[ship]", f"x = {'[' * 20_000}{']' * 20_000}\n[ship]")),
     "unknown key": (1, ["did you mean 'length_m'"], lambda d: d.through("length_m", "lenght_m")),
@@ -167,14 +168,15 @@ PROFILES = {
     "wrong kind of actuator": (1, ["actuators.0.kind"],
                                lambda d: d.through('kind = "rudder"', 'kind = "oar"')),
     "wrong clock": (1, ["sensors.heading.clock"], lambda d: d.through(
-        'topic = "/gyro"\nfield = "heading_deg"', 'clock = "church"\ntopic = "/gyro"\nfield = "heading_deg"')),
+        'field = "heading_deg"', 'clock = "church"\nfield = "heading_deg"')),
     "one field for two": (1, ["needs 2 field(s)"],
                           lambda d: d.through('fields = ["x_m", "y_m"]', 'field = "x_m"')),
     "unknown unit": (1, ["furlong"], lambda d: d.through('unit = "rpm"', 'unit = "furlong"')),
     "unknown field": (1, ["did you mean 'heading_deg'"],
                       lambda d: d.through('"heading_deg"', '"heading_dge"')),
     "unknown topic": (1, ["has no topic"], lambda d: d.through('"/rudder"', '"../../etc/passwd"')),
-    "negative length": (1, ["greater than 0"], lambda d: d.through("length_m = 3.0", "length_m = -3")),
+    "negative length": (1, ["greater than 0"],
+        lambda d: d.through("length_m = 3.0", "length_m = -3")),
     "length inf": (1, ["finite"], lambda d: d.through("length_m = 3.0", "length_m = inf")),
     "length in words": (1, ["ship.length_m"], lambda d: d.through("= 3.0", "= 'three'")),
     "lever arm NaN": (1, ["finite"], lambda d: d.through("= [0.7, -0.2]", "= [nan, 0.0]")),
@@ -229,7 +231,8 @@ OPTIONS = {
     "--width 0": (2, ["--width"], lambda d: d.train("--width", "0")),
     "--epochs 0": (2, ["--epochs"], lambda d: d.train("--epochs", "0")),
     "--folds -1": (2, ["--folds"], lambda d: d.train("--folds", "-1")),
-    "--model": (2, ["--model can be feedforward, hybrid, mmg"], lambda d: d.train("--model", "lstm")),
+    "--model": (2, ["--model can be feedforward, hybrid, mmg"],
+        lambda d: d.train("--model", "lstm")),
     "--data": (2, ["did you mean 'sli"], lambda d: d.train("--data", "sli99")),
     "--recipe": (2, ["--recipe can be fast, paper"], lambda d: d.train("--recipe", "quick")),
     "--wind-input": (2, ["--wind-input can be"], lambda d: d.train("--wind-input", "sails")),
@@ -254,7 +257,8 @@ FOLDERS = {
         "ingest", d.log, "--profile", d.profile(), "--store", d.file("s")]),
     "ingest: the store in a file": (1, ["is a file"], lambda d: [
         "ingest", d.log, "--profile", d.profile(), "--store", d.file("s") / "store"]),
-    "voyages: the store is a file": (1, ["is a file"], lambda d: ["voyages", "--store", d.file("s")]),
+    "voyages: the store is a file": (1, ["is a file"],
+        lambda d: ["voyages", "--store", d.file("s")]),
     "voyages: no store": (1, ["no store"], lambda d: ["voyages", "--store", d.path("s")]),
     "train: the store is a file": (1, ["is a file"], lambda d: [
         "train", "--store", d.file("s"), "--out", d.path("run")]),
