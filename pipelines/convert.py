@@ -19,6 +19,7 @@ from shiplog.exceptions import ProfileError, ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.write import Series, write_log
 from shiplog.profile import Profile
+from shiplog.unexpected import unexpected
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +47,8 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
                     done.logs.append(target)
         except ShiplogError as error:
             done.refused[str(path)] = str(error)
+        except Exception as error:  # one bad source never ends the others
+            done.refused[str(path)] = str(unexpected(error, path.name))
     return done
 
 
@@ -63,22 +66,37 @@ def draft(path: Path, vessel: str | None = None) -> str:
             return draft_log(target, vessel)
 
 
+def _free(target: Path, out: Path) -> Path:
+    """Raises ShiplogError for a log that is there already, which may be the only one of its kind,
+    and for the name of a voyage that would lead elsewhere."""
+    if set(target.stem) & set("/\\\0") or len(target.relative_to(out).parts) != 1:
+        raise ShiplogError(
+            f"A voyage is called {target.stem!r}, which no file can be.", hint="rename it."
+        )
+    if target.exists():
+        raise ShiplogError(
+            f"{target} exists already.", hint="choose another --out, or remove that log."
+        )
+    return target
+
+
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
     ship = profile.ship.name if profile else path.stem
     target = out / f"{path.stem if path.is_file() else path.name}.mcap"
     if is_bag(path):
+        _free(target, out)
         if left_out := bag_to_log(path, target, ship):
             done.lost[str(path)] = "; ".join(f"{t}: {why}" for t, why in left_out.items())
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
         parts = folder_to_series(path, profile)
-        yield _written(target, parts, profile, ship, path)
+        yield _written(_free(target, out), parts, profile, ship, path)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
             done.lost[str(path)] = f"{damaged} damaged sentences"
-        yield _written(target, parts, profile, ship, path)
+        yield _written(_free(target, out), parts, profile, ship, path)
     else:
         if profile is None:
             raise ProfileError(
@@ -88,20 +106,18 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             )
         for name, part in columns.voyages(read_table(path, profile.table), profile, path):
             series = columns.series(part, profile)
-            yield _written(out / f"{name}.mcap", series, profile, ship, path)
+            yield _written(_free(out / f"{name}.mcap", out), series, profile, ship, path)
 
 
 def _written(
     target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
 ) -> Path:
-    there = target.exists()
     datum = profile.site.datum if profile else None
     write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
     log.info(
-        "%s: %d topics, %d rows%s",
+        "%s: %d topics, %d rows",
         target.name,
         len(parts),
         max((len(p.time) for p in parts), default=0),
-        ", in place of the one that was there" if there else "",
     )
     return target

@@ -13,6 +13,7 @@ from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from pipelines.split import choose_physical_split, choose_split
 from pipelines.train import train_run
+from shiplog.arguments import sample_logs
 from shiplog.config import Config, Fast, Physics
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.store import Store
@@ -38,7 +39,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     """Ingest, train, compare, diagnose, extend, gain. Resumes: what is in `out` already is not
     done again."""
     began = time.monotonic()
-    folder = logs or sample_logs()
+    folder = sample_logs(logs)
     store = Store(out / "store")
     log.info("1/4 ingesting %s", folder)
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
@@ -91,16 +92,3 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     )
     content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
     return Demo(ending, content, result.recording)
-
-
-def sample_logs() -> Path:
-    """The folder of the checkout this runs from. Raises ShiplogError."""
-    here = (Path.cwd(), Path(__file__).resolve().parent.parent)
-    for folder in here:
-        if any((folder / "sample_logs").glob("*.mcap")):
-            return folder / "sample_logs"
-    raise ShiplogError(
-        f"There is no folder sample_logs in {here[0]}.",
-        hint="run the demo from a clone of shiplog, or make the logs again with "
-        "`python -m pipelines.known_ship sample_logs` and give them with --logs.",
-    )

@@ -16,7 +16,9 @@ from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
-from shiplog import diagnose, page, parts, runs, segments
+from shiplog import diagnose, page, parts, runs, segments, user_causes
+from shiplog.arguments import refuse_taken
+from shiplog.causes import Cause
 from shiplog.decision import Decision
 from shiplog.diagnosis import placebo, refutation, search
 from shiplog.diagnosis import trial as diagnosis_trial
@@ -50,7 +52,10 @@ def diagnose_run(
     former   decide as the program did before hypotheses were weighed by one posterior
     """
     began = time.time()
-    run = runs.load(run_path)
+    if extend is not None:
+        refuse_taken(extend, "--extend")
+    causes = user_causes.load(cause_files)
+    run = runs.load(run_path, causes)
     names = trial.voyages_of(run, store, voyages)
     profile = store.profile(names)
     if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
@@ -72,7 +77,7 @@ def diagnose_run(
         nominal = None
     campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
     try:
-        done = _diagnosed(campaign, out, cause_files, former)
+        done = _diagnosed(campaign, out, causes, former)
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
         log.info("no path of the model can be computed: %s", error, exc_info=log.isEnabledFor(10))
         done = Diagnosis(answer.runs_away(run, before_effect), out)
@@ -98,7 +103,7 @@ class Campaigns:
     before_effect: bool
 
 
-def _diagnosed(of: Campaigns, out: Path, cause_files: Sequence[Path], former: bool) -> Diagnosis:
+def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause], former: bool) -> Diagnosis:
     run, store, names, profile = of.run, of.store, of.names, of.profile
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = []
@@ -108,10 +113,10 @@ def _diagnosed(of: Campaigns, out: Path, cause_files: Sequence[Path], former: bo
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
     if former:
-        tried, untested = trial.trial_of(run, nominal, recorded, cause_files)
+        tried, untested = trial.trial_of(run, nominal, recorded, causes)
     else:
         lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
-        made = setup.trial_of(run, nominal, recorded, cause_files, lacking)
+        made = setup.trial_of(run, nominal, recorded, causes, lacking)
         tried, untested = made.trial, dict(made.untested)
         notes += [lacking] if lacking else []
     log.info(

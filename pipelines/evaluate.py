@@ -13,7 +13,7 @@ import torch
 
 from pipelines.prepare import seconds
 from pipelines.split import plan
-from shiplog import band, evaluate, floors, parts, report, runs, table, windows
+from shiplog import band, evaluate, floors, parts, report, runs, table, user_causes, windows
 from shiplog import coverage as covering
 from shiplog.channels import STATE
 from shiplog.comparison import BAND, Actuator, Comparison
@@ -105,9 +105,18 @@ class Evaluation:
         return "\n".join(lines)
 
 
-def evaluate_runs(paths: Sequence[Path], store: Store, voyages: Sequence[str]) -> Evaluation:
-    """Roll every run's models out over the chosen voyages. Raises ShiplogError."""
-    opened = tuple(runs.load(path) for path in paths)
+def evaluate_runs(
+    paths: Sequence[Path],
+    store: Store,
+    voyages: Sequence[str],
+    cause_files: Sequence[Path] = (),
+) -> Evaluation:
+    """Roll every run's models out over the chosen voyages. Raises ShiplogError.
+
+    cause_files   Python files of the causes of the user's own that are in these runs
+    """
+    causes = user_causes.load(cause_files)
+    opened = tuple(runs.load(path, causes) for path in paths)
     first = opened[0]
     for other in opened[1:]:
         if other.config.window != first.config.window:
@@ -196,13 +205,17 @@ class Compared:
 
 
 def compare_runs(
-    paths: Sequence[Path], store: Store, voyages: Sequence[str], save_to: Path | None
+    paths: Sequence[Path],
+    store: Store,
+    voyages: Sequence[str],
+    save_to: Path | None,
+    cause_files: Sequence[Path] = (),
 ) -> Compared:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
     unless a path is given."""
     from shiplog import viewer
 
-    found = evaluate_runs(paths, store, voyages)
+    found = evaluate_runs(paths, store, voyages, cause_files)
     save(found)
     recording = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"

@@ -17,6 +17,7 @@ from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import choose_physical_split, plan, refuse_shared_rows, say
 from shiplog import band, identifiability, report, runs
+from shiplog.arguments import refuse_taken
 from shiplog.config import Config
 from shiplog.crossvalidation import CrossValidated, cross_validate
 from shiplog.exceptions import RunError, listed
@@ -27,7 +28,6 @@ from shiplog.models.hybrid import Hybrid
 from shiplog.runs import Run
 from shiplog.sensitivity import Series, Simulator, losses, rollout
 from shiplog.store import Store
-from shiplog.windows import AUGMENTATIONS
 
 log = logging.getLogger(__name__)
 
@@ -241,18 +241,10 @@ def identify_command(
     folds: int | None = None,
 ) -> Answer:
     """`shiplog train --model mmg|hybrid`."""
-    if model == "hybrid" and not fit:
-        raise RunError(
-            "A hybrid's network has to be fitted.", hint="--no-fit goes with --model mmg."
-        )
+    refuse_taken(out)
     if model == "mmg" and seeds > 1:
         log.info("an identification draws nothing: one seed stands for all")
         seeds = 1
-    if AUGMENTATIONS[data].copies:
-        raise RunError(
-            f"--data {data} is of noisy copies, which an identification has no use for.",
-            hint="choose ref, sli2, sli10 or d-ref.",
-        )
     store = Store(store_path)
     split = choose_physical_split(store, voyages, validation, data, window)
     say(split)

@@ -18,6 +18,7 @@ from shiplog.logs.check import check
 from shiplog.logs.read import Contents, contents
 from shiplog.profile import Profile
 from shiplog.store import Store
+from shiplog.unexpected import unexpected
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +51,7 @@ def ingest_logs(
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
     said: set[str] = set()
+    store.mend()  # or what a killed ingest left out of the catalogue stayed so, being "unchanged"
     for path in paths:
         try:
             found = contents(path)
@@ -70,6 +72,9 @@ def ingest_logs(
             state = store.add(voyage)
         except ShiplogError as error:
             refused[str(path)] = error
+            continue
+        except Exception as error:  # one bad log never ends the others
+            refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
         log.info(
@@ -112,10 +117,10 @@ def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFram
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
-    """Folders stand for the logs in them."""
+    """Folders stand for the logs in them; one without logs for itself, which no reader takes."""
     found: list[Path] = []
     for path in paths:
-        found += sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        found += (sorted(path.glob("*.mcap")) or [path]) if path.is_dir() else [path]
     return found
 
 
@@ -130,6 +135,9 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
         except ShiplogError as error:
             refused[str(path)] = error
             continue
+        except Exception as error:  # one bad log never ends the others
+            refused[str(path)] = unexpected(error, path.name)
+            continue
         reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
     return Ingested(reports, refused)
 
@@ -138,7 +146,8 @@ def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
     """What ingest would say of the sensors against each other; nothing where it would refuse."""
     try:
         voyage = ingest(path, chosen or fitting_profile(contents(path)))
-    except ShiplogError as error:
-        log.info("%s: sensors not held against each other: %s", path.stem, error.message)
+    except Exception as error:
+        why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
+        log.info("%s: sensors not held against each other: %s", path.stem, why.message)
         return []
     return parity.findings(voyage.estimates, voyage.table.height, voyage.profile)

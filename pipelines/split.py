@@ -11,11 +11,10 @@ import polars as pl
 
 from pipelines.prepare import seconds
 from shiplog import table, windows
-from shiplog.config import Split
+from shiplog.config import AUGMENTATIONS, Split
 from shiplog.exceptions import StoreError, listed
 from shiplog.parts import Part
 from shiplog.store import Store
-from shiplog.windows import AUGMENTATIONS
 
 log = logging.getLogger(__name__)
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 
 import numpy as np
@@ -20,16 +22,16 @@ from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import choose_split, plan, refuse_shared_rows, say
 from shiplog import band, engine, runs, seeds, train, windows
+from shiplog.arguments import refuse_taken
 from shiplog.config import Config
-from shiplog.exceptions import RunError, listed, nearest
+from shiplog.exceptions import RunError, listed
 from shiplog.findings import CONTRACT
-from shiplog.models import MODELS
 from shiplog.models.feedforward import scaling
 from shiplog.runs import Run
 from shiplog.simulate import simulate
 from shiplog.store import Store
 from shiplog.train import Progress
-from shiplog.windows import AUGMENTATIONS, Windows
+from shiplog.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +62,10 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
     workers = max(1, min(cores, len(todo)))
-    with _one_thread(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with (
+        _one_thread(),
+        ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool,
+    ):
         futures = {pool.submit(train_seed, run.path, seed): seed for seed in todo}
         try:
             for future in as_completed(futures):
@@ -77,6 +82,10 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
                 "A training process was ended from outside, perhaps for want of memory.",
                 hint="give the same command again: finished seeds and checkpoints are kept.",
             ) from error
+        except BaseException:  # or the pool waits for seeds that may take hours
+            for process in active_children():
+                process.terminate()
+            raise
     run.save_band(_band(run, held))
     return run.finish(provenance(store, split, began))
 
@@ -88,6 +97,20 @@ def _band(run: Run, held: pl.DataFrame) -> band.Band:
     error = np.concatenate([states - unseen.state.numpy() for states in simulated])
     spread = np.concatenate([band.seeds_spread(simulated)] * len(simulated))
     return band.calibrate(error, spread, len(run.config.split.validation))
+
+
+def _end_with_parent() -> None:
+    """In a training process: whatever ends the command ends this too, and Ctrl-C is the command's
+    to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 @contextmanager
@@ -122,12 +145,9 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
     training, validation = (engine.batch(w, scale, shape, torch.float32) for w in (learnt, held))
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
-    parent = os.getppid()
 
     def keep(progress: Progress) -> None:
         run.save_checkpoint(seed, progress)
-        if os.getppid() != parent:  # the command was killed: hours of orphaned work help nobody
-            raise SystemExit(1)
 
     if config.recipe == "paper":
         progress = train.paper(
@@ -150,21 +170,6 @@ def _cut(run: Run, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
     return windows.cut(rows, planned, run.config.window, *names)
 
 
-def check_choices(model: str, data: str, recipe: str, wind_input: str | None) -> None:
-    """Raises RunError for a word that names nothing."""
-    for value, allowed, option in (
-        (model, tuple(MODELS), "--model"),
-        (data, tuple(AUGMENTATIONS), "--data"),
-        (recipe, ("fast", "paper"), "--recipe"),
-        (wind_input or "angle", ("angle", "components"), "--wind-input"),
-    ):
-        if value not in allowed:
-            raise RunError(
-                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
-                hint=f"{option} can be {listed(allowed)}.",
-            )
-
-
 def train_command(
     store_path: Path,
     out: Path,
@@ -181,6 +186,7 @@ def train_command(
     epochs: int | None,
 ) -> Answer:
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
+    refuse_taken(out)
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
     say(split)

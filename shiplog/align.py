@@ -18,6 +18,13 @@ LEAST_TOLERANCE_S = 0.15
 AROUND = 10  # samples on either side of a span that say whether a message is missing in it
 MOST_PERIODS = 3.0  # a longer span is a gap whatever the samples around it say
 
+# A stamp that is far from the others is another clock's: of a receiver before its first fix
+# (1970, 1980), of a week counter that rolled over, or of a damaged byte.
+STRAY_S = 60.0  # a silence that the recorder may not have heard; shorter ones cost 600 rows
+STRAY_PERIODS = 10.0  # of the median: a report every three minutes is no silence
+STRAY_SHARE = 0.01  # of the samples: as many across a shorter silence than a day are a voyage's
+DAY_S = 86_400.0  # no voyage is silent for so long, whatever any clock says
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -47,6 +54,46 @@ class OnGrid:
     gap: np.ndarray
     blank: np.ndarray
     spike: np.ndarray
+
+
+def strays(time: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Stamps [n] bool that cannot be of this voyage.
+
+    time, other  [n] ns: by the clock that counts, and by the recorder's or the publisher's
+
+    Silences of a minute and more cut the stamps into groups, and the largest is the voyage's. More
+    than a day from it, none belongs. A nearer group of a few samples belongs where the other clock
+    tells the same silence: a sensor that fell out and came back for a moment is data. So do a few
+    stamps among the voyage's own that the other clock does not confirm.
+    """
+    count = len(time)
+    stray = np.zeros(count, bool)
+    if count < 2:
+        return stray
+    seconds = time * 1e-9  # floats: 0.3 us at most lost, and no step too long for an integer
+    order = np.argsort(seconds, kind="stable")
+    steps = np.diff(seconds[order])
+    groups = np.split(
+        order, np.flatnonzero(steps > max(STRAY_S, STRAY_PERIODS * np.median(steps))) + 1
+    )
+    main = int(np.argmax([len(group) for group in groups]))
+    off = seconds - other * 1e-9
+    off = np.abs(off - np.median(off[groups[main]])) > STRAY_S
+    for side in (groups[main::-1], groups[main:]):
+        apart, near = False, side[0]
+        for group in side[1:]:
+            gaps = (seconds[group].min() - seconds[near].max(),
+                    seconds[near].min() - seconds[group].max())  # fmt: skip
+            apart = apart or max(gaps) > DAY_S
+            few = len(group) < STRAY_SHARE * count
+            if apart or (few and off[group].all()):
+                stray[group] = True
+            else:
+                near = group
+    alone = off & ~stray
+    if 0 < alone.sum() < STRAY_SHARE * count:
+        stray |= alone
+    return stray
 
 
 def ordered(time: np.ndarray, value: np.ndarray, tolerance_s: float | None) -> Samples:

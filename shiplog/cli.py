@@ -1,22 +1,28 @@
 """The commands: one short function each. Only here does the library call `pipelines`.
 
 Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fault, 2 wrong usage,
-3 done but something was lost or refused.
+3 done but something was lost or refused. What is heavy is imported where it is used, after the
+arguments were checked: a wrong word is answered at once.
 """
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import logging
 import os
+import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 
-from shiplog import cache, report
+from shiplog import cache
 from shiplog.exceptions import ShiplogError
+from shiplog.unexpected import unexpected
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -27,6 +33,22 @@ app = typer.Typer(
 )
 
 LOST = 3
+STOPPED = 130  # by Ctrl-C, as shells have it
+KEPT = "stopped; what was finished is kept"
+MENDABLE = (  # what the system says of a path that the user can mend
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
+    errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
+)  # fmt: skip
+
+
+def _ask_json(json_to: str | None) -> str | None:
+    """Whether --json can be written is known before the work."""
+    if json_to and json_to != "-":
+        from shiplog.arguments import check_file
+
+        check_file(Path(json_to), "--json")
+    return json_to
+
 
 Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]
 StoreOption = Annotated[Path, typer.Option("--store", help="Folder of ingested voyages.")]
@@ -34,45 +56,87 @@ ProfileOption = Annotated[
     str | None, typer.Option("--profile", help="A shipped profile's name, or a TOML's path.")
 ]
 JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.")
+    str | None,
+    typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.", callback=_ask_json),
 ]
 Voyages = Annotated[
     list[str] | None,
     typer.Option("--voyages", help="Names or shell patterns; can be given several times."),
 ]
+Causes = Annotated[
+    list[Path] | None,
+    typer.Option("--cause", help="A Python file with causes of your own; several times."),
+]
 STORE = Path("store")
 
 
 def main() -> None:
-    """Entry point: a fault of the input is a message and exit code 1, never a traceback."""
+    """Entry point: settings of this process, then `run`."""
     # What JAX compiled for one ship serves every later command: some ten seconds each.
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.folder() / "jax"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
-    cache.trim()
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, _stopped)
+    sys.exit(run())
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """The exit code of a command line, that of this process unless one is given.
+
+    Whatever goes wrong is a sentence on stderr and never a traceback: a fault of the input says
+    what to mend, and a fault of the program where its trace was written.
+    """
+    for stream in (sys.stdout, sys.stderr):  # a file's name need not be text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
-        app()
-    except ShiplogError as error:
-        _fail(error)
-    except KeyboardInterrupt:
-        typer.echo("stopped; what was finished is kept", err=True)
-        sys.exit(130)
+        cache.trim()
+        app(arguments)
+    except SystemExit as ended:  # as every command ends
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        if code == STOPPED:  # as typer has it; SIGTERM has said so itself
+            typer.echo(KEPT, err=True)
+        return code
+    except Exception as error:
+        fault = _fault(error)
+        typer.echo(str(fault), err=True)
+        return fault.exit_code
+    return 0
 
 
-def _fail(error: ShiplogError) -> NoReturn:
-    typer.echo(str(error), err=True)
-    sys.exit(1)
+def _fault(error: Exception) -> ShiplogError:
+    """What a user is told of it."""
+    if isinstance(error, ShiplogError):
+        return error
+    if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
+        return ShiplogError(
+            f"{os.fsdecode(error.filename)}: {error.strerror}.",
+            hint="look whether that path is what you meant, may be used, and has room on its disk.",
+        )
+    return unexpected(error)
+
+
+def _stopped(number: int, _frame: object) -> NoReturn:
+    """Asked to end: everything that was started is ended on the way out."""
+    signal.signal(number, signal.SIG_IGN)
+    typer.echo(KEPT, err=True)
+    sys.exit(128 + number)
 
 
 def _answer(text: str, content: dict, json_to: str | None) -> None:
     """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
+    from shiplog import report
+
     if json_to == "-":
         typer.echo(text, err=True)
         typer.echo(json.dumps(report.finite(content), indent=1))
         return
-    typer.echo(text)
+    if text:
+        typer.echo(text)
     if json_to:
         try:
             Path(json_to).write_text(json.dumps(report.finite(content), indent=1), encoding="utf-8")
@@ -114,9 +178,13 @@ def demo(
 
     Example: shiplog demo --out demo --no-view
     """
+    from shiplog.arguments import check_writable, sample_logs
+
+    check_writable(out, "--out")
+    folder = sample_logs(logs)
     from pipelines.demo import run_demo
 
-    result = run_demo(out, logs)
+    result = run_demo(out, folder)
     _answer(result.text, result.content, json_to)
     if view:
         try:
@@ -132,11 +200,10 @@ def check(logs: Logs, profile: ProfileOption = None, json_to: JsonOption = None)
 
     Example: shiplog check sample_logs/voyage_1.mcap
     """
+    _check_logs(logs, profile)
     from pipelines.prepare import check_logs
 
-    checked = check_logs(logs, profile)
-    _answer(_reports(checked.reports), report.voyages_json(checked.reports), json_to)
-    _leave(checked)
+    _leave(check_logs(logs, profile), json_to)
 
 
 @app.command()
@@ -154,20 +221,22 @@ def ingest(
 
     Example: shiplog ingest sample_logs --store store
     """
+    from shiplog.arguments import check_writable
+
+    check_writable(store, "--store")
+    _check_logs(logs, profile)
     from pipelines.prepare import expand, ingest_logs
     from shiplog.store import Store
 
-    done = ingest_logs(expand(logs), profile, Store(store), correct)
-    _answer(_reports(done.reports), report.voyages_json(done.reports), json_to)
-    _leave(done)
+    _leave(ingest_logs(expand(logs), profile, Store(store), correct), json_to)
 
 
-def _reports(reports) -> str:
-    return "\n".join(line for one in reports for line in report.voyage_lines(one))
+def _leave(done, json_to: str | None) -> None:
+    """Answer; exit 1 where nothing could be taken, 3 where something was lost or refused."""
+    from shiplog import report
 
-
-def _leave(done) -> None:
-    """Exit 1 where nothing could be taken, 3 where something was lost or refused."""
+    text = "\n".join(line for one in done.reports for line in report.voyage_lines(one))
+    _answer(text, report.voyages_json(done.reports, done.refused), json_to)
     for path, error in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {error}", err=True)
     if done.refused and not done.reports:
@@ -198,10 +267,15 @@ def convert(
 
     Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
     """
-    from pipelines.convert import convert as convert_tables
+    from shiplog.arguments import check_writable
+
+    check_writable(out, "--out")
     from shiplog import profile as profiles
 
-    done = convert_tables(tables, profiles.load(profile) if profile else None, out)
+    ship = profiles.load(profile) if profile else None
+    from pipelines.convert import convert as convert_tables
+
+    done = convert_tables(tables, ship, out)
     content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}
     _answer(f"{len(done.logs)} logs in {out}", content | {"lost": done.lost}, json_to)
     for path, why in done.refused.items():
@@ -226,13 +300,16 @@ def profile(
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
+    from shiplog.arguments import check_file, refuse_taken
+
+    if out is not None:
+        refuse_taken(out)
+        check_file(out, "--out")
     from pipelines.convert import draft
 
     text = draft(log, vessel)
     if out is None:
         typer.echo(text)
-    elif out.exists():
-        raise ShiplogError(f"{out} exists already.", hint="choose another --out.")
     else:
         out.write_text(text, encoding="utf-8")
         typer.echo(f"draft written to {out}: look over every line that says CHECK")
@@ -261,8 +338,14 @@ def voyages(
         _answer(found.text, found.content, json_to)
         return
 
+    from shiplog import report
     from shiplog.store import Store
 
+    if not store.exists():
+        raise ShiplogError(
+            f"There is no store {store}.",
+            hint="ingest logs first: shiplog ingest LOG... --store DIR.",
+        )
     entries = Store(store).entries()
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
     _answer(report.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
@@ -321,9 +404,16 @@ def train(
     Example: shiplog train --data ref --seeds 3 --out runs/ref
     Example: shiplog train --model mmg --voyages 'trial_*' --out runs/mmg
     """
-    from pipelines.train import check_choices, train_command
+    from shiplog.arguments import check_training, check_writable, refuse_taken
 
-    check_choices(model, data, recipe, wind_input)
+    physical = {
+        "--no-fit": not fit, "--parameters": parameters is not None, "--without": bool(without),
+        "--free": bool(free), "--folds": folds is not None,
+    }  # fmt: skip
+    check_training(model, data, recipe, wind_input, physical)
+    refuse_taken(out)
+    check_writable(out, "--out")
+    _check_voyages(store, voyages, validation)
     if model != "feedforward":
         from pipelines.identify import identify_command
 
@@ -344,17 +434,8 @@ def train(
         )
         _answer(found.text, found.content, json_to)
         return
-    for option, given in (
-        ("--no-fit", not fit),
-        ("--parameters", parameters),
-        ("--without", without),
-        ("--free", free),
-        ("--folds", folds is not None),
-    ):
-        if given:
-            raise ShiplogError(
-                f"{option} says nothing to a network.", hint="it goes with --model mmg or hybrid."
-            )
+    from pipelines.train import train_command
+
     answer = train_command(
         store,
         out,
@@ -377,16 +458,18 @@ def evaluate(
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
     voyages: Voyages = None,
     store: StoreOption = STORE,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """L, RMSE per channel, end errors, coverage, against two floors.
 
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """
+    _check_runs([run], store, voyages, cause)
     from pipelines.evaluate import evaluate_runs, save
     from shiplog.store import Store
 
-    found = evaluate_runs([run], Store(store), voyages or [])
+    found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     save(found)
     _answer(found.text(), found.answer(found.runs[0]), json_to)
 
@@ -400,16 +483,22 @@ def compare(
         Path | None, typer.Option(help="Write the recording here and open nothing.")
     ] = None,
     web: Annotated[bool, typer.Option("--web", help="Serve it on 127.0.0.1.")] = False,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """Measured against simulated in Rerun.
 
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
+    from shiplog.arguments import check_file
+
+    _check_runs(runs, store, voyages, cause)
+    if save is not None:
+        check_file(save, "--save")
     from pipelines.evaluate import compare_runs
     from shiplog.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], save)
+    result = compare_runs(runs, Store(store), voyages or [], save, cause or [])
     _answer(result.text, result.content, json_to)
     if save is None:
         try:
@@ -430,22 +519,63 @@ def diagnose(
     extend: Annotated[
         Path | None, typer.Option(help="Write the model with the named causes as this run.")
     ] = None,
-    cause: Annotated[
-        list[Path] | None,
-        typer.Option("--cause", help="A Python file with causes of your own; several times."),
-    ] = None,
+    cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """What the simulation gets wrong, why, the extended model, and the gain on held-out voyages.
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """
+    from shiplog.arguments import check_writable, refuse_taken
+
+    _check_runs([run], store, voyages, cause)
+    check_writable(out, "--out")
+    if extend is not None:
+        refuse_taken(extend, "--extend")
+        check_writable(extend, "--extend")
     from pipelines.diagnose import diagnose_command
 
     found = diagnose_command(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
     )
     _answer(found.text, found.content, json_to)
+
+
+def _check_logs(logs: Sequence[Path], profile: str | None) -> None:
+    """Raises ShiplogError where there is no such profile, or none of the logs is there; one of
+    several that is not there does not stop the others."""
+    from shiplog import profile as profiles
+    from shiplog.exceptions import LogUnreadable
+
+    if profile is not None:
+        profiles.load(profile)
+    if not any(log.exists() for log in logs):
+        raise LogUnreadable(
+            f"{logs[0]} does not exist.", hint="give the path of an MCAP log, or a folder of them."
+        )
+
+
+def _check_voyages(store: Path, *patterns: Sequence[str] | None) -> None:
+    """Raises StoreError for a store or voyage that is not there."""
+    from shiplog.store import Store
+
+    for chosen in patterns:
+        Store(store).select(list(chosen or ()))
+
+
+def _check_runs(
+    runs: Sequence[Path],
+    store: Path,
+    voyages: Sequence[str] | None,
+    causes: Sequence[Path] | None,
+) -> None:
+    """Raises ShiplogError for a run, voyage or file that is not there."""
+    from shiplog.arguments import check_causes, check_run
+
+    for run in runs:
+        check_run(run)
+    check_causes(causes or ())
+    _check_voyages(store, voyages)
 
 
 def _show(recording: Path, web: bool) -> None:

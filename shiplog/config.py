@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,6 +11,25 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from shiplog.exceptions import RunError
+
+RECIPES = ("fast", "paper")
+WIND_INPUTS = ("angle", "components")
+
+
+@dataclass(frozen=True)
+class Augmentation:
+    """How many times over the same rows are used: every `step` rows, `copies` noisy ones."""
+
+    step: int
+    copies: int = 0
+
+
+AUGMENTATIONS = {  # Table 4 of the paper: step S and copies M, for windows of I = 100
+    "ref": Augmentation(100), "sli2": Augmentation(50), "sli10": Augmentation(10),
+    "jit2": Augmentation(100, 2), "jit10": Augmentation(100, 10),
+    "sli2xjit2": Augmentation(50, 2), "sli10xjit10": Augmentation(10, 10),
+    "d-ref": Augmentation(100),
+}  # fmt: skip
 
 
 class Section(BaseModel):
@@ -58,7 +78,7 @@ class Physics(Section):
     parameters: str = ""  # where the starting values are from
     without: tuple[str, ...] = ()  # forces switched off
     free: tuple[str, ...] = ()  # patterns of the parameters that may move; empty is all
-    substeps: int = Field(default=1, ge=1)  # Euler steps within each measured one
+    substeps: int = Field(default=1, ge=1, le=1000)  # Euler steps within each measured one
     folds: int = Field(default=5, ge=0)  # that voyages are held out in; below 2, none is
     # on the plausible spreads, for the ridge; to choose from on validation voyages
     ridges: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
@@ -120,7 +140,8 @@ def load(path: Path) -> Config:
     """A config from TOML. Raises RunError naming what is wrong."""
     try:
         return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (OSError, tomllib.TOMLDecodeError, ValidationError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # of TOML, UTF-8 and pydantic
+        first = str(error).splitlines()[0] if isinstance(error, ValidationError) else error
         raise RunError(
-            f"{path} is no configuration of a run: {error}.", hint="train the run again."
+            f"{path} is no configuration of a run: {first}.", hint="train the run again."
         ) from error

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 class ShiplogError(Exception):
     """The input is at fault. The command line prints it without a traceback and exits with 1."""
 
+    exit_code = 1
+
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message)
         self.message = message
@@ -16,6 +18,12 @@ class ShiplogError(Exception):
 
     def __str__(self) -> str:
         return f"{self.message}\n  {self.hint}" if self.hint else self.message
+
+
+class UsageError(ShiplogError):
+    """A command line that cannot be meant so: a word that names nothing, options at odds."""
+
+    exit_code = 2
 
 
 class LogUnreadable(ShiplogError):

@@ -176,8 +176,8 @@ class Extension:
             kind = by.get(entry["label"], by.get(entry["name"]))
             if kind is None:
                 raise RunError(
-                    f"The run was extended by {entry['label']!r}, which nobody knows here.",
-                    hint="extend it again with the --cause file that defines it.",
+                    f"The run was extended by {entry['label']!r}, which is no cause of shiplog's.",
+                    hint="give the file that defines it with --cause FILE.",
                 )
             made = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["made"].items()}
             cause = replace(kind, **made)

@@ -15,11 +15,20 @@ import polars as pl
 from shiplog import align, channels, midship, parity, quality
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
-from shiplog.findings import VoyageReport
+from shiplog.findings import Finding, VoyageReport
 from shiplog.grid import Grid, mark_gaps, mark_holds, mark_jumps
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.parity import Estimate
 from shiplog.profile import Actuator, Profile, Sensor, Source
+
+CLOCKS = {  # of a source: its column, and the one that it is held against
+    "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
+    "publish": ("publish_time", "log_time"),
+}  # fmt: skip
+
+# Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
+# rows (100 s) are no voyage. A million rows, 28 hours, take 100 MB, whatever they hold.
+LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,7 @@ def ingest(path, profile: Profile) -> Voyage:
 def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
     _require(reading, profile)
+    reading, left_out = _without_strays(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -55,6 +65,13 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         )
     driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
     start, end = _span(base, [*sampled.values(), *driven.values()])
+    if (end - start) // align.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
+        raise LogUnreadable(
+            f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
+            f"{(end - start) * 1e-9 / align.DAY_S:.1f} days apart.",
+            hint="set another `clock` for the heading in the profile, or record the log again "
+            "with a clock that runs.",
+        )
     grid = Grid(align.grid(start, end))
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
@@ -81,7 +98,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *grid.findings, *said),
+        findings=(*reading.health.findings, *left_out, *grid.findings, *said),
     )
     return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
 
@@ -127,15 +144,44 @@ def _require(reading: Reading, profile: Profile) -> None:
                 )
 
 
+def _clock(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
+    """The column that says when a source measured, and the one to hold it against."""
+    if source.clock == "message" and frame["stamp"].null_count() == frame.height:
+        return CLOCKS["log"]  # the message carries no time: the recorder's is all there is
+    return CLOCKS[source.clock]
+
+
+def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
+    """The log without the messages whose stamps cannot be of this voyage, and what they are."""
+    frames, findings = dict(reading.frames), []
+    for source in (*(s for _, s in profile.sensors.items()), *profile.actuators):
+        frame = frames.get(source.topic)
+        if frame is None or frame.height == 0:
+            continue
+        clock, other = _clock(frame, source)
+        known = frame.filter(pl.col(clock).is_not_null())
+        times = known[clock].to_numpy()
+        stray = align.strays(times, known[other].to_numpy())
+        if not stray.any():
+            continue
+        frames[source.topic] = known.filter(~stray)
+        off = np.median(times[~stray]) - times[stray].astype(float)
+        far = float(np.abs(off).max()) * 1e-9
+        how = f"{far / align.DAY_S:.3g} days" if far > align.DAY_S else f"{far:.0f} s"
+        sentence = (
+            f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
+            f"cannot be of this voyage, being up to {how} away."
+        )
+        findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
+    return replace(reading, frames=frames), findings
+
+
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     """Time [n] ns by the source's clock and SI values [n, k]."""
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
-    clock = {"message": "stamp", "log": "log_time", "publish": "publish_time"}[source.clock]
-    times = frame[clock]
-    if times.null_count() == frame.height and clock == "stamp":
-        times = frame["log_time"]  # the message carries no time: the recorder's is all there is
+    times = frame[_clock(frame, source)[0]]
     values = [
         (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -18,12 +18,16 @@ from shiplog import channels, units
 from shiplog.exceptions import ProfileError, listed, nearest
 
 Clock = Literal["message", "log", "publish"]
+Accuracy = Annotated[float, Field(ge=0)]
 
 
 class Section(BaseModel):
-    """A part of a profile: frozen, and every key known."""
+    """A part of a profile: frozen, every key known, every number finite.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    A lever arm of NaN would empty every position of a voyage without a word.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Ship(Section):
@@ -95,7 +99,8 @@ class Sensor(Source):
 
     kind: str | None = None
     lever_arm_m: tuple[float, float] = (0.0, 0.0)  # [ahead, starboard] of midship
-    sigma: float | tuple[float, ...] | None = None  # accuracy, in `unit`; position always in m
+    # accuracy, in `unit`; position always in m
+    sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = None
 
 
 KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
@@ -191,6 +196,12 @@ class Actuator(Source):
     diameter_m: float | None = Field(default=None, gt=0)
     area_m2: float | None = Field(default=None, gt=0)
     span_m: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _limited(self) -> Actuator:
+        if self.limits is not None and self.limits[0] >= self.limits[1]:
+            raise ValueError(f"limits are {list(self.limits)}; the lower one stands first")
+        return self
 
     @property
     def circular(self) -> bool:
@@ -332,11 +343,19 @@ def load(name_or_path: str | Path) -> Profile:
     if path.suffix == ".toml" or path.exists():
         if not path.is_file():
             raise ProfileError(
-                f"There is no profile file {path}.",
+                f"The profile {path} is a folder, not a file."
+                if path.is_dir()
+                else f"There is no profile file {path}.",
                 hint=f"shipped profiles: {listed(shipped())}; "
                 "or draft one with `shiplog profile LOG`.",
             )
-        text, source = path.read_text(encoding="utf-8"), str(path.resolve())
+        try:
+            text, source = path.read_text(encoding="utf-8"), str(path.resolve())
+        except (OSError, UnicodeDecodeError) as error:
+            raise ProfileError(
+                f"The profile {path} cannot be read: {error}.",
+                hint="save it as UTF-8 text, in a file that you may read.",
+            ) from error
     else:
         name = str(name_or_path)
         if name not in shipped():
@@ -354,7 +373,7 @@ def parse(text: str, source: str) -> Profile:
     """A profile from TOML text. Raises ProfileError naming each wrong key."""
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also of a number of thousands of digits
         raise ProfileError(
             f"{source} is not valid TOML: {error}.",
             hint="mend that line; see the shipped profiles.",
@@ -378,19 +397,52 @@ def parse(text: str, source: str) -> Profile:
         ) from error
 
 
+SAID = {  # pydantic's kinds of error in a user's words
+    "finite_number": "has to be a finite number",
+    "float_type": "has to be a number",
+    "float_parsing": "has to be a number",
+    "tuple_type": "has to be a list",
+    "model_type": "has to be a section of keys",
+    "string_type": "has to be a text in quotes",
+    "string_pattern_mismatch": "may have letters, digits and underscores only",
+    "too_short": "is missing: at least one is needed",
+}
+
+
 def advice(error: ValidationError) -> str:
     """Pydantic's findings in a user's words, with the nearest known key for an unknown one."""
-    sentences = []
+    found: dict[str, list[str]] = {}
     for item in error.errors():
-        place = ".".join(str(part) for part in item["loc"]) or "it"
+        branch = any(_branch(part) for part in item["loc"])
+        place = ".".join(str(part) for part in item["loc"] if not _branch(part)) or "it"
         if item["type"] == "extra_forbidden":
             known = _keys_at(item["loc"][:-1])
-            sentences.append(f"{place} is not a known key{nearest(str(item['loc'][-1]), known)}")
+            sentence = f"is not a known key{nearest(str(item['loc'][-1]), known)}"
         elif item["type"] == "missing":
-            sentences.append(f"{place} is missing")
+            sentence = "is missing"
+        elif item["type"] in SAID:
+            sentence = SAID[item["type"]]
         else:
-            sentences.append(f"{place}: {item['msg'].removeprefix('Value error, ')}")
-    return "; ".join(sentences)
+            words = item["msg"].removeprefix("Value error, ")
+            sentence = words.replace("Input should be", "has to be")
+            sentence = sentence if sentence != words else f": {words}"
+        if branch and item["type"] in ("float_type", "tuple_type"):
+            found.setdefault(place, [])  # a number or a list: the other alternative says more
+        else:
+            found.setdefault(place, []).append(sentence)
+    for place in [p for p in found if any(q.startswith(f"{p}.") for q in found)]:
+        if not found[place]:
+            del found[place]
+    return "; ".join(
+        f"{place} {sentence}".replace(" : ", ": ")
+        for place, sentences in found.items()
+        for sentence in sentences or ["has to be a number or a list of numbers"]
+    )
+
+
+def _branch(part: object) -> bool:
+    """Whether pydantic says with it which alternative of a type it tried."""
+    return part in ("float", "constrained-float") or str(part).startswith("tuple[")
 
 
 def _keys_at(location: tuple) -> list[str]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import polars as pl
 
 from shiplog.findings import CONTRACT, VoyageReport
 from shiplog.judgement import FEWEST
 from shiplog.profile import Profile
-from shiplog.store import Entry
+
+if TYPE_CHECKING:
+    from shiplog.store import Entry
 
 MOST_FINDINGS = 12
 
@@ -62,9 +65,13 @@ def voyage_lines(report: VoyageReport) -> list[str]:
     return lines
 
 
-def voyages_json(reports: Sequence[VoyageReport]) -> dict:
-    """The contract's answer of `check` and `ingest`."""
-    return {"contract": CONTRACT, "voyages": [report.as_json() for report in reports]}
+def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object]) -> dict:
+    """The contract's answer of `check` and `ingest`; refused: file → why."""
+    return {
+        "contract": CONTRACT,
+        "voyages": [report.as_json() for report in reports],
+        "refused": {path: str(why) for path, why in refused.items()},
+    }
 
 
 def catalogue(entries: Sequence[Entry]) -> str:

@@ -11,6 +11,8 @@
     <run>/cross_validation.parquet          L of every training window by a fit without its voyage
     <run>/band.safetensors                  how far off a simulation may be
     <run>/extension.json  extension.safetensors   causes that a diagnosis put into it
+    <run>/extension-<k>.py                  where some are a user's own: their code, to be read. It
+                                            is never run from here: a run may be anybody's
     <run>/errors.parquet  rollouts.parquet  of the latest evaluation, per window, step and seed
 
 While it is being trained a run is called <run>.partial; it is renamed when every seed is done.
@@ -30,22 +32,25 @@ from typing import Any
 import numpy as np
 import polars as pl
 import torch
+from pydantic import ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load_file as load_arrays
 from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog import config as configuration
-from shiplog import earlier_runs, user_causes
+from shiplog import earlier_runs
+from shiplog.arguments import check_run, refuse_taken
 from shiplog.band import Band
+from shiplog.causes import CATALOGUE, Cause
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
 from shiplog.extend import ExtendedSimulator, Extension, campaign
-from shiplog.models import mmg, network
+from shiplog.models import MODELS, mmg, network
 from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
-from shiplog.profile import Profile
+from shiplog.profile import Profile, advice
 from shiplog.record import Record
 from shiplog.reference import Start
 from shiplog.report import finite
@@ -57,11 +62,15 @@ HELD = 1e-9  # spread of numbers that a diagnosis leaves where they are
 
 @dataclass(frozen=True)
 class Run:
-    """An opened run folder, finished or partial."""
+    """An opened run folder, finished or partial.
+
+    causes  of the user's own, without which a run that was extended by them cannot be simulated
+    """
 
     path: Path
     config: Config
     profile: Profile
+    causes: tuple[Cause, ...] = ()
 
     @property
     def name(self) -> str:
@@ -102,20 +111,24 @@ class Run:
         )
 
     def scaling(self) -> Scaling:
-        tensors = _tensors(self.path / "scaling.safetensors")
-        return Scaling(*(tensors[name] for name in Scaling.__slots__))
+        path = self.path / "scaling.safetensors"
+        tensors = _tensors(path)
+        try:
+            return Scaling(*(tensors[name] for name in Scaling.__slots__))
+        except KeyError as error:
+            raise _unreadable(path, f"it lacks {error}") from error
 
     def windows(self) -> pl.DataFrame:
         """The plan of the training windows: voyage, segment, start, copy."""
-        return pl.read_parquet(self.path / "windows.parquet")
+        return _table(self.path / "windows.parquet")
 
     def training(self) -> pl.DataFrame:
         """The 1 Hz rows the run was trained on, sorted, as `table.resample` gave them."""
-        return pl.read_parquet(self.path / "training.parquet")
+        return _table(self.path / "training.parquet")
 
     def validation(self) -> pl.DataFrame:
         """The 1 Hz rows of the validation voyages, likewise."""
-        return pl.read_parquet(self.path / "validation.parquet")
+        return _table(self.path / "validation.parquet")
 
     def empty_model(self) -> FeedForward:
         return FeedForward(self.shape, self.scaling())
@@ -131,14 +144,30 @@ class Run:
     @property
     def extension(self) -> Extension | None:
         """The causes that a diagnosis named and put into this run; None for a plain one. Raises
-        RunError for one of an earlier program."""
+        RunError for one of an earlier program, and for a user's cause that was not given."""
         path = self.path / "extension.json"
         if not path.is_file():
             return None
-        told = json.loads(path.read_text("utf-8"))
+        told = _json(path)
+        known = {cause.label for cause in (*CATALOGUE, *self.causes)}
+        try:
+            entries = [(str(entry["label"]), str(entry["name"])) for entry in told["causes"]]
+        except (KeyError, TypeError) as error:
+            raise _unreadable(path, error) from error
+        lacking = [label for label, name in entries if not {label, name} & known]
+        if lacking:
+            code = listed(str(p) for p in sorted(self.path.glob("extension-*.py")))
+            raise RunError(
+                f"The run {self.name} was extended by {listed(lacking)}, which is no cause of "
+                "shiplog's.",
+                hint="give the file that defines it with --cause FILE"
+                + ("." if code == "none" else f"; a copy to look over first: {code}."),
+            )
         arrays = _arrays(self.path / "extension.safetensors")
-        own = user_causes.load(sorted(self.path.glob("extension-*.py")))
-        found = Extension.of(told, arrays, own)
+        try:
+            found = Extension.of(told, arrays, self.causes)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise _unreadable(path, error) from error
         if self.config.physical:
             seed = self.config.seeds[0]
             names = self.simulator(seed).model.names
@@ -242,12 +271,21 @@ class Run:
             for name, value in arrays.items()
             if name.startswith("residual.")
         }
-        residual = hybrid.Residual(width=self.config.physics.width, **fixed)
+        try:
+            residual = hybrid.Residual(width=self.config.physics.width, **fixed)
+        except TypeError as error:
+            raise _unreadable(self._seed(seed) / "model.safetensors", error) from error
         return self._simulator(hybrid.Hybrid(physics, residual), seed, arrays)
 
     def _simulator(self, model: Any, seed: int, arrays: dict[str, np.ndarray]) -> Simulator:
-        place = self._kept(seed, len(arrays["theta"]), model.names)
-        return Simulator(model, place.vector(arrays["theta"]), place.matrix(arrays["covariance"]))
+        try:
+            place = self._kept(seed, len(arrays["theta"]), model.names)
+            theta, covariance = place.vector(arrays["theta"]), place.matrix(arrays["covariance"])
+        except (KeyError, ValueError, TypeError) as error:
+            raise _unreadable(self._seed(seed) / "model.safetensors", error) from error
+        if not np.isfinite(theta).all():
+            raise _unreadable(self._seed(seed) / "model.safetensors", "it holds no finite numbers")
+        return Simulator(model, theta, covariance)
 
     def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:
         return earlier_runs.kept(self.identified(seed)["name"].to_list(), count, names)
@@ -276,7 +314,7 @@ class Run:
 
     def identified(self, seed: int = 0) -> pl.DataFrame:
         """name, symbol, meaning, unit, start, spread, value, standard_error, free."""
-        return pl.read_parquet(self._seed(seed) / "identified.parquet")
+        return _table(self._seed(seed) / "identified.parquet")
 
     def save_cross_validation(self, losses: pl.DataFrame) -> None:
         """groups, voyage, window, start (L of the starting values), loss."""
@@ -292,12 +330,16 @@ class Run:
 
     def model(self, seed: int) -> FeedForward:
         model = self.empty_model()
-        _fill(model, _tensors(self._seed(seed) / "model.safetensors"))
+        path = self._seed(seed) / "model.safetensors"
+        try:
+            _fill(model, _tensors(path))
+        except (KeyError, RuntimeError) as error:  # of another size than the settings say
+            raise _unreadable(path, error) from error
         return model.double()
 
     def history(self, seed: int) -> pl.DataFrame:
         """epoch, training, validation, smoothed."""
-        return pl.read_parquet(self._seed(seed) / "training.parquet")
+        return _table(self._seed(seed) / "training.parquet")
 
     def finished(self, seed: int) -> bool:
         return (self._seed(seed) / "training.parquet").is_file()
@@ -385,8 +427,7 @@ def create(
     Raises RunError where the name is taken by a finished run or by other settings.
     """
     partial = path.with_name(f"{path.name}.partial")
-    if path.exists():
-        raise RunError(f"{path} exists already.", hint="choose another --out, or remove it.")
+    refuse_taken(path)
     if partial.is_dir() and (partial / "config.toml").is_file():
         begun = configuration.load(partial / "config.toml")
         same = begun == config and _same_rows(partial, training)
@@ -407,35 +448,42 @@ def create(
             partial / "scaling.safetensors",
             {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
         )
-    # Last: a folder with a config is one that can be gone on with.
-    (partial / "config.toml").write_text(config.to_toml(), encoding="utf-8")
+    # Last, and whole: a folder with a config is one that can be gone on with.
+    begun = partial / "config.partial"
+    begun.write_text(config.to_toml(), encoding="utf-8")
+    begun.replace(partial / "config.toml")
     return Run(partial, config, profile)
 
 
-def load(path: str | Path) -> Run:
-    """A finished run. Raises RunError."""
+def load(path: str | Path, causes: Sequence[Cause] = ()) -> Run:
+    """A finished run. Raises RunError.
+
+    causes   of the user's own, for a run that was extended by them; see `user_causes.load`
+    """
     path = Path(path)
-    if not (path / "config.toml").is_file():
-        begun = path.with_name(f"{path.name}.partial")
-        if begun.is_dir():
-            raise RunError(
-                f"The run {path} is not finished.",
-                hint="give the same `shiplog train` again: it goes on.",
-            )
-        raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
-    return open_folder(path)
+    check_run(path)
+    return replace(open_folder(path), causes=tuple(causes))
 
 
 def open_folder(path: Path) -> Run:
-    """A run folder as it stands, finished or partial."""
-    profile = Profile.model_validate(json.loads((path / "profile.json").read_text("utf-8")))
-    return Run(path, configuration.load(path / "config.toml"), profile)
+    """A run folder as it stands, finished or partial. Raises RunError for one that is spoilt."""
+    config = configuration.load(path / "config.toml")
+    if config.model not in MODELS:
+        raise RunError(
+            f"{path / 'config.toml'} is no configuration of a run: there is no model "
+            f"{config.model!r}.",
+            hint="train the run again, or open it with the shiplog that made it.",
+        )
+    try:
+        profile = Profile.model_validate(_json(path / "profile.json"))
+    except ValidationError as error:
+        raise _unreadable(path / "profile.json", advice(error)) from error
+    return Run(path, config, profile)
 
 
 def extend(run: Run, out: Path, simulator: ExtendedSimulator, files: Sequence[Path] = ()) -> Run:
     """A new run: everything of the old one, and the causes. Raises RunError for a taken name."""
-    if out.exists():
-        raise RunError(f"{out} exists already.", hint="choose another --extend, or remove it.")
+    refuse_taken(out, "--extend")
     partial = out.with_name(f"{out.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     shutil.copytree(
@@ -446,12 +494,13 @@ def extend(run: Run, out: Path, simulator: ExtendedSimulator, files: Sequence[Pa
         ),
     )  # fmt: skip
     told, arrays = Extension.kept(simulator, len(simulator.model.base.names))
-    for i, path in enumerate(files):
+    own = tuple(cause for cause in simulator.model.causes if cause.user)
+    for i, path in enumerate(files if own else ()):
         shutil.copy(path, partial / f"extension-{i}.py")
-    write_json(partial / "extension.json", told | {"base": run.name, "files": len(files)})
+    write_json(partial / "extension.json", told | {"base": run.name})
     _save_arrays(partial / "extension.safetensors", arrays)
     partial.rename(out)
-    return Run(out, run.config, run.profile)
+    return Run(out, run.config, run.profile, own)
 
 
 def write_json(path: Path, content: dict) -> None:
@@ -492,14 +541,32 @@ def _tensors(path: Path) -> dict[str, torch.Tensor]:
     try:
         return load_file(path)
     except (OSError, SafetensorError) as error:
-        raise RunError(f"{path} cannot be read: {error}.", hint="train the run again.") from error
+        raise _unreadable(path, error) from error
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise _unreadable(path, error) from error
+
+
+def _table(path: Path) -> pl.DataFrame:
+    try:
+        return pl.read_parquet(path)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, why: object) -> RunError:
+    return RunError(f"{path} cannot be read: {why}.", hint="train the run again.")
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
     try:
         return load_arrays(path)
     except (OSError, SafetensorError) as error:
-        raise RunError(f"{path} cannot be read: {error}.", hint="train the run again.") from error
+        raise _unreadable(path, error) from error
 
 
 def _save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from shiplog.arguments import check_causes
 from shiplog.causes import CATALOGUE, Cause
 from shiplog.exceptions import RunError
 
@@ -28,12 +29,10 @@ def load(paths: Sequence[Path]) -> tuple[Cause, ...]:
 
 
 def _of(path: Path) -> list[Cause]:
+    check_causes([path])
     name = f"shiplog_user_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise RunError(
-            f"{path} is no Python file.", hint="give --cause a file such as my_cause.py."
-        )
+    assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

@@ -22,7 +22,7 @@ def call(*arguments):
     """Exit code, stdout and stderr, with a ShiplogError handled as `main` does."""
     result = CliRunner().invoke(cli.app, [str(a) for a in arguments])
     if isinstance(result.exception, ShiplogError):
-        return 1, result.stdout, str(result.exception)
+        return result.exception.exit_code, result.stdout, str(result.exception)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     return result.exit_code, result.stdout, result.stderr
@@ -138,19 +138,20 @@ def test_a_finished_run_is_not_trained_over(run, store):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "expected"),
+    ("expected_code", "arguments", "expected"),
     [
-        (("--model", "feedfoward"), "did you mean 'feedforward'"),
-        (("--data", "sli3"), "--data can be"),
-        (("--recipe", "papr"), "did you mean 'paper'"),
-        (("--voyages", "trp_1"), "did you mean 'trip_1'"),
-        (("--window", "400"), "cannot be split"),
-        (("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"), "longer than every"),
+        (2, ("--model", "feedfoward"), "did you mean 'feedforward'"),
+        (2, ("--data", "sli3"), "--data can be"),
+        (2, ("--recipe", "papr"), "did you mean 'paper'"),
+        (1, ("--voyages", "trp_1"), "did you mean 'trip_1'"),
+        (1, ("--window", "400"), "cannot be split"),
+        (1, ("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"),
+         "longer than every"),
     ],
-)
-def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, expected):
+)  # fmt: skip
+def test_a_wrong_choice_names_the_right_ones(store, tmp_path, expected_code, arguments, expected):
     code, _, said = call("train", "--store", store, "--out", tmp_path / "r", *arguments)
-    assert code == 1 and expected in said
+    assert code == expected_code and expected in said
     assert not list(tmp_path.iterdir())
 
 
@@ -175,6 +176,28 @@ def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
     assert call("voyages", "--store", store)[1].count("trip_1") == 1
     code, _, said = call("ingest", bad, "--store", tmp_path / "other")
     assert code == 1 and not (tmp_path / "other").exists()
+
+
+def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path, monkeypatch):
+    """Its trace is kept, and its sentence says where."""
+    from pipelines import prepare
+
+    def broken(path, profile):
+        if path.stem == "trip_1":
+            raise ZeroDivisionError("of a kind that nobody foresaw")
+        return ingest(path, profile)
+
+    ingest = prepare.ingest
+    monkeypatch.setattr(prepare, "ingest", broken)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    code, _, said = call("ingest", logs, "--store", tmp_path / "store")
+    assert code == 3 and "trip_1.mcap refused" in said and "ZeroDivisionError" in said
+    assert "Traceback" not in said
+    (trace,) = (tmp_path / "cache").rglob("*.txt")
+    assert str(trace) in said and "in broken" in trace.read_text()
+    names = [v["name"] for v in json.loads(call("voyages", "--store", tmp_path / "store",
+                                                "--json", "-")[1])["voyages"]]  # fmt: skip
+    assert names == ["trip_2", "trip_3"]
 
 
 def test_the_same_name_with_other_content_is_refused_by_name(logs, store, tmp_path):

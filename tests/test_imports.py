@@ -11,14 +11,15 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROWS = (  # each may import its own row (a package its own modules) and the rows above
     {"exceptions", "channels", "seeds", "cache", "timescale", "parts"},
-    {"units", "findings", "traced"},
+    {"units", "findings", "traced", "unexpected"},
     {"profile", "config", "logs", "comparison", "exhibit"},
     {"align", "midship", "quality", "conversion"},
     {"draft"},
     {"grid", "table", "parity", "parity_fit", "record", "variational"},
     {"ingest", "causes", "segments", "parity_campaign"},
-    {"store", "windows", "correct", "user_causes"},
+    {"store", "windows", "correct"},
     {"models"},
+    {"arguments", "user_causes"},
     {"engine", "simulate", "coverage", "sensitivity"},
     {"identify", "band", "gain"},
     {

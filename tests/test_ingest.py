@@ -7,8 +7,9 @@ import polars as pl
 import pytest
 import sailing
 
+from shiplog import align
 from shiplog.channels import Quality
-from shiplog.exceptions import ChannelMissing, ProfileError
+from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
 from shiplog.ingest import ingest
 from shiplog.logs.write import Series
 
@@ -217,3 +218,61 @@ def test_a_profile_that_cannot_be_is_refused_with_advice(old, new, expected):
     with pytest.raises(ProfileError) as caught:
         sailing.profile(sailing.PROFILE.replace(old, new))
     assert expected in str(caught.value)
+
+
+DAY = 86_400_000_000_000
+
+
+def restamped(parts, topic, rows, by):
+    """Stamps moved by so many ns; the recorder's clock tells the truth."""
+    one = parts[topic]
+    time = one.time.copy()
+    time[rows] += by
+    return {**parts, topic: replace(one, time=time, log_time=one.time)}
+
+
+@pytest.mark.parametrize("topic", ["/gyro", "/velocity", "/rudder"])
+@pytest.mark.parametrize(
+    ("rows", "by"),
+    [(300, 10 * DAY), (300, -10 * DAY), ([5, 300], -sailing.START), (299, 1024 * 7 * DAY),
+     (300, 3600 * 10**9), (300, 120 * 10**9), (slice(0, 200), -sailing.START)],
+    ids=["ten days late", "ten days early", "1970", "week rollover", "an hour", "two minutes",
+         "starts in 1970"],
+)  # fmt: skip
+def test_a_stamp_that_cannot_belong_is_left_out_and_said(voyage, topic, rows, by):
+    parts = sailing.series()
+    clean = voyage(parts)
+    done = voyage(restamped(parts, topic, rows, by))
+    assert done.table.height <= clean.table.height
+    both = done.table.join(clean.table, on="time", suffix="_clean")
+    assert both.height == done.table.height  # no row at any other time
+    for name in ("x0", "surge", "heading", "rudder"):
+        off = (both[name] - both[f"{name}_clean"]).drop_nulls()
+        assert float(off.abs().max()) < 1e-9
+    said = [f for f in done.report.findings if f.kind == "jump"]
+    assert {f.channel for f in said} == {topic}
+    count = 200 if isinstance(rows, slice) else np.size(rows)
+    assert said[0].sentence.startswith(f"{count} of ")
+    assert said[0].value == pytest.approx(abs(by) * 1e-9, abs=60.0)
+
+
+def test_a_sensor_that_fell_out_for_long_and_came_back_for_a_moment_is_data(voyage):
+    parts = sailing.series(2000.0)
+    t = (parts["/velocity"].time - sailing.START) * 1e-9
+    done = voyage(kept(parts, "/velocity", (t < 1500.0) | (t > 1999.5)))
+    assert "/velocity" not in [f.channel for f in done.report.findings]
+    assert done.table["surge"].to_numpy()[-3:] == pytest.approx(sailing.SPEED, abs=1e-5)
+
+
+def test_a_slow_sensor_has_no_strays():
+    time = sailing.START + np.arange(0, 200) * 180 * 10**9  # a report every three minutes
+    assert not align.strays(time, time + 10**9).any()
+    assert not align.strays(time, sailing.START + np.arange(0, 200)).any()  # replayed at once
+
+
+def test_stamps_scattered_over_years_are_refused_and_not_laid_on_a_grid(voyage):
+    parts = sailing.series()
+    gyro = parts["/gyro"]
+    time = sailing.START + np.arange(len(gyro.time)) * 12 * 3600 * 10**9
+    with pytest.raises(LogUnreadable, match="days apart"):
+        voyage({**parts, "/gyro": replace(gyro, time=time)})

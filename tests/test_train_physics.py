@@ -13,12 +13,14 @@ import pytest
 import sailing
 from safetensors.numpy import load_file, save_file
 from test_cli import call
+from test_user_causes import GOOD
 
 from pipelines import known_ship
 from pipelines.identify import identify_run
 from pipelines.split import choose_physical_split
 from shiplog import identify as identification
-from shiplog import ridge, runs
+from shiplog import ridge, runs, user_causes
+from shiplog.causes import CATALOGUE
 from shiplog.config import Config, Split
 from shiplog.exceptions import RunError
 from shiplog.ingest import ingest
@@ -105,6 +107,47 @@ def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_pat
     assert all(0.0 <= share <= 1.0 for share in content["band_90"].values())
 
 
+def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
+    """A run may be anybody's: a cause of its owner's comes from --cause FILE, given again."""
+    ran = tmp_path / "ran"
+    mine = tmp_path / "mine.py"
+    mine.write_text(f"{GOOD}\nwith open({str(ran)!r}, 'a') as f:\n    f.write('x')\n")
+    causes = user_causes.load([mine])
+    run = runs.load(published[0])
+    after = run.extended(0).with_causes(
+        causes, {"tide_gate": np.array([3.0])}, {"tide_gate": np.array([[0.01]])}
+    )
+    kept = runs.extend(run, tmp_path / "extended", after, [mine])
+    assert kept.label == "mmg with tide_gate"
+    was = ran.read_text()
+    for command in ("evaluate", "compare"):
+        code, _, said = call(command, kept.path, "--store", store, "--voyages", "trip_3")
+        assert code == 1 and "'tide_gate'" not in said and "tide_gate" in said
+        assert f"--cause FILE; a copy to look over first: {kept.path / 'extension-0.py'}" in said
+    assert ran.read_text() == was
+    with pytest.raises(RunError, match="--cause"):
+        runs.load(kept.path).models()
+    again = runs.load(kept.path, user_causes.load([mine])).models()[0]
+    assert again.theta == pytest.approx(after.theta)
+    code, said, _ = call("evaluate", kept.path, "--store", store, "--voyages", "trip_3",
+                         "--cause", mine)  # fmt: skip
+    assert code == 0 and "mmg with tide_gate" in said
+    assert ran.read_text() == was + "xx"
+
+
+def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_path):
+    """Also where the owner's causes were tested and not named: nothing of theirs is in it."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(GOOD)
+    run = runs.load(published[0])
+    (current,) = [c for c in CATALOGUE if c.label == "current"]
+    numbers = {"current": np.array([0.1, -0.05])}
+    after = run.extended(0).with_causes([current], numbers, {"current": 1e-4 * np.eye(2)})
+    kept = runs.extend(run, tmp_path / "extended", after, [mine])
+    assert runs.load(kept.path).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
+    assert not list(kept.path.glob("*.py"))
+
+
 def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
     """Its folder holds neither names nor numbers of the five coefficients."""
     old = tmp_path / "old"
@@ -179,7 +222,7 @@ def test_voyages_are_held_out_in_as_many_parts_as_are_asked_for(fitted, store, t
         store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, "--folds", 2, "--free", "hull.x_0f"
     )
     assert code == 0 and runs.load(tmp_path / "r").config.physics.folds == 2
-    assert call("train", "--store", store, "--out", tmp_path / "n", "--folds", 2)[0] == 1
+    assert call("train", "--store", store, "--out", tmp_path / "n", "--folds", 2)[0] == 2
 
 
 def test_one_identification_stands_for_all_seeds(fitted):
@@ -363,7 +406,7 @@ def test_a_window_longer_than_every_voyage_is_refused(store, tmp_path):
 
 def test_a_hybrid_has_to_be_fitted(store, tmp_path):
     code, _, said = train(store, tmp_path / "r", "--model", "hybrid", "--no-fit", *BOTH)
-    assert code == 1 and "has to be fitted" in said and "--model mmg" in said
+    assert code == 2 and "has to be fitted" in said and "--model mmg" in said
     assert not list(tmp_path.iterdir())
 
 

@@ -1,8 +1,11 @@
 """The recording holds what was compared, in the units its axes say, and the viewer shows it."""
 
 import math
+import subprocess
+import sys
 import urllib.request
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -15,6 +18,7 @@ from shiplog.comparison import Actuator, Comparison
 from shiplog.exceptions import ShiplogError
 from shiplog.viewer import display, forces, histogram, native, recording, timeline, trajectory
 
+ROOT = Path(__file__).parent.parent
 SECONDS = 201
 TURNING = math.radians(6.0)  # rad/s: passes north every minute
 
@@ -471,12 +475,32 @@ def test_a_recording_that_is_not_there_is_named(tmp_path):
 @pytest.mark.viewer
 def test_the_web_viewer_listens_on_this_machine_only(saved):
     with viewer.serve(saved, port=0) as served:
-        listening = psutil.Process(served.process.pid).net_connections("inet")
+        (server,) = psutil.Process(served.process.pid).children()
+        listening = server.net_connections("inet")
         hosts = {c.laddr.ip for c in listening if c.status == psutil.CONN_LISTEN}
         assert hosts == {"127.0.0.1"}
         with urllib.request.urlopen(served.address, timeout=10) as page:
             assert page.status == 200 and b"<html" in page.read()[:2000]
-    assert served.process.poll() is not None
+    assert served.process.poll() is not None and not server.is_running()
+
+
+@pytest.mark.viewer
+def test_a_server_ends_with_the_command_whatever_ends_that(saved):
+    program = (
+        "import sys; from shiplog import viewer\n"
+        "with viewer.serve(sys.argv[1], port=0) as served:\n"
+        "    print('ready', flush=True); served.wait()\n"
+    )
+    command = subprocess.Popen(
+        [sys.executable, "-c", program, str(saved)], stdout=subprocess.PIPE, cwd=ROOT
+    )
+    with command:
+        assert command.stdout.readline() == b"ready\n"
+        started = psutil.Process(command.pid).children(recursive=True)
+        assert len(started) == 2  # the server and who watches over it
+        command.kill()
+    _, alive = psutil.wait_procs(started, timeout=30)
+    assert alive == []
 
 
 @pytest.mark.viewer

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from shiplog import seeds, windows
+from shiplog.config import AUGMENTATIONS
 from shiplog.exceptions import WindowError
-from shiplog.windows import AUGMENTATIONS
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
 STATES = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from pipelines.diagnosis.trial import model_of, setting_of
 from shiplog import causes as catalogue
-from shiplog import remembered, user_causes
+from shiplog import remembered
 from shiplog.causes import Cause
 from shiplog.diagnosis import nominal_campaign
 from shiplog.diagnosis.trial import Trial
@@ -25,11 +24,12 @@ class Setup:
 
 
 def trial_of(
-    run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path],
+    run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
     lacking: str = "",
 ) -> Setup:  # fmt: skip
     """Of a network the ship's MMG is asked, fitted to the voyages that the network was trained on.
 
+    own       causes of the user's
     nominal   the voyages that the run was made on, before these; None where there are none
     lacking   why the model cannot tell causes that change forces; empty where it can
     """
@@ -37,7 +37,7 @@ def trial_of(
     extension = run.extension
     held = {} if extension is None else {c.label: c for c in extension.causes}
     fitted = "" if nominal is not None or run.given else _fitted(run)
-    wanted = [c for c in (*catalogue.CATALOGUE, *user_causes.load(cause_files))
+    wanted = [c for c in (*catalogue.CATALOGUE, *own)
               if c.label not in held]  # fmt: skip
     chosen, untested = catalogue.testable(setting, wanted, fitted)
     if lacking:

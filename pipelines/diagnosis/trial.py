@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from pipelines.prepare import seconds
 from pipelines.split import plan
 from shiplog import causes as catalogue
-from shiplog import parts, record, reference, remembered, table, timescale, user_causes, windows
+from shiplog import parts, record, reference, remembered, table, timescale, windows
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
 from shiplog.extend import ExtendedSimulator, campaign
@@ -73,7 +72,7 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
 
 
 def trial_of(
-    run: Run, nominal: Record | None, recorded: Record, cause_files: Sequence[Path]
+    run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause]
 ) -> tuple[Trial, dict[str, str]]:
     """Reference and trial; which causes cannot be tested, and why. Of a network the ship's MMG is
     asked, fitted to the voyages that the network was made on."""
@@ -82,7 +81,7 @@ def trial_of(
     held = {} if extension is None else {c.label: c for c in extension.causes}
     untested: dict[str, str] = {}
     chosen = list(held.values())  # they are in the model, testable here or not
-    for one in (*catalogue.CATALOGUE, *user_causes.load(cause_files)):
+    for one in (*catalogue.CATALOGUE, *own):
         if one.label in held:
             continue
         missing = one.missing(setting)

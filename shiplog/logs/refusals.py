@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable
@@ -10,10 +11,15 @@ MAGIC = b"\x89MCAP0\r\n"
 
 
 def check_file(path: Path) -> None:
-    """Refuse a folder and a missing file."""
+    """Refuse a folder, a missing file and one that may not be read."""
+    if path.is_dir():
+        raise LogUnreadable(
+            f"{path} is a folder without MCAP logs.", hint="give a log, or a folder of them."
+        )
     if not path.is_file():
-        found = "is a folder" if path.is_dir() else "does not exist"
-        raise LogUnreadable(f"{path} {found}.", hint="give the path of one MCAP file.")
+        raise LogUnreadable(f"{path} does not exist.", hint="give the path of one MCAP file.")
+    if not os.access(path, os.R_OK):
+        raise LogUnreadable(f"{path} may not be read.", hint="change its permissions.")
 
 
 def check_magic(path: Path, start: bytes, size: int) -> None:

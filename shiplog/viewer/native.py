@@ -26,6 +26,23 @@ NATIVE_PATIENCE = 2.0  # s: a viewer that has no graphics says so at once
 WEB_PATIENCE = 30.0  # s: the first start on a slow disk
 
 
+# A server without a command is a third of a core until the machine is switched off. Whatever ends
+# this process closes the pipe that this one reads, SIGKILL included, on every system.
+SUPERVISOR = """
+import subprocess, sys, threading
+server = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+def end():
+    sys.stdin.buffer.read()
+    server.terminate()
+    try:
+        server.wait(4.0)
+    except subprocess.TimeoutExpired:
+        server.kill()
+threading.Thread(target=end, daemon=True).start()
+sys.exit(server.wait())
+"""
+
+
 def open_viewer(path: str | Path) -> None:
     """Show a recording in the native viewer, which stays open when shiplog is done."""
     path = existing(path)
@@ -71,9 +88,8 @@ def serve(path: str | Path, port: int = 9090) -> Served:
     web, data = free_port(port), free_port(9876)
     source = urllib.parse.quote(f"rerun+http://{HOST}:{data}/proxy", safe="")
     with tempfile.TemporaryFile() as said:
-        process = start(
-            [str(path), "--serve-web", "--port", str(data), "--web-viewer-port", str(web)], said
-        )
+        arguments = [str(path), "--serve-web", "--port", str(data), "--web-viewer-port", str(web)]
+        process = start(arguments, said, supervised=True)
         try:
             wait_for(process, (web, data), WEB_PATIENCE)
         except TimeoutError:
@@ -85,12 +101,16 @@ def serve(path: str | Path, port: int = 9090) -> Served:
     return Served(f"http://{HOST}:{web}/?url={source}", process)
 
 
-def start(arguments: list[str], said: IO[bytes]) -> subprocess.Popen:
-    """Start Rerun's program in a group of its own, so that Ctrl-C here does not close a window."""
+def start(arguments: list[str], said: IO[bytes], supervised: bool = False) -> subprocess.Popen:
+    """Start Rerun's program in a group of its own, so that Ctrl-C here does not close a window.
+
+    supervised   it ends when this process ends, however that comes about
+    """
+    command = [str(_program()), *arguments, "--bind", HOST]
     return subprocess.Popen(
-        [str(_program()), *arguments, "--bind", HOST],
+        [sys.executable, "-I", "-c", SUPERVISOR, *command] if supervised else command,
         env=_environment(),
-        stdin=subprocess.DEVNULL,
+        stdin=subprocess.PIPE if supervised else subprocess.DEVNULL,
         stdout=said,
         stderr=subprocess.STDOUT,
         start_new_session=True,
@@ -99,7 +119,10 @@ def start(arguments: list[str], said: IO[bytes]) -> subprocess.Popen:
 
 def stop(process: subprocess.Popen) -> None:
     """End it, at first politely."""
-    process.terminate()
+    if process.stdin is not None:
+        process.stdin.close()  # its supervisor ends it
+    else:
+        process.terminate()
     try:
         process.wait(5.0)
     except subprocess.TimeoutExpired:

@@ -41,7 +41,7 @@ def headless() -> Iterator[ViewerClient]:
     """A viewer without a window, ended whatever happens."""
     port = native.free_port()
     with tempfile.TemporaryFile() as said:
-        process = native.start(["--headless", "--port", str(port)], said)
+        process = native.start(["--headless", "--port", str(port)], said, supervised=True)
         try:
             native.wait_for(process, (port,), PATIENCE)
             yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")

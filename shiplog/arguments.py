@@ -1,0 +1,132 @@
+"""What a command line asks for, checked before anything heavy is loaded: a wrong word, a folder
+that is not there or a name that is taken is said at once, and not after the work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from shiplog.config import AUGMENTATIONS, RECIPES, WIND_INPUTS
+from shiplog.exceptions import RunError, ShiplogError, UsageError, listed, nearest
+from shiplog.models import MODELS
+
+
+def check_training(
+    model: str, data: str, recipe: str, wind_input: str | None, physical: dict[str, bool]
+) -> None:
+    """Raises UsageError for a word that names nothing, and for options that exclude each other.
+
+    physical   options of the physical models only, and whether they were given
+    """
+    for value, allowed, option in (
+        (model, MODELS, "--model"),
+        (data, AUGMENTATIONS, "--data"),
+        (recipe, RECIPES, "--recipe"),
+        (wind_input or WIND_INPUTS[0], WIND_INPUTS, "--wind-input"),
+    ):
+        if value not in allowed:
+            raise UsageError(
+                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
+                hint=f"{option} can be {listed(allowed)}.",
+            )
+    given = [option for option, was in physical.items() if was]
+    if model == "feedforward" and given:
+        raise UsageError(
+            f"{given[0]} says nothing to a network.", hint="it goes with --model mmg or hybrid."
+        )
+    if model == "hybrid" and physical["--no-fit"]:
+        raise UsageError(
+            "A hybrid's network has to be fitted.", hint="--no-fit goes with --model mmg."
+        )
+    if model != "feedforward" and AUGMENTATIONS[data].copies:
+        raise UsageError(
+            f"--data {data} is of noisy copies, which an identification has no use for.",
+            hint=f"choose {listed(n for n, a in AUGMENTATIONS.items() if not a.copies)}.",
+        )
+
+
+def refuse_taken(path: Path, option: str = "--out") -> None:
+    """Raises RunError where something is there already."""
+    if path.exists():
+        raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
+
+
+def check_writable(path: Path, option: str) -> None:
+    """Raises ShiplogError where there can be no folder of this name to write into."""
+    try:
+        there = path if path.exists() else _above(path)
+        good = there.is_dir() and os.access(there, os.W_OK)
+        why = "is not writable" if there.is_dir() else "is a file, not a folder"
+    except OSError as error:  # a name that is too long
+        raise ShiplogError(
+            f"{option} {path} cannot be used: {error.strerror}.", hint=f"choose another {option}."
+        ) from error
+    if not good:
+        raise ShiplogError(
+            f"{option} {path} cannot be written: {there} {why}.", hint=f"choose another {option}."
+        )
+
+
+def check_file(path: Path, option: str) -> None:
+    """Raises ShiplogError where no file of this name can be written; one that is there can be
+    replaced."""
+    if path.is_dir():
+        raise ShiplogError(
+            f"{option} {path} cannot be written: it is a folder.", hint="give a file's path."
+        )
+    if not path.parent.exists():
+        raise ShiplogError(
+            f"{option} {path} cannot be written: there is no folder {path.parent}.",
+            hint=f"give {option} a path in a folder that exists.",
+        )
+    check_writable(path.parent, option)
+
+
+def check_run(path: Path) -> None:
+    """Raises RunError for what is no finished run."""
+    if (path / "config.toml").is_file():
+        return
+    if path.with_name(f"{path.name}.partial").is_dir():
+        raise RunError(
+            f"The run {path} is not finished.",
+            hint="give the same `shiplog train` again: it goes on.",
+        )
+    if path.exists():
+        raise RunError(
+            f"{path} is no run: there is no config.toml in it.",
+            hint="give the folder that shiplog train --out RUN made.",
+        )
+    raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+
+
+def check_causes(paths: Sequence[Path]) -> None:
+    """Raises RunError for a --cause that is no Python file."""
+    for path in paths:
+        if not path.is_file() or path.suffix != ".py":
+            raise RunError(
+                f"{path} is no Python file.", hint="give --cause a file such as my_cause.py."
+            )
+
+
+def sample_logs(given: Path | None = None) -> Path:
+    """The folder of logs for the demo: the one given, or that of the checkout this runs from.
+    Raises ShiplogError."""
+    if given is not None:
+        if not any(given.glob("*.mcap")):
+            raise ShiplogError(f"No log in {given}.", hint="give --logs a folder of MCAP logs.")
+        return given
+    here = (Path.cwd(), Path(__file__).resolve().parent.parent)
+    for folder in here:
+        if any((folder / "sample_logs").glob("*.mcap")):
+            return folder / "sample_logs"
+    raise ShiplogError(
+        f"There is no folder sample_logs in {here[0]}.",
+        hint="run the demo from a clone of shiplog, or make the logs again with "
+        "`python -m pipelines.known_ship sample_logs` and give them with --logs.",
+    )
+
+
+def _above(path: Path) -> Path:
+    """The nearest folder above that exists."""
+    return next((p for p in path.absolute().parents if p.exists()), Path.cwd())

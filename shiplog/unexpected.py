@@ -1,0 +1,58 @@
+"""Exceptions that nobody foresaw: one sentence for the user, the trace into a file for us."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+import sys
+import tempfile
+import traceback
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from shiplog import cache
+from shiplog.exceptions import ShiplogError
+
+SHOWN = 300  # letters of an exception's own words; some libraries quote whole files
+
+
+class Unexpected(ShiplogError):
+    """A fault of the program: it says of which kind it is and where its trace was written."""
+
+
+def unexpected(error: BaseException, doing: str = "") -> Unexpected:
+    """Write the trace of an exception and say where it is.
+
+    doing   what the program was at, such as the name of a log; the command's name otherwise
+    """
+    words = " ".join(str(error).split())
+    words = words if len(words) <= SHOWN else words[:SHOWN] + "..."
+    kind = type(error).__name__
+    where = _write("".join(traceback.format_exception(error)))
+    kept = f"its trace is in {where}" if where else "its trace could not be written"
+    return Unexpected(
+        f"{doing + ': ' if doing else ''}an unexpected fault of the program ended this: {kind}"
+        f"{': ' + words if words else ''}; {kept}.",
+        hint="please report it with that file; if the input is damaged, check it as well.",
+    )
+
+
+def _write(trace: str) -> Path | None:
+    """Into the cache, which is trimmed, or the temporary folder where that cannot be written."""
+    try:
+        release = version("shiplog")
+    except PackageNotFoundError:
+        release = "not installed"
+    head = f"shiplog {release}, Python {platform.python_version()}, {platform.platform()}\n"
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S.%f")
+    text = f"{head}{' '.join(sys.argv)!a}\n\n{trace}"
+    for folder in (lambda: cache.folder() / "faults", lambda: Path(tempfile.gettempdir())):
+        try:
+            path = folder() / f"shiplog-{now}-{os.getpid()}.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", errors="backslashreplace")
+        except (OSError, RuntimeError):  # RuntimeError: no home folder is known
+            continue
+        return path
+    return None

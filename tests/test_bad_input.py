@@ -1,0 +1,421 @@
+"""What a user can get wrong, one row each: a sentence, the right exit code, never a traceback.
+
+Logs, profiles, tables, options and folders; `test_bad_runs` has what needs a trained run.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+import sailing
+
+from shiplog import cache, cli
+
+PROFILE = sailing.PROFILE
+TABLE = {  # what kvlcc2's [table] section reads
+    "run_id": ["z1"] * 3, "t_s": [0.0, 0.1, 0.2], "x0_m": [0.0] * 3, "y0_m": [0.0] * 3,
+    "psi_deg": [0.0] * 3, "u_body_mps": [1.0] * 3, "v_body_mps": [0.0] * 3, "r_degps": [0.0] * 3,
+    "delta_deg": [0.0] * 3, "n_rps": [9.0] * 3,
+}  # fmt: skip
+
+
+class Desk:
+    """A folder with a good log, a good profile and an ingested store, to spoil things in."""
+
+    def __init__(self, folder: Path, log: Path, store: Path) -> None:
+        self.folder, self.log, self.store = folder, log, store
+
+    def path(self, name: str) -> Path:
+        return self.folder / name
+
+    def file(self, name: str, content: bytes | str = b"") -> Path:
+        path = self.path(name)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    def dir(self, name: str) -> Path:
+        self.path(name).mkdir()
+        return self.path(name)
+
+    def profile(self, old: str = "", new: str = "") -> Path:
+        assert old in PROFILE
+        return self.file("p.toml", PROFILE.replace(old, new) if old else PROFILE)
+
+    def ingest(self, *arguments) -> list:
+        return ["ingest", *arguments, "--store", self.path("new")]
+
+    def through(self, old: str, new: str) -> list:
+        """Ingest the good log through a spoilt profile."""
+        return self.ingest(self.log, "--profile", self.profile(old, new))
+
+    def train(self, *arguments) -> list:
+        return ["train", "--store", self.store, "--out", self.path("run"), *arguments]
+
+    def table(self, name: str = "t.csv", **changed) -> Path:
+        frame = pl.DataFrame({**TABLE, **changed})
+        frame.write_csv(self.path(name)) if name.endswith("csv") else frame.write_parquet(
+            self.path(name)
+        )
+        return self.path(name)
+
+    def convert(self, *tables, profile: str | Path = "kvlcc2") -> list:
+        return ["convert", *tables, "--profile", profile, "--out", self.path("logs")]
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory):
+    """Two voyages of the circling ship, ingested."""
+    folder = tmp_path_factory.mktemp("known")
+    logs = [sailing.write(folder / f"{n}.mcap", sailing.series(s)) for n, s in
+            (("one", 60.0), ("two", 50.0))]  # fmt: skip
+    (folder / "circle.toml").write_text(PROFILE)
+    arguments = ["ingest", *logs, "--profile", folder / "circle.toml", "--store", folder / "store"]
+    assert cli.run([str(a) for a in arguments]) == 0
+    return folder
+
+
+@pytest.fixture
+def desk(known, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return Desk(tmp_path, known / "one.mcap", known / "store")
+
+
+def judge(arguments, code, words, capsys) -> str:
+    """Run a command line; its sentences."""
+    found = cli.run([os.fsdecode(a) if isinstance(a, Path) else str(a) for a in arguments])
+    said = capsys.readouterr()
+    said = said.out + said.err
+    assert found == code, said
+    assert "Traceback" not in said and "unexpected fault" not in said, said
+    missing = [word for word in words if word not in " ".join(said.split())]
+    assert not missing, said
+    assert not list((cache.folder() / "faults").glob("*"))
+    return said
+
+
+def halves(desk: Desk) -> bytes:
+    raw = desk.log.read_bytes()
+    return raw[: len(raw) // 2]
+
+
+LOGS = {
+    "ingest: no such log": (1, ["does not exist"], lambda d: d.ingest("nowhere.mcap")),
+    "check: no such log": (1, ["does not exist"], lambda d: ["check", "nowhere.mcap"]),
+    "profile: no such log": (1, ["does not exist"], lambda d: ["profile", "nowhere.mcap"]),
+    "0 bytes": (1, ["is empty (0 bytes)"], lambda d: d.ingest(d.file("a.mcap"))),
+    "check: 0 bytes": (1, ["is empty (0 bytes)"], lambda d: ["check", d.file("a.mcap")]),
+    "text renamed": (1, ["is no MCAP log"], lambda d: d.ingest(d.file("a.mcap", "hello you all"))),
+    "line ends converted": (1, ["copy the original again in binary mode"],
+                            lambda d: d.ingest(d.file("a.mcap", b"\x89MCAP0\n\n" + b"x" * 99))),
+    "cut within the magic": (1, ["cut off after 4 bytes"],
+                             lambda d: d.ingest(d.file("a.mcap", b"\x89MCA"))),
+    "only the magic": (1, ["a.mcap"], lambda d: d.ingest(d.file("a.mcap", b"\x89MCAP0\r\n"))),
+    "rubbish behind the magic": (1, ["a.mcap"], lambda d: d.ingest(
+        d.file("a.mcap", b"\x89MCAP0\r\n" + bytes(range(256)) * 9))),
+    "cut in half": (3, ["cut off"], lambda d: d.ingest(
+        d.file("a.mcap", halves(d)), "--profile", d.profile())),
+    "check: cut in half": (3, ["cut off"], lambda d: ["check", d.file("a.mcap", halves(d))]),
+    "profile: text": (1, ["is no MCAP log"], lambda d: ["profile", d.file("a.mcap", "hello you")]),
+    "profile: a folder": (1, ["is a folder"], lambda d: ["profile", d.dir("logs")]),
+    "an empty folder": (1, ["is a folder without MCAP logs"], lambda d: d.ingest(d.dir("logs"))),
+    "check: an empty folder": (1, ["without MCAP logs"], lambda d: ["check", d.dir("logs")]),
+    "an empty folder and a log": (3, ["without MCAP logs"], lambda d: d.ingest(
+        d.dir("logs"), d.log, "--profile", d.profile())),
+    "a good log and a bad one": (3, ["bad.mcap refused"], lambda d: d.ingest(
+        d.log, d.file("bad.mcap", "hello you"), "--profile", d.profile())),
+    "a good log and none": (3, ["nowhere.mcap refused"], lambda d: d.ingest(
+        d.log, "nowhere.mcap", "--profile", d.profile())),
+    "a Parquet table": (1, ["shiplog convert"], lambda d: d.ingest(d.table("t.parquet"))),
+    "a CSV table": (1, ["shiplog convert"], lambda d: ["check", d.table("t.csv")]),
+    "a name taken by another log": (1, ["already holds another log"], lambda d: [
+        "ingest", d.file("one.mcap", (d.log.parent / "two.mcap").read_bytes()), "--profile",
+        d.profile(), "--store", d.store]),
+    "a name too long for a folder": (1, ["too long for a folder"], lambda d: d.ingest(
+        d.file("a" * 245 + ".mcap", d.log.read_bytes()), "--profile", d.profile())),
+    "a log of nobody's profile": (1, ["shiplog profile"], lambda d: d.ingest(d.log)),
+}  # fmt: skip
+
+PROFILES = {
+    "unknown": (1, ["did you mean 'esso-osaka'"],
+                lambda d: d.ingest(d.log, "--profile", "esso-osak")),
+    "check: unknown": (1, ["no profile named"],
+                       lambda d: ["check", d.log, "--profile", "flying-dutchman"]),
+    "convert: unknown": (1, ["no profile named"], lambda d: d.convert(d.table(), profile="ship")),
+    "no file": (1, ["no profile file"], lambda d: d.ingest(d.log, "--profile", "nowhere.toml")),
+    "a folder": (1, ["is a folder"], lambda d: d.ingest(d.log, "--profile", d.folder)),
+    "of another ship": (1, ["has no topic"], lambda d: d.ingest(d.log, "--profile", "blueboat")),
+    "bad TOML": (1, ["not valid TOML", "line 2"], lambda d: d.through("[ship]", "[ship")),
+    "not UTF-8": (1, ["UTF-8"], lambda d: d.ingest(
+        d.log, "--profile", d.file("p.toml", b"\xff\xfe[ship]"))),
+    "empty": (1, ["ship is missing"], lambda d: d.ingest(d.log, "--profile", d.file("p.toml"))),
+    "6000 digits": (1, ["not valid TOML"],
+        lambda d: d.through("[ship]", f"x = {'9' * 6000}\n[ship]")),
+    "20 000 brackets": (1, ["not valid TOML"], lambda d: d.through(
+        "[ship]", f"x = {'[' * 20_000}{']' * 20_000}\n[ship]")),
+    "unknown key": (1, ["did you mean 'length_m'"], lambda d: d.through("length_m", "lenght_m")),
+    "unknown section": (1, ["did you mean 'sensors'"],
+                        lambda d: d.through("[sensors.wind]", "[sensor.wind]")),
+    "no actuator": (1, ["actuators is missing"], lambda d: d.ingest(
+        d.log, "--profile", d.file("p.toml", PROFILE[: PROFILE.index("[[actuators]]")]))),
+    "no heading": (1, ["sensors.heading is missing"],
+                   lambda d: d.through("[sensors.heading]", "[sensors.wind2]")),
+    "wrong kind of sensor": (1, ["it can be geodetic, local"],
+                             lambda d: d.through('kind = "local"', 'kind = "polar"')),
+    "wrong kind of actuator": (1, ["actuators.0.kind"],
+                               lambda d: d.through('kind = "rudder"', 'kind = "oar"')),
+    "wrong clock": (1, ["sensors.heading.clock"], lambda d: d.through(
+        'field = "heading_deg"', 'clock = "church"\nfield = "heading_deg"')),
+    "one field for two": (1, ["needs 2 field(s)"],
+                          lambda d: d.through('fields = ["x_m", "y_m"]', 'field = "x_m"')),
+    "unknown unit": (1, ["furlong"], lambda d: d.through('unit = "rpm"', 'unit = "furlong"')),
+    "unknown field": (1, ["did you mean 'heading_deg'"],
+                      lambda d: d.through('"heading_deg"', '"heading_dge"')),
+    "unknown topic": (1, ["has no topic"], lambda d: d.through('"/rudder"', '"../../etc/passwd"')),
+    "negative length": (1, ["greater than 0"],
+        lambda d: d.through("length_m = 3.0", "length_m = -3")),
+    "length inf": (1, ["finite"], lambda d: d.through("length_m = 3.0", "length_m = inf")),
+    "length in words": (1, ["ship.length_m"], lambda d: d.through("= 3.0", "= 'three'")),
+    "lever arm NaN": (1, ["finite"], lambda d: d.through("= [0.7, -0.2]", "= [nan, 0.0]")),
+    "sigma negative": (1, ["greater than or equal to 0"],
+                       lambda d: d.through("sigma = 0.05", "sigma = -0.05")),
+    "limits reversed": (1, ["the lower one stands first"],
+                        lambda d: d.through("[-35.0, 35.0]", "[35.0, -35.0]")),
+    "actuator's name a path": (1, ["letters, digits and underscores"],
+                               lambda d: d.through('"rudder"\nkind', '"../../x"\nkind')),
+    "actuator's name taken": (1, ["already taken: rudder"],
+                              lambda d: d.through('"propeller"\nkind', '"rudder"\nkind')),
+    "table's channel unknown": (1, ["the channel 'speed'"],
+                                lambda d: d.through("[ship]", "[table]\nu = 'speed'\n[ship]")),
+}  # fmt: skip
+
+TABLES = {
+    "no such table": (1, ["is no table"], lambda d: d.convert("nowhere.csv")),
+    "no table": (1, ["is no table"], lambda d: d.convert(d.file("t.xlsx", b"PK"))),
+    "rubbish Parquet": (1, ["cannot be read"], lambda d: d.convert(d.file("t.parquet", b"PAR1x"))),
+    "empty CSV": (1, ["cannot be read"], lambda d: d.convert(d.file("t.csv"))),
+    "no rows": (1, ["no row"], lambda d: d.convert(d.file("t.csv", ",".join(TABLE) + "\n"))),
+    "no time in any row": (1, ["no row"], lambda d: d.convert(d.table(t_s=[None] * 3))),
+    "a column missing": (1, ["no column for heading"], lambda d: d.convert(d.file(
+        "t.csv", "t_s,run_id,x0_m,y0_m,u_body_mps,v_body_mps,r_degps,delta_deg,n_rps\n"
+        "0,a,0,0,0,0,0,0,0\n"))),
+    "semicolons": (1, ["no column for"], lambda d: d.convert(
+        d.file("t.csv", ";".join(TABLE) + "\n" + ";".join("0" * len(TABLE)) + "\n"))),
+    "words in a number column": (1, ["'u_body_mps' holds 'fast' in row 2"], lambda d: d.convert(
+        d.table(u_body_mps=["1.0", "fast", "1.0"]))),
+    "a Boolean column": (1, ["'n_rps' holds Boolean"], lambda d: d.convert(
+        d.table("t.parquet", n_rps=[True] * 3))),
+    "a voyage that leads elsewhere": (1, ["no file can be"], lambda d: d.convert(
+        d.table(run_id=["../../x"] * 3))),
+    "a folder without tables": (1, ["holds no table"], lambda d: d.convert(d.dir("topics"))),
+    "a profile without [table]": (1, ["has no [table] section"],
+                                  lambda d: d.convert(d.table(), profile=d.profile())),
+    "a good table and a bad one": (3, ["bad.csv refused"], lambda d: d.convert(
+        d.table(), d.file("bad.csv", "a,b\n1,2\n"))),
+    "a log that is there already": (1, ["exists already"], lambda d: [
+        *d.convert(d.table())[:-1], d.file("z1.mcap").parent]),
+}  # fmt: skip
+
+OPTIONS = {
+    "no such command": (2, ["No such command"], lambda d: ["sail"]),
+    "no such option": (2, ["No such option"], lambda d: d.train("--speed", "10")),
+    "ingest without logs": (2, ["Missing argument"], lambda d: ["ingest"]),
+    "train without --out": (2, ["--out"], lambda d: ["train"]),
+    "convert without profile": (2, ["--profile"], lambda d: ["convert", "t.csv", "--out", "x"]),
+    "--seeds -1": (2, ["--seeds"], lambda d: d.train("--seeds", "-1")),
+    "--seeds three": (2, ["--seeds"], lambda d: d.train("--seeds", "three")),
+    "--window 1": (2, ["--window"], lambda d: d.train("--window", "1")),
+    "--width 0": (2, ["--width"], lambda d: d.train("--width", "0")),
+    "--epochs 0": (2, ["--epochs"], lambda d: d.train("--epochs", "0")),
+    "--folds -1": (2, ["--folds"], lambda d: d.train("--folds", "-1")),
+    "--model": (2, ["--model can be feedforward, hybrid, mmg"],
+        lambda d: d.train("--model", "lstm")),
+    "--data": (2, ["did you mean 'sli"], lambda d: d.train("--data", "sli99")),
+    "--recipe": (2, ["--recipe can be fast, paper"], lambda d: d.train("--recipe", "quick")),
+    "--wind-input": (2, ["--wind-input can be"], lambda d: d.train("--wind-input", "sails")),
+    "--no-fit of a network": (2, ["says nothing to a network"], lambda d: d.train("--no-fit")),
+    "--parameters of a network": (2, ["says nothing"], lambda d: d.train("--parameters", "x.toml")),
+    "--without of a network": (2, ["says nothing"], lambda d: d.train("--without", "wind")),
+    "--free of a network": (2, ["says nothing"], lambda d: d.train("--free", "wind.*")),
+    "--folds of a network": (2, ["says nothing"], lambda d: d.train("--folds", "2")),
+    "--no-fit of a hybrid": (2, ["has to be fitted"],
+                             lambda d: d.train("--model", "hybrid", "--no-fit")),
+    "noisy copies for mmg": (2, ["choose d-ref, ref, sli10, sli2"],
+                             lambda d: d.train("--model", "mmg", "--data", "jit2")),
+    "unknown voyage": (1, ["did you mean 'one'"], lambda d: d.train("--voyages", "onne")),
+    "unknown validation": (1, ["No voyage matches 'x*'"], lambda d: d.train("--validation", "x*")),
+    "one voyage for both": (1, ["also a validation voyage"], lambda d: d.train(
+        "--voyages", "one", "--validation", "one", "--window", "20")),
+    "a window longer than the voyages": (1, ["--window"], lambda d: d.train("--window", "900")),
+}  # fmt: skip
+
+FOLDERS = {
+    "ingest: the store is a file": (1, ["is a file"], lambda d: [
+        "ingest", d.log, "--profile", d.profile(), "--store", d.file("s")]),
+    "ingest: the store in a file": (1, ["is a file"], lambda d: [
+        "ingest", d.log, "--profile", d.profile(), "--store", d.file("s") / "store"]),
+    "voyages: the store is a file": (1, ["is a file"],
+        lambda d: ["voyages", "--store", d.file("s")]),
+    "voyages: no store": (1, ["no store"], lambda d: ["voyages", "--store", d.path("s")]),
+    "train: the store is a file": (1, ["is a file"], lambda d: [
+        "train", "--store", d.file("s"), "--out", d.path("run")]),
+    "train: no store": (1, ["ingest logs first"], lambda d: [
+        "train", "--store", d.path("s"), "--out", d.path("run")]),
+    "train: an empty store": (1, ["ingest logs first"], lambda d: [
+        "train", "--store", d.dir("s"), "--out", d.path("run")]),
+    "train: --out is there": (1, ["exists already"], lambda d: [
+        "train", "--store", d.store, "--out", d.dir("run")]),
+    "train: --out in a file": (1, ["--out", "is a file"], lambda d: [
+        "train", "--store", d.store, "--out", d.file("runs") / "run"]),
+    "train: --out too long": (1, ["too long"], lambda d: [
+        "train", "--store", d.store, "--out", d.path("r" * 300)]),
+    "convert: --out in a file": (1, ["--out", "is a file"], lambda d: [
+        "convert", d.table(), "--profile", "kvlcc2", "--out", d.file("f") / "logs"]),
+    "profile: --out is there": (1, ["exists already"], lambda d: [
+        "profile", d.log, "--out", d.file("p.toml")]),
+    "profile: --out in no folder": (1, ["there is no folder"], lambda d: [
+        "profile", d.log, "--out", d.path("none") / "p.toml"]),
+    "--json a folder": (1, ["it is a folder"], lambda d: [
+        "voyages", "--store", d.store, "--json", d.folder]),
+    "--json in no folder": (1, ["there is no folder"], lambda d: [
+        "voyages", "--store", d.store, "--json", d.path("none") / "a.json"]),
+    "--json in a file": (1, ["is a file"], lambda d: [
+        "check", d.log, "--json", d.file("f") / "a.json"]),
+    "demo: no logs": (1, ["No log in"], lambda d: ["demo", "--logs", d.dir("logs")]),
+    "demo: no such folder": (1, ["No log in"], lambda d: ["demo", "--logs", d.path("logs")]),
+    "demo: --out is a file": (1, ["is a file"], lambda d: ["demo", "--out", d.file("f")]),
+}  # fmt: skip
+
+CASES = [
+    pytest.param(*case, id=f"{table}: {name}")
+    for table, cases in (
+        ("log", LOGS), ("profile", PROFILES), ("table", TABLES), ("option", OPTIONS),
+        ("folder", FOLDERS),
+    )
+    for name, case in cases.items()
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "words", "arguments"), CASES)
+def test_it_is_one_sentence_and_the_right_code(desk, capsys, code, words, arguments):
+    judge(arguments(desk), code, words, capsys)
+
+
+def test_nothing_is_left_of_what_was_refused(desk, capsys):
+    """Neither a store, nor a run, nor logs."""
+    for arguments in (
+        desk.ingest(desk.file("a.mcap")), desk.train("--model", "lstm"), desk.train("--data", "x"),
+        desk.convert(desk.table(u_body_mps=["fast"] * 3)),
+    ):  # fmt: skip
+        assert cli.run([str(a) for a in arguments]) in (1, 2)
+    capsys.readouterr()
+    assert {p.name for p in desk.folder.iterdir()} <= {"a.mcap", "t.csv", "cache"}
+
+
+def test_refused_logs_are_in_the_json(desk, capsys):
+    import json
+
+    bad = desk.file("bad.mcap", "hello you")
+    arguments = [*desk.ingest(desk.log, bad, "--profile", desk.profile()), "--json",
+                 desk.path("a.json")]  # fmt: skip
+    judge(arguments, 3, ["bad.mcap"], capsys)
+    answer = json.loads(desk.path("a.json").read_text())
+    assert [v["name"] for v in answer["voyages"]] == ["one"]
+    ((path, why),) = answer["refused"].items()
+    assert path == str(bad) and "is no MCAP log" in why
+    judge(["check", bad, "--json", desk.path("b.json")], 1, ["bad.mcap"], capsys)
+    assert list(json.loads(desk.path("b.json").read_text())["refused"]) == [str(bad)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have names of text only")
+def test_a_log_whose_name_is_no_text(desk, capsys):
+    path = os.fsencode(desk.folder) + b"/\xff\xfe.mcap"
+    Path(os.fsdecode(path)).write_bytes(desk.log.read_bytes())
+    arguments = desk.ingest(Path(os.fsdecode(path)), "--profile", desk.profile())
+    judge(arguments, 1, ["is not text"], capsys)
+
+
+# --- what nobody foresaw
+
+
+def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys, monkeypatch):
+    from shiplog.store import Store
+
+    def broken(_store):
+        raise ZeroDivisionError("division\nby zero")
+
+    monkeypatch.setattr(Store, "entries", broken)
+    assert cli.run(["voyages", "--store", str(desk.store)]) == 1
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    (trace,) = (desk.folder / "cache" / "shiplog" / "faults").iterdir()
+    first, _ = said.split("\n", 1)
+    assert "ZeroDivisionError: division by zero" in first and str(trace) in first
+    text = trace.read_text()
+    assert "in broken" in text and "Traceback" in text
+
+
+def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
+    """In the temporary folder."""
+    import tempfile
+
+    from shiplog.store import Store
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(desk.file("no-folder") / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(desk.dir("tmp")))
+    monkeypatch.setattr(Store, "entries", lambda _store: 1 / 0)
+    assert cli.run(["voyages", "--store", str(desk.store)]) == 1
+    (trace,) = desk.path("tmp").iterdir()
+    assert str(trace) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", [PermissionError, FileNotFoundError])
+def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monkeypatch, kind):
+    import errno
+
+    from shiplog.store import Store
+
+    code = {PermissionError: errno.EACCES, FileNotFoundError: errno.ENOENT}[kind]
+
+    def refused(_store):
+        raise OSError(code, os.strerror(code), "/somewhere")
+
+    monkeypatch.setattr(Store, "entries", refused)
+    judge(["voyages", "--store", desk.store], 1, [f"/somewhere: {os.strerror(code)}"], capsys)
+
+
+def test_ctrl_c_is_said_and_has_its_code(desk, capsys, monkeypatch):
+    from shiplog.store import Store
+
+    def interrupted(_store):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Store, "entries", interrupted)
+    assert cli.run(["voyages", "--store", str(desk.store)]) == 130
+    assert "what was finished is kept" in capsys.readouterr().err
+
+
+def test_wrong_words_are_answered_before_anything_heavy_is_loaded(desk):
+    """torch, JAX and Rerun take seconds; a wrong word is answered without any of them."""
+    import subprocess
+
+    program = (
+        "import sys, shiplog.cli as c; code = c.run(sys.argv[1:]); "
+        "heavy = {'torch', 'jax', 'rerun', 'scipy', 'numba'} & set(sys.modules); "
+        "sys.exit(9 if heavy else code)"
+    )
+    missing = desk.path("nowhere")
+    for code, arguments in (
+        (2, desk.train("--model", "lstm")), (1, desk.train("--voyages", "x")),
+        (1, ["evaluate", missing]), (1, ["compare", missing]), (1, ["diagnose", missing]),
+        (1, ["demo", "--logs", missing]), (1, ["ingest", missing]),
+        (1, ["ingest", desk.log, "--profile", "x"]),
+    ):  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", program, *map(str, arguments)], cwd=Path(__file__).parent.parent,
+            check=False, capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == code, (arguments, done.stderr)

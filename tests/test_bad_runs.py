@@ -1,0 +1,225 @@
+"""Run folders that are missing, spoilt, or another ship's: a sentence and exit code 1."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sailing
+from safetensors.numpy import load_file, save_file
+from test_bad_input import judge
+from test_user_causes import GOOD
+
+from pipelines import known_ship
+from shiplog import cli
+
+HULL = ("--model", "mmg", "--no-fit", "--without", "propeller", "--without", "rudder")
+
+
+@pytest.fixture(scope="module")
+def sea(tmp_path_factory):
+    """A store of three voyages, a run of physics and one of a network, and another ship's store."""
+    sea = tmp_path_factory.mktemp("sea")
+    (sea / "logs").mkdir()
+    for number in (1, 2, 3):
+        voyage = known_ship.sail(60.0, seed=number, wind=known_ship.Wind(2.0, number))
+        start = datetime(2026, 5, number, 12, 0, tzinfo=UTC)
+        known_ship.write_voyage(
+            sea / "logs" / f"trip_{number}.mcap", voyage, seed=number, start=start
+        )
+    (sea / "circle.toml").write_text(sailing.PROFILE)
+    sailing.write(sea / "circle.mcap")
+    made = ("--store", sea / "store", "--voyages", "trip_1", "--voyages", "trip_2")
+    for arguments in (
+        ("ingest", sea / "logs", "--store", sea / "store"),
+        ("ingest", sea / "circle.mcap", "--profile", sea / "circle.toml", "--store", sea / "other"),
+        ("train", *made, "--out", sea / "mmg", "--window", 20, *HULL),
+        ("train", *made, "--out", sea / "short", "--window", 15, *HULL),
+        ("train", *made, "--out", sea / "net", "--window", 20, "--width", 6, "--epochs", 2),
+    ):
+        assert cli.run([str(a) for a in arguments]) == 0
+    return sea
+
+
+@pytest.fixture
+def desk(sea, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return Desk(sea, tmp_path)
+
+
+class Desk:
+    def __init__(self, sea: Path, folder: Path) -> None:
+        self.sea, self.folder = sea, folder
+
+    def path(self, name: str) -> Path:
+        return self.folder / name
+
+    def file(self, name: str, text: str = "") -> Path:
+        self.path(name).write_text(text)
+        return self.path(name)
+
+    def dir(self, name: str) -> Path:
+        self.path(name).mkdir()
+        return self.path(name)
+
+    def on(self, command: str, *runs, store: str = "store", voyages: str = "trip_3") -> list:
+        return [command, *(r if isinstance(r, Path) else self.sea / r for r in runs),
+                "--store", self.sea / store, "--voyages", voyages]  # fmt: skip
+
+    def spoilt(self, file: str, content: bytes | str | None = None, run: str = "mmg") -> list:
+        """Evaluate a copy of a run in which one file is another, or gone."""
+        copy = self.path("spoilt")
+        shutil.copytree(self.sea / run, copy)
+        (copy / file).unlink(missing_ok=True)
+        if content is not None:
+            raw = content if isinstance(content, bytes) else content.encode()
+            (copy / file).write_bytes(raw)
+        return self.on("evaluate", copy)
+
+    def reworded(self, old: str, new: str, run: str = "mmg") -> list:
+        text = (self.sea / run / "config.toml").read_text()
+        assert old in text
+        return self.spoilt("config.toml", text.replace(old, new), run)
+
+    def weights(self, run: str = "mmg", **changed) -> list:
+        path = Path("seed0") / "model.safetensors"
+        arrays = {**load_file(self.sea / run / path), **changed}
+        save_file(arrays, self.path("weights"))
+        return self.spoilt(str(path), self.path("weights").read_bytes(), run)
+
+    def stored(self, file: str, content: bytes | str) -> list:
+        """Evaluate on a store in which one file is another."""
+        copy = self.path("store")
+        shutil.copytree(self.sea / "store", copy)
+        raw = content if isinstance(content, bytes) else content.encode()
+        (copy / file).write_bytes(raw)
+        return ["evaluate", self.sea / "mmg", "--store", copy, "--voyages", "trip_3"]
+
+
+EXTENDED = {"causes": [{"name": "a", "label": "a", "made": {}, "numbers": [1.0]}], "shares": {},
+            "lengths": {}}  # fmt: skip
+
+CASES = {
+    "evaluate: no run": ["There is no run"], "compare: no run": ["There is no run"],
+    "diagnose: no run": ["There is no run"],
+    "a folder that is no run": (["is no run"], lambda d: d.on("evaluate", d.dir("r"))),
+    "a file that is no run": (["is no run"], lambda d: d.on("evaluate", d.file("r"))),
+    "a run that was not finished": (["is not finished"], lambda d: d.on(
+        "evaluate", d.dir("r.partial").with_name("r"))),
+    "evaluate: unknown voyage": (["did you mean 'trip_"], lambda d: d.on(
+        "evaluate", "mmg", voyages="trp_3")),
+    "compare: unknown voyage": (["did you mean 'trip_"], lambda d: d.on(
+        "compare", "mmg", voyages="trp_3")),
+    "diagnose: unknown voyage": (["did you mean 'trip_"], lambda d: d.on(
+        "diagnose", "mmg", voyages="trp_3")),
+    "evaluate: no store": (["ingest logs first"], lambda d: d.on("evaluate", "mmg", store="none")),
+    "evaluate: another ship": (["of a ship with"], lambda d: d.on(
+        "evaluate", "mmg", store="other", voyages="circle")),
+    "diagnose: another ship": (["the voyages are of 'circle'"], lambda d: [
+        *d.on("diagnose", "mmg", store="other", voyages="circle"), "--out", d.path("out")]),
+    "compare: two windows": (["windows of 20 s, short of 15 s"], lambda d: d.on(
+        "compare", "mmg", "short")),
+    "compare: --save in no folder": (["there is no folder"], lambda d: [
+        *d.on("compare", "mmg"), "--save", d.path("none") / "a.rrd"]),
+    "compare: --save a folder": (["it is a folder"], lambda d: [
+        *d.on("compare", "mmg"), "--save", d.folder]),
+    "diagnose: --extend is there": (["exists already", "--extend"], lambda d: [
+        *d.on("diagnose", "mmg"), "--extend", d.dir("r")]),
+    "diagnose: --extend in a file": (["--extend", "is a file"], lambda d: [
+        *d.on("diagnose", "mmg"), "--extend", d.file("f") / "r"]),
+    "diagnose: --out is a file": (["--out", "is a file"], lambda d: [
+        *d.on("diagnose", "mmg"), "--out", d.file("f")]),
+    "train: --out is a run": (["exists already"], lambda d: [
+        "train", "--store", d.sea / "store", "--out", d.sea / "mmg"]),
+    "cause: no file": (["is no Python file"], lambda d: [
+        *d.on("diagnose", "mmg"), "--cause", d.path("c.py")]),
+    "cause: a folder": (["is no Python file"], lambda d: [
+        *d.on("evaluate", "mmg"), "--cause", d.folder]),
+    "cause: a text": (["is no Python file"], lambda d: [
+        *d.on("compare", "mmg"), "--cause", d.file("c.txt", GOOD)]),
+    "cause: bad Python": (["SyntaxError"], lambda d: [
+        *d.on("evaluate", "mmg"), "--cause", d.file("c.py", "def broken(:")]),
+    "cause: raises": (["ZeroDivisionError"], lambda d: [
+        *d.on("diagnose", "mmg"), "--cause", d.file("c.py", "1 / 0")]),
+    "cause: none in it": (["defines no cause"], lambda d: [
+        *d.on("evaluate", "mmg"), "--cause", d.file("c.py", "x = 1")]),
+    "cause: a name of the catalogue": (["'current' already"], lambda d: [
+        *d.on("evaluate", "mmg"), "--cause", d.file("c.py", GOOD.replace("tide_gate", "current"))]),
+    "config empty": (["config.toml", "no configuration"], lambda d: d.spoilt("config.toml", "")),
+    "config no text": (["no configuration"], lambda d: d.spoilt("config.toml", b"\xff\xfe")),
+    "config no TOML": (["no configuration"], lambda d: d.spoilt("config.toml", "[[[")),
+    "config gone": (["is no run"], lambda d: d.spoilt("config.toml")),
+    "config: a billion substeps": (["no configuration"], lambda d: d.reworded(
+        "substeps = 1\n", "substeps = 1000000000\n")),
+    "config: another model": (["cannot be read"], lambda d: d.reworded('"mmg"', '"hybrid"')),
+    "config: no model": (["no configuration"], lambda d: d.reworded('"mmg"', '"crystal ball"')),
+    "config: a window of years": (["window"], lambda d: d.reworded(
+        "window = 20\n", "window = 100000000000\n")),
+    "config: seeds elsewhere": (["no configuration"], lambda d: d.reworded(
+        "seeds = [\n    0,\n]", 'seeds = ["../.."]')),
+    "profile gone": (["profile.json cannot be read"], lambda d: d.spoilt("profile.json")),
+    "profile cut": (["profile.json cannot be read"], lambda d: d.spoilt("profile.json", "{")),
+    "profile of another kind": (["profile.json cannot be read"], lambda d: d.spoilt(
+        "profile.json", '{"ship": 5}')),
+    "profile a list": (["profile.json cannot be read"], lambda d: d.spoilt("profile.json", "[1]")),
+    "training rows rubbish": (["training.parquet cannot be read"], lambda d: d.spoilt(
+        "training.parquet", "x")),
+    "training rows gone": (["training.parquet cannot be read"], lambda d: d.spoilt(
+        "training.parquet")),
+    "names of parameters gone": (["identified.parquet cannot be read"], lambda d: d.spoilt(
+        "seed0/identified.parquet")),
+    "weights rubbish": (["model.safetensors cannot be read"], lambda d: d.spoilt(
+        "seed0/model.safetensors", "x" * 300)),
+    "weights with a header of 2^63": (["model.safetensors cannot be read"], lambda d: d.spoilt(
+        "seed0/model.safetensors", b"\xff" * 7 + b"\x7f{}")),
+    "weights gone": (["model.safetensors cannot be read"], lambda d: d.spoilt(
+        "seed0/model.safetensors")),
+    "three parameters": (["equations"], lambda d: d.weights(theta=np.zeros(3))),
+    "parameters of NaN": (["no finite numbers"], lambda d: d.weights(
+        theta=np.full(len(load_file(d.sea / "mmg/seed0/model.safetensors")["theta"]), np.nan))),
+    "a covariance of another size": (["model.safetensors cannot be read"], lambda d: d.weights(
+        covariance=np.zeros((2, 2)))),
+    "network: weights of another size": (["model.safetensors cannot be read"], lambda d: d.weights(
+        "net", **{"layer00.bias": np.zeros(2, dtype=np.float32)})),
+    "network: scaling gone": (["scaling.safetensors cannot be read"], lambda d: d.spoilt(
+        "scaling.safetensors", None, "net")),
+    "extension a list": (["extension.json cannot be read"], lambda d: d.spoilt(
+        "extension.json", "[1]")),
+    "extension rubbish": (["extension.json cannot be read"], lambda d: d.spoilt(
+        "extension.json", "{")),
+    "extension by nobody's cause": (["--cause FILE"], lambda d: d.spoilt(
+        "extension.json", json.dumps(EXTENDED))),
+    "extension without numbers": (["extension.safetensors cannot be read"], lambda d: d.spoilt(
+        "extension.json", json.dumps({**EXTENDED, "causes": []}))),
+    "store: voyage.json rubbish": (["trip_3"], lambda d: d.stored(
+        "voyage=trip_3/voyage.json", "{}")),
+    "store: table cut": (["table of trip_3", "spoilt"], lambda d: d.stored(
+        "voyage=trip_3/table.parquet", b"PAR1" + b"x" * 99)),
+}  # fmt: skip
+
+
+def rows():
+    for name, case in CASES.items():
+        if isinstance(case, list):
+            command = name.split(":")[0]
+            case = (case, lambda d, command=command: d.on(command, d.path("none")))
+        yield pytest.param(*case, id=name)
+
+
+@pytest.mark.parametrize(("words", "arguments"), list(rows()))
+def test_it_is_one_sentence_and_exit_code_1(desk, capsys, words, arguments):
+    judge(arguments(desk), 1, words, capsys)
+
+
+def test_a_catalogue_of_rubbish_is_made_again(desk, capsys):
+    judge(desk.stored("catalogue.parquet", b"x"), 0, ["Per voyage, mmg"], capsys)
+
+
+def test_a_refused_diagnosis_leaves_nothing(desk, capsys):
+    judge([*desk.on("diagnose", "mmg"), "--out", desk.path("out"), "--extend", desk.dir("r")],
+          1, ["exists already"], capsys)  # fmt: skip
+    assert not desk.path("out").exists()

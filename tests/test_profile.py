@@ -1,0 +1,55 @@
+"""Profiles that say what cannot be: refused in a user's words, with the key."""
+
+import pytest
+import sailing
+
+from shiplog import profile
+from shiplog.exceptions import ProfileError
+
+ARM, SIGMA = "lever_arm_m = [0.7, -0.2]", "sigma = 0.01"
+FINITE = "has to be a finite number"
+
+
+@pytest.mark.parametrize("name", profile.shipped())
+def test_every_shipped_profile_is_taken(name):
+    assert profile.load(name).source == name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (ARM, "lever_arm_m = [nan, 0.0]", f"sensors.position.lever_arm_m.0 {FINITE}"),
+        (ARM, "lever_arm_m = [0.0, 1e999]", f"sensors.position.lever_arm_m.1 {FINITE}"),
+        ("length_m = 3.0", "length_m = inf", f"ship.length_m {FINITE}"),
+        ("length_m = 3.0", "length_m = -3.0", "ship.length_m has to be greater than 0"),
+        (SIGMA, "sigma = -5", "sensors.position.sigma has to be greater than or equal to 0"),
+        (SIGMA, "sigma = [0.1, -0.1]", "sensors.position.sigma.1 has to be greater than or equal"),
+        (SIGMA, "sigma = nan", f"sensors.position.sigma {FINITE}"),
+        (SIGMA, "sigma = []", "sensors.position.sigma is missing"),
+        (SIGMA, "sigma = 'a'", "sensors.position.sigma has to be a number"),
+        ("sign = -1.0", "sign = inf", f"actuators.0.sign {FINITE}"),
+        ("[-35.0, 35.0]", "[35.0, -35.0]", "the lower one stands first"),
+        ("[-35.0, 35.0]", "[-inf, inf]", f"actuators.0.limits.0 {FINITE}"),
+        ('name = "rudder"\n', 'name = "../../x"\n', "letters, digits and underscores only"),
+        ("[ship]", "[site]\ndatum = [nan, 0.0]\n[ship]", f"site.datum.0 {FINITE}"),
+        ("[ship]", "[table]\n'v [m/s]' = {channel='sway', sign=nan}\n[ship]",
+         f"table.v [m/s].sign {FINITE}"),
+        ("[ship]", "x = " + "9" * 6000 + "\n[ship]", "not valid TOML"),
+        ("[ship]", "x = " + "[" * 20_000 + "]" * 20_000 + "\n[ship]", "not valid TOML"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_with_its_key(old, new, said):
+    assert old in sailing.PROFILE
+    with pytest.raises(ProfileError) as found:
+        sailing.profile(sailing.PROFILE.replace(old, new))
+    assert said in found.value.message and found.value.hint
+    assert "constrained" not in found.value.message and "tuple[" not in found.value.message
+
+
+def test_a_profile_that_is_no_text_or_no_file(tmp_path):
+    bad = tmp_path / "bad.toml"
+    bad.write_bytes(b"\xff\xfe[ship]")
+    with pytest.raises(ProfileError, match="UTF-8"):
+        profile.load(bad)
+    with pytest.raises(ProfileError, match="is a folder"):
+        profile.load(tmp_path)
