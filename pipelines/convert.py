@@ -42,7 +42,6 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     for path in sources:
         try:
             with saying(f"{path.name}: converting"):
-                out.mkdir(parents=True, exist_ok=True)
                 for target in _each(path, profile, out, done):
                     done.logs.append(target)
         except ShiplogError as error:
@@ -66,13 +65,9 @@ def draft(path: Path, vessel: str | None = None) -> str:
             return draft_log(target, vessel)
 
 
-def _free(target: Path, out: Path) -> Path:
-    """Raises ShiplogError for a log that is there already, which may be the only one of its kind,
-    and for the name of a voyage that would lead elsewhere."""
-    if set(target.stem) & set("/\\\0") or len(target.relative_to(out).parts) != 1:
-        raise ShiplogError(
-            f"A voyage is called {target.stem!r}, which no file can be.", hint="rename it."
-        )
+def _free(target: Path) -> Path:
+    """Raises ShiplogError for a log that is there already, which may be the only one of its
+    kind."""
     if target.exists():
         raise ShiplogError(
             f"{target} exists already.", hint="choose another --out, or remove that log."
@@ -84,19 +79,19 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
     ship = profile.ship.name if profile else path.stem
     target = out / f"{path.stem if path.is_file() else path.name}.mcap"
     if is_bag(path):
-        _free(target, out)
+        _free(target).parent.mkdir(parents=True, exist_ok=True)
         if left_out := bag_to_log(path, target, ship):
             done.lost[str(path)] = "; ".join(f"{t}: {why}" for t, why in left_out.items())
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
         parts = folder_to_series(path, profile)
-        yield _written(_free(target, out), parts, profile, ship, path)
+        yield _written(_free(target), parts, profile, ship, path)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
             done.lost[str(path)] = f"{damaged} damaged sentences"
-        yield _written(_free(target, out), parts, profile, ship, path)
+        yield _written(_free(target), parts, profile, ship, path)
     else:
         if profile is None:
             raise ProfileError(
@@ -106,13 +101,14 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             )
         for name, part in columns.voyages(read_table(path, profile.table), profile, path):
             series = columns.series(part, profile)
-            yield _written(_free(out / f"{name}.mcap", out), series, profile, ship, path)
+            yield _written(_free(out / f"{name}.mcap"), series, profile, ship, path)
 
 
 def _written(
     target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
 ) -> Path:
     datum = profile.site.datum if profile else None
+    target.parent.mkdir(parents=True, exist_ok=True)
     write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
     log.info(
         "%s: %d topics, %d rows",

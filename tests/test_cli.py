@@ -85,7 +85,8 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     assert code == 0
     content = json.loads(answer.read_text())
     assert set(content) == {"contract", "loss", "windows", "seeds", "rmse", "end_position_m",
-                            "end_heading_deg", "floors", "voyages", "band_90", "winds"}  # fmt: skip
+                            "end_heading_deg", "floors", "voyages", "band_90", "winds",
+                            "sentence", "judgement"}  # fmt: skip
     assert content["loss"] == pytest.approx(np.mean(content["seeds"]))
     assert len(content["seeds"]) == 2 and content["windows"] == 3
     assert set(content["floors"]) == {"hold", "least_squares"}
@@ -144,7 +145,7 @@ def test_a_finished_run_is_not_trained_over(run, store):
         (2, ("--data", "sli3"), "--data can be"),
         (2, ("--recipe", "papr"), "did you mean 'paper'"),
         (1, ("--voyages", "trp_1"), "did you mean 'trip_1'"),
-        (1, ("--window", "400"), "cannot be split"),
+        (1, ("--window", "400"), "No voyage has a window of 400 s"),
         (1, ("--voyages", "trip_1", "--validation", "trip_2", "--window", "400"),
          "longer than every"),
     ],
