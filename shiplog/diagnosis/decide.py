@@ -26,7 +26,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     found = posteriors.posterior(search, tuple(refuted))
     names = found.stated
     kind = found.remainder
-    best = posteriors.best_with(found, names, kind if not names else None)
+    best = search.recalled(posteriors.best_with(found, names, kind if not names else None))
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
     trial = search.trial
     trial.remainder, trial.unrest = best.remainder, trial.reference.unrest

@@ -6,13 +6,24 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from shiplog.causes import Cause
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.hypotheses import Found, Point
+from shiplog.linearise import Path
 from shiplog.unnamed import Pulses
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a trial was linearised, without the linearisation, which takes 50 MB and more."""
+
+    numbers: Mapping[str, np.ndarray]
+    path: Path
 
 
 @dataclass(frozen=True)
@@ -21,7 +32,8 @@ class Hypothesis:
 
     evidence   log marginal likelihood [nats], the trial counting for its share
     score      log evidence + log prior - placebo: log posterior up to a constant
-    point      the trial linearised where the causes' numbers stand
+    point      the trial linearised where the causes' numbers stand; only the place of one that is
+               far behind
     found      their numbers and covariance there
     pulses     of an intermittent remainder
     """
@@ -30,7 +42,7 @@ class Hypothesis:
     remainder: Remainder
     evidence: float
     score: float
-    point: Point
+    point: Point | Place
     found: Found
     pulses: Pulses | None = None
 

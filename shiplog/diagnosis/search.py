@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shiplog.diagnosis import placebo
-from shiplog.diagnosis.hypothesis import Hypothesis, Priors, form_error, name_of
+from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
 from shiplog.settling import settle
 
 MOST_CAUSES = 5  # each pays its prior; beyond, coefficients of another ship were given
 MOST_SETS = 16  # that are linearised; what is left then is far behind
+KEPT = 6  # linearisations that are kept; another one is made again where it is asked for
 WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
@@ -107,20 +108,40 @@ class Search:
     def nothing(self) -> Hypothesis:
         return self.found[(), NOMINAL]
 
+    def point(self, one: Hypothesis) -> Point:
+        """The trial linearised where a hypothesis was."""
+        if isinstance(one.point, Point):
+            return one.point
+        return self.trial.at(one.point.numbers, one.point.path)
+
+    def recalled(self, one: Hypothesis) -> Hypothesis:
+        """A hypothesis with its linearisation."""
+        return replace(one, point=self.point(one))
+
+    def _forget(self) -> None:
+        """Linearisations of all but the best hypotheses: each takes 50 MB and more."""
+        best = [self.nothing, *self.ranked()]
+        kept = list(dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point)))[:KEPT]
+        for key, one in self.found.items():
+            if isinstance(one.point, Point) and id(one.point) not in kept:
+                place = Place(one.point.numbers, one.point.path)
+                self.found[key] = replace(one, point=place)
+
     # --- moves ---
 
     def _expand(self, one: Hypothesis) -> None:
         """The sets with one cause more or less than a hypothesis has."""
         self._expanded.add((one.causes, one.kind))
+        one = self.recalled(one)
         best = self.ranked()[0].score
         for labels, numbers, predicted in self._additions(one):
             worth = predicted > best - WINDOW or not one.causes
             if worth and labels not in self._tried and len(self._tried) < self._most:
-                self.weigh(labels, numbers, one.point)
+                self.weigh(labels, numbers, self.point(one))
         for label in one.causes if len(one.causes) > 1 else ():
             labels = tuple(n for n in one.causes if n != label)
             if labels not in self._tried:
-                self.weigh(labels, {n: one.found.numbers[n] for n in labels}, one.point)
+                self.weigh(labels, {n: one.found.numbers[n] for n in labels}, self.point(one))
 
     def _additions(
         self, one: Hypothesis
@@ -134,7 +155,7 @@ class Search:
         ]  # fmt: skip
         self.trial.remainder = one.remainder
         _, found = self.trial.scan(
-            one.point, candidates, self._included(one.causes), one.found.louder
+            self.point(one), candidates, self._included(one.causes), one.found.louder
         )
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
@@ -200,6 +221,7 @@ class Search:
             self._change(point, labels, one, best, score >= near)
         if self._best(levels, RAISED).louder > RAISED_FROM:
             self._pulses(point, labels)
+        self._forget()
 
     def _drawn(self, point: Point, included: Sequence[str], usual: float) -> list[Level]:
         """Levels about the best one under `nominal`, as made under RAISED."""

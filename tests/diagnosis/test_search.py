@@ -13,6 +13,7 @@ from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
+from shiplog.hypotheses import Point
 from shiplog.unnamed import Pulses
 
 TOLD = 0.6
@@ -226,3 +227,24 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     assert all("drag" not in h.causes for h in found.ranked())
     assert found.ranked()[0].causes == ("load",)
     assert set(found.scanned) == {c.label for c in CAUSES}
+
+
+@pytest.mark.parametrize("kept", [1, 2])
+def test_what_is_far_behind_keeps_its_place_and_not_its_linearisation(monkeypatch, kept):
+    """The same hypotheses, with the same scores, and the same decision."""
+    whole = searched({"drag": [1.2], "load": [1.2]})
+    monkeypatch.setattr(searching, "KEPT", kept)
+    found = searched({"drag": [1.2], "load": [1.2]})
+    linearised = {id(h.point) for h in found.found.values() if isinstance(h.point, Point)}
+    assert len(linearised) == kept < len({id(h.point) for h in whole.found.values()})
+    assert {key: h.score for key, h in found.found.items()} == pytest.approx(
+        {key: h.score for key, h in whole.found.items()}
+    )
+    assert isinstance(found.nothing.point, Point)
+    far = next(h for h in found.ranked()[::-1] if h.causes)
+    assert set(found.point(far).numbers) == set(far.causes)
+    (one, _), (other, _) = decide(found), decide(whole)
+    named = {n.cause.label: n.numbers for n in other.named}
+    assert {n.cause.label for n in one.named} == set(named) == {"drag", "load"}
+    for cause in one.named:
+        assert cause.numbers == pytest.approx(named[cause.cause.label])
