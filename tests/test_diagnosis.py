@@ -497,7 +497,9 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     """Rudders must move to tell a lag from a delay, screws turn to tell lost thrust from a rough
     hull, and the ship swing both ways to tell a gyro's scale from its bias."""
     trial = sea.done.trial
-    grams = dict(zip((m.words for m in advise.MANOEUVRES), advise.sailed(trial, {}), strict=True))
+    grams = dict(
+        zip((m.said(1.0) for m in advise.MANOEUVRES), advise.sailed(trial, {}), strict=True)
+    )
     by = {c.label: c for c in sea.usual.model.causes}
 
     def worth(label, numbers, other):
@@ -557,7 +559,7 @@ def test_an_unrecorded_thruster_is_a_second_cause(compass, monkeypatch, louder, 
     assert search._second(decision.point, replace(decision.base, louder=louder)) == 0.0
 
 
-def test_an_unrecorded_thruster_is_placed_where_it_stands():
+def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     """Its place [m ahead of midship] and force between those that are tried first, from products
     drawn with it: sway and yaw rate pushed together."""
     rng = np.random.default_rng(5)
@@ -579,10 +581,20 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands():
         ),
         unrest=replace(unrest, pulse=np.array([9.0, 9.0, 9.0])),  # an earlier one is no matter
         weight=np.ones(count),
-        left_of=lambda *_: (weighed, np.zeros(0)),
+        left=lambda *_: (linear, np.zeros(0)),
         solved=lambda *_: np.zeros(0),
     )  # fmt: skip
-    found = unnamed.pulses(trial, None, None)
+    cut = segments.Cut(
+        np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
+        np.zeros((count, 1, 1)), np.zeros(count), 0.2,
+    )  # fmt: skip
+    path = linearise.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
+    linear = linearise.Linear(
+        cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * knots)),
+        np.zeros((count, 1, 6, 0)),
+    )  # fmt: skip
+    monkeypatch.setattr(evidence, "weighed", lambda *_: weighed)
+    found = unnamed.pulses(trial, SimpleNamespace(linear=linear), None)
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0

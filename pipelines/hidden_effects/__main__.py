@@ -117,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         suite.set_defaults(first_seed=None, count=None)
         if name not in ("fixed", "brief"):
             suite.add_argument("--first-seed", type=int, default=first, help="of the block")
+        if name != "fixed":
             suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
     again = commands.add_parser("replay", help="kept cases, diagnosed again")
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")

@@ -51,7 +51,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         trial.unrest = _with_pulses(search, best)
     return Decision(
         verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
-        found.ranking(), shown.found.louder, shown.point, shown.found, search.first,
+        found.ranking(), shown.found.louder, search.point(shown), shown.found, search.first,
         search.nothing.found, (), search.told,
     ), found  # fmt: skip
 
@@ -101,7 +101,7 @@ def _structure(search: Search, best: Hypothesis) -> Structure:
     if family in (STOCHASTIC, INTERMITTENT):
         channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
         return Structure(family, gained, channels)
-    acts_on = search.trial.acts_on(best.point, best.found, best.kind)
+    acts_on = search.trial.acts_on(search.point(best), best.found, best.kind)
     return Structure(family, gained, acts_on)
 
 
@@ -111,7 +111,7 @@ def _is_device(search: Search, best: Hypothesis) -> bool:
     kept = trial.unrest
     trial.unrest = _with_pulses(search, best)
     try:
-        force, deviation = pulse_force(trial, best.point, best.found, best.pulses)
+        force, deviation = pulse_force(trial, search.point(best), best.found, best.pulses)
     finally:
         trial.unrest = kept
     return posteriors.of_one_device(force, deviation)
