@@ -79,7 +79,8 @@ def diagnose_run(
     try:
         done = _diagnosed(campaign, out, causes, former)
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
-        log.info("no path of the model can be computed: %s", error, exc_info=log.isEnabledFor(10))
+        detailed = log.isEnabledFor(logging.DEBUG)
+        log.info("no path of the model can be computed: %s", error, exc_info=detailed)
         done = Diagnosis(answer.runs_away(run, before_effect), out)
     _save(done, run, store, names, began)
     if extend is not None:

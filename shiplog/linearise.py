@@ -172,6 +172,13 @@ class Linear:
         """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
         return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
 
+    def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
+        """Without what the numbers [S, C + W] of each segment do, SI: C of the columns of `j`, then
+        W that push [S, 3J, W] at the knots."""
+        count = self.j.shape[-1]
+        e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
+        return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))
+
     def beside(self, other: Linear) -> Linear:
         """These segments and others of the same record."""
         path = Path(*(_both(self.path, other.path, name) for name in ("start", "push")))

@@ -513,6 +513,21 @@ def test_what_was_left_out_carries_no_information():
     assert whole.logdet == pytest.approx(part.logdet, rel=1e-12)
 
 
+def test_numbers_of_each_segment_are_taken_off_it_alone():
+    """Of columns of its own and of pushes at the knots; segments without numbers stay."""
+    cut, at, _ = coasting()
+    linear = linearise.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
+    rng = np.random.default_rng(3)
+    pushed = rng.standard_normal((4, linear.z.shape[-1] - 6, 2))
+    numbers = np.array([[0.4, 0.0, 0.0], [0.0, 1.0, -2.0], [0.0, 0.0, 0.0], [0.3, 0.5, 0.0]])
+    left = linear.less_numbers(numbers, pushed)
+    for i, (own, one, two) in enumerate(numbers):
+        push = pushed[i, :, 0] * one + pushed[i, :, 1] * two
+        wanted = linear.e[i] - linear.j[i, ..., 0] * own - linear.z[i, ..., 6:] @ push
+        assert left.e[i] == pytest.approx(wanted, abs=1e-12)
+    assert np.array_equal(left.j, linear.j) and left.cut is linear.cut
+
+
 def test_a_path_that_runs_away_does_not_move_and_leaves_the_others_alone():
     cut, at, _ = coasting(segments_on=(2,))
     theta = np.array([7.0])

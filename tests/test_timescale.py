@@ -6,6 +6,7 @@ import closed
 import numpy as np
 import pytest
 
+from pipelines.diagnosis import trial
 from shiplog import profile as profiles
 from shiplog import segments, timescale
 from shiplog.timescale import NODE_ROWS, Timescale
@@ -84,3 +85,12 @@ def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
     at = rows[1] + 7 * 4
     row = 0.5 * (values[at - 2] + values[at + 2]) + values[at - 1 : at + 2].sum(0)
     assert found[1, 7] == pytest.approx(row / 4.0)
+
+
+@pytest.mark.parametrize("empty", ["trial", "nominal campaign"])
+def test_without_a_row_there_is_no_speed_to_scale_by(empty):
+    """The campaigns stay as they are; that they are too short for a verdict is said later."""
+    none = replace(SEEN, state=SEEN.state[:0], voyage=SEEN.voyage[:0], time=SEEN.time[:0])
+    nominal, recorded = (SEEN, none) if empty == "trial" else (none, SEEN)
+    given = trial.in_ship_time(None, nominal, recorded)
+    assert given[0] is nominal and given[1] is recorded

@@ -54,10 +54,12 @@ def in_ship_time(
 ) -> tuple[Record | None, Record]:
     """Both campaigns with the time scale of this ship at the working speed of its usual voyages."""
     usual = recorded if nominal is None else nominal
+    if not len(usual) or not len(recorded):  # too little for a verdict, which is said later
+        return nominal, recorded
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     shorter = min(one.seconds for one in (usual, recorded))
-    working = np.quantile(np.linalg.norm(usual.state[:, [1, 3]], axis=1), WORKING)
-    of = timescale.of_ship(main.length, float(working), shorter)
+    working = float(np.quantile(np.linalg.norm(usual.state[:, [1, 3]], axis=1), WORKING))
+    of = timescale.of_ship(main.length, working, shorter)
     changed = None if nominal is None else replace(nominal, timescale=of)
     return changed, replace(recorded, timescale=of)
 

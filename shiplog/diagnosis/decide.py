@@ -22,14 +22,14 @@ EVERYWHERE = ("surge", "sway", "yaw_rate")
 
 def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[Decision, Posterior]:
     """The verdict, some names refuted by held-out data (with the reason)."""
-    refuted = dict(refuted or {})
+    refuted, trial = dict(refuted or {}), search.trial
+    trial.unrest = trial.reference.unrest  # the verdict before may have left its pulses there
     found = posteriors.posterior(search, tuple(refuted))
     names = found.stated
     kind = found.remainder
     best = search.recalled(posteriors.best_with(found, names, kind if not names else None))
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
-    trial = search.trial
-    trial.remainder, trial.unrest = best.remainder, trial.reference.unrest
+    trial.remainder = best.remainder
     verdict, structure, named, pulses = "undecided", None, (), None
     if names and mostly:
         verdict, named = "named", _named(search, found, best, names)

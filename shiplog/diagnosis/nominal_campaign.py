@@ -233,14 +233,11 @@ def _noise_of_parts(
 ) -> Unrest:
     """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
     assert effects.numbers is not None
-    linear, count = made.linear, made.columns.linearised
-    e = linear.e.copy()
+    own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
-        own = numbers * made.columns.unit
-        e[rows] -= linear.j[rows] @ own[:count]
-        push = made.pushed[rows] @ own[count:]
-        e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], push)
-    return evidence.learnt(replace(linear, e=e).pick(kept), np.zeros(count), unrest, rounds=3)
+        own[rows] = numbers * made.columns.unit
+    left = made.linear.less_numbers(own, made.pushed).pick(kept)
+    return evidence.learnt(left, np.zeros(made.columns.linearised), unrest, rounds=3)
 
 
 def learn(

@@ -7,7 +7,6 @@ there at most is subtracted from what it gains on the trial.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,16 +52,13 @@ def intermittent(campaign: Campaign, g: Grid, segments: float) -> float:
     if linear is None or not campaign.weight.sum():
         return 0.0
     pushed = campaign.discrepancy.pushed(linear.cut, g)
-    own, unit, share = reference.columns.linearised, reference.columns.unit, reference.counts
-    e = linear.e.copy()
+    unit, share = reference.columns.unit, reference.counts
+    own = np.empty((len(linear.e), len(unit)))
     for left_out, (rows, part) in enumerate(zip(campaign.rows, campaign.parts, strict=True)):
         information, pull = campaign.prior_without(left_out)
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
-        found = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
-        e[rows] -= linear.j[rows] @ found[:own]
-        moved = pushed[rows] @ found[own:]
-        e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], moved)
-    left, none = replace(linear, e=e), np.zeros(linear.j.shape[-1])
+        own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
+    left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
     gain = unnamed.pulses_of(left, none, reference, reference.unrest, campaign.weight).gain
     return max(gain, 0.0) * segments / float(campaign.weight.sum())
 

@@ -20,7 +20,7 @@ from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Tr
 from shiplog.hypotheses import Found, Level, Point
 from shiplog.settling import settle
 
-MOST_CAUSES = 5  # each pays its prior; beyond, coefficients of another ship were given
+MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; what is left then is far behind
 KEPT = 6  # linearisations that are kept; another one is made again where it is asked for
 WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -84,6 +84,7 @@ class Search:
     def without(self, name: str) -> None:
         """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
         self.banned.add(name)
+        self.trial.unrest = self.trial.reference.unrest  # a verdict may have left its pulses there
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
         self.run()

@@ -263,23 +263,18 @@ class Trial(hypotheses.Trial):
         modes, noise = self.modes(point, base.louder)
         deviation = self.campaign.effects.deviation
         free = np.flatnonzero(deviation > 0.0)
-        e, pushed = linear.e.copy(), np.zeros(0)
+        pushed = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
         if self.reference.misfit is not None:
             pushed = self.reference.misfit.pushed(linear.cut, self.grid)
         begins = self.rows[[rows[0] for rows in self.parts]]
         of = np.searchsorted(begins, linear.cut.rows, side="right") - 1
-        count = columns.linearised
+        numbers = np.zeros((len(linear.e), columns.linearised + pushed.shape[-1]))
         for i, gram in enumerate(products(modes, self.parts, unit, self.weight, noise)):
             own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
             left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + np.arange(len(common)))] @ common
-            found = np.zeros(len(common))
-            found[free] = np.linalg.solve(own, left) * columns.unit[free]
-            rows = of == i
-            e[rows] -= linear.j[rows] @ found[:count]
-            if pushed.size:
-                moved = pushed[rows] @ found[count:]
-                e[rows] -= np.einsum("sbcz,sz->sbc", linear.z[rows][..., 6:], moved)
-        return replace(linear, e=e)
+            rows = np.flatnonzero(of == i)
+            numbers[np.ix_(rows, free)] = np.linalg.solve(own, left) * columns.unit[free]
+        return linear.less_numbers(numbers, pushed)
 
     # --- remainders ---
 

@@ -229,6 +229,21 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     assert set(found.scanned) == {c.label for c in CAUSES}
 
 
+def test_without_a_cause_the_process_noise_is_the_usual_one_again():
+    """A verdict leaves its pulses in the trial's process noise; the next search begins without."""
+    found = searched({"drag": [1.2]})
+    trial = found.trial
+    usual = trial.unrest
+    trial.unrest = replace(usual, pulse=np.array([0.0, 0.02, 0.0]))
+    found.without("load")
+    assert trial.unrest is trial.reference.unrest is usual
+    again = searched({"drag": [1.2]})
+    again.without("load")
+    assert {key: h.score for key, h in found.found.items()} == pytest.approx(
+        {key: h.score for key, h in again.found.items()}
+    )
+
+
 @pytest.mark.parametrize("kept", [1, 2])
 def test_what_is_far_behind_keeps_its_place_and_not_its_linearisation(monkeypatch, kept):
     """The same hypotheses, with the same scores, and the same decision."""
