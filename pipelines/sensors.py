@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 from pipelines.provenance import Answer
-from shiplog import parity_campaign, report
+from shiplog import parity_campaign, parts, report
 from shiplog.findings import CONTRACT
 from shiplog.parity import Estimate
 from shiplog.parity_campaign import Campaign
@@ -22,11 +22,12 @@ log = logging.getLogger(__name__)
 def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[Campaign, Profile]]:
     """Voyages of one ship, apart where none was sailed for a season. Raises StoreError."""
     chosen = store.select(list(voyages) or None)
-    begins = {
-        entry.name: datetime.fromisoformat(entry.start).timestamp()
-        for entry in store.entries()
-        if entry.name in chosen
-    }
+    starts = {entry.name: datetime.fromisoformat(entry.start) for entry in store.entries()}
+    begins = {}
+    for name in chosen:
+        part = None if name in starts else parts.parse(name)
+        whole, later = (name, 0) if part is None else (part.whole, part.begin)
+        begins[name] = starts[whole].timestamp() + later
     found = []
     for names in parity_campaign.seasons(begins):
         profile = store.profile(names)

@@ -6,11 +6,13 @@ import json
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from contextlib import ExitStack
 from dataclasses import asdict
 from types import SimpleNamespace
 
 import pytest
 
+from pipelines.diagnosis import baseline, trial
 from pipelines.hidden_effects import (
     former,
     methods,
@@ -21,10 +23,20 @@ from pipelines.hidden_effects import (
     score,
     suites,
     tables,
+    without,
 )
 from pipelines.hidden_effects.__main__ import main
 from pipelines.hidden_effects.plan import Plan, Planned
 from pipelines.hidden_effects.score import Sealed
+from shiplog import remembered
+from shiplog.diagnosis import (
+    discrepancy,
+    nominal_campaign,
+    placebo,
+    posterior,
+    refutation,
+    thresholds,
+)
 from shiplog.exceptions import ShiplogError
 
 # --- ships of other families ----------------------------------------------------------------------
@@ -193,6 +205,46 @@ def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeyp
         replay.replay(out, out, stubs())
     with pytest.raises(ShiplogError, match="no case with store and base"):
         replay.replay(new, tmp_path / "third", stubs())
+
+
+def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, monkeypatch):
+    """Two kept cases in which nothing was hidden; without the placebo a name would be said."""
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(keep=True))
+    asked = []
+
+    def settings(jobs, shiplog):
+        asked.append(shiplog[-1])
+        monkeypatch.setenv("SAYS", "coverage" if shiplog[-1] == "placebo" else "none")
+        return stubs(jobs=jobs)
+
+    monkeypatch.setattr(without, "Settings", settings)
+    shown = without.table(out, ("nothing", "placebo"), 1)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in shown.splitlines()[-2:]]
+    assert rows == [["nothing", "2", "2", "0", "0"], ["placebo", "2", "0", "0", "2"]]
+    assert asked == ["nothing", "placebo"]
+    assert {folder.name for folder in (tmp_path / "out-without").iterdir()} == set(asked)
+
+
+@pytest.mark.parametrize("part", list(without.PARTS))
+def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
+    """What a part replaces exists under that name, and is itself again afterwards."""
+    watched = {
+        "placebo": (placebo, "placebos"), "form-error": (thresholds, "FORM_ERROR"),
+        "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (remembered, "characteristics"),
+        "share-of-trial": (remembered, "characteristics"),
+        "robust-weights": (nominal_campaign, "robust_weights"),
+        "refutation": (refutation, "judged"), "baseline": (baseline, "lacking"),
+        "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
+        "time-scale": (trial, "in_ship_time"),
+    }  # fmt: skip
+    assert set(without.PARTS) == {without.WHOLE, *watched}
+    before = {name: getattr(*where) for name, where in watched.items()}
+    with ExitStack() as stack:
+        without.PARTS[part](stack)
+        if part in watched:
+            assert getattr(*watched[part]) is not before[part]
+    assert all(getattr(*where) is before[name] for name, where in watched.items())
 
 
 def test_logs_of_another_family_come_with_their_own_profile(tmp_path, stubs, simulator):

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 import sailing
 
+from pipelines import sensors
 from shiplog import parity, parity_campaign
+from shiplog.ingest import ingest
 from shiplog.parity import Estimate
 from shiplog.parity_campaign import campaign, deviates, seasons, together
+from shiplog.store import Store
 
 DAY = 86_400.0
 
@@ -100,3 +103,14 @@ def test_what_is_apart_by_less_than_matters_or_than_is_known_does_not_deviate():
     assert deviates(one, replace(one, value=0.2, low=0.15, high=0.25))
     assert not deviates(one, replace(one, value=0.46, low=0.4599, high=0.4601))
     assert not deviates(one, replace(one, value=0.2, low=-0.3, high=0.7))
+
+
+def test_parts_of_a_stored_voyage_are_a_campaign(tmp_path):
+    store = Store(tmp_path / "store")
+    store.add(
+        ingest(sailing.write(tmp_path / "trip.mcap", sailing.series(130.0)), sailing.profile())
+    )
+    ((whole, _),) = sensors.campaigns(store, ())
+    ((halves, _),) = sensors.campaigns(store, ["trip[65:130]", "trip[0:65]"])
+    assert whole.voyages == ("trip",)
+    assert halves.voyages == ("trip[0:65]", "trip[65:130]")

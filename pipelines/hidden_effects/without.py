@@ -66,12 +66,17 @@ def _voyages_alike(stack: ExitStack) -> None:
 def _whole_share(stack: ExitStack) -> None:
     """A trial counts all of itself."""
     learned = remembered.characteristics
-    whole = lambda *given: replace(learned(*given), share=1.0)  # noqa: E731
+
+    def whole(*given):
+        return replace(learned(*given), share=1.0)
+
     stack.enter_context(patch.object(remembered, "characteristics", whole))
 
 
 def _no_robust_weights(stack: ExitStack) -> None:
-    plain = lambda square, kept: np.where(kept, 1.0, 0.0)  # noqa: E731
+    def plain(square, kept):
+        return np.where(kept, 1.0, 0.0)
+
     for module in (nominal_campaign, sys.modules[Trial.__module__]):
         stack.enter_context(patch.object(module, "robust_weights", plain))
     _learned_anew(stack)
@@ -97,19 +102,25 @@ def _no_practical_size(stack: ExitStack) -> None:
 
 
 def _no_share_of_causes(stack: ExitStack) -> None:
-    """A name stands beside whatever remains."""
+    """A cause is named however small a share of the error it explains."""
     stack.enter_context(patch.object(thresholds, "MOST", 0.0))
 
 
 def _fixed_time_scale(stack: ExitStack) -> None:
     """Segments of 30 s whatever the ship."""
-    as_they_are = lambda run, nominal, recorded: (nominal, recorded)  # noqa: E731
+
+    def as_they_are(run, nominal, recorded):
+        return nominal, recorded
+
     stack.enter_context(patch.object(trial, "in_ship_time", as_they_are))
 
 
 def _learned_anew(stack: ExitStack) -> None:
     """What is kept in the cache was learned with the part."""
-    learned = lambda *given: nominal_campaign.characteristics(*given)  # noqa: E731
+
+    def learned(*given):
+        return nominal_campaign.characteristics(*given)
+
     stack.enter_context(patch.object(remembered, "characteristics", learned))
 
 

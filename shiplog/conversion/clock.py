@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import polars as pl
 
 from shiplog import units
@@ -80,6 +81,12 @@ def number_of(texts: pl.Series) -> pl.Series:
     return comma.cast(pl.Float64, strict=False)
 
 
+def typical(values: pl.Series) -> float:
+    """Median size of numbers, 0 where there is none."""
+    sizes = values.fill_nan(None).abs().drop_nulls().to_numpy()
+    return float(np.median(sizes)) if len(sizes) else 0.0
+
+
 def _blank(texts: pl.Series) -> int:
     return int((texts.is_null() | (texts.str.strip_chars() == "")).sum())
 
@@ -87,9 +94,9 @@ def _blank(texts: pl.Series) -> int:
 def _counted(values: pl.Series, unit: str | None) -> pl.Series:
     """Numbers to ns; whole ones exactly: a float of seconds holds this century to 0.2 µs."""
     if unit is None:
-        most = float(values.cast(pl.Float64).fill_nan(None).abs().median() or 0.0)  # type: ignore[arg-type]
+        most = typical(values.cast(pl.Float64))
         fitting = [n for n, per in UNIX if YEAR_2000 <= most / per < YEAR_2100]
-        step = float(values.cast(pl.Float64).diff().abs().median() or 0.0)  # type: ignore[arg-type]
+        step = typical(values.cast(pl.Float64).diff())
         if not fitting and step > LONGEST_STEP_S:
             raise ProfileError(
                 f"The times of column {values.name!r} step by {step:g}, and are no Unix time.",

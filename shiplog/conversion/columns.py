@@ -11,12 +11,11 @@ import numpy as np
 import polars as pl
 
 from shiplog import units
+from shiplog.conversion import clock
+from shiplog.conversion.delimited import Table
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.profile import LABELS, TABLE_CHANNELS, Column, Profile, Source
-
-from . import clock
-from .delimited import Table
 
 log = logging.getLogger(__name__)
 

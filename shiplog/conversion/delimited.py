@@ -13,9 +13,8 @@ from pathlib import Path
 
 import polars as pl
 
+from shiplog.conversion.clock import number_of
 from shiplog.exceptions import ChannelMissing
-
-from .clock import number_of
 
 log = logging.getLogger(__name__)
 

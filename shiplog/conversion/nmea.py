@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 import pynmea2
 
+from shiplog.conversion.clock import DAY_NS, NANOS, UNIX, YEAR_2000, YEAR_2100
+from shiplog.conversion.nmea_sentences import INSTEAD, SENTENCES, TOPICS, NotValid, facts, family
 from shiplog.exceptions import ChannelMissing, listed
 from shiplog.logs.write import Series
-
-from .clock import DAY_NS, NANOS, UNIX, YEAR_2000, YEAR_2100
-from .nmea_sentences import INSTEAD, SENTENCES, TOPICS, NotValid, facts, family
 
 log = logging.getLogger(__name__)
 

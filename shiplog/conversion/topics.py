@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from shiplog.conversion import clock
+from shiplog.conversion.columns import plain, schema_of
+from shiplog.conversion.delimited import is_table, read_table
+from shiplog.conversion.nmea import lines_to_series
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.write import Series
 from shiplog.profile import Profile
-
-from . import clock
-from .columns import plain, schema_of
-from .delimited import is_table, read_table
-from .nmea import lines_to_series
 
 log = logging.getLogger(__name__)
 
@@ -63,21 +62,21 @@ def folder_to_series(folder: Path, profile: Profile | None) -> list[Series]:
 def _one(path: Path, profile: Profile | None) -> list[Series]:
     frame = read_table(path).frame
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
-    told = next((n for n in named if n in frame.columns), None)
-    stamp_name = told or _known(frame, STAMPS)
+    by_profile = next((n for n in named if n in frame.columns), None)
+    stamp_name = by_profile or _known(frame, STAMPS)
     logged_name = _known(frame, LOGGED)
-    if stamp_name is None and logged_name is None:
+    names = [n for n in (stamp_name, logged_name) if n]
+    if not names:
         raise ChannelMissing(
             f"{path.name} has no column of times. Columns found: {listed(frame.columns)}.",
             hint='name it in [table], as { channel = "time", unit = "us" }.',
         )
-    columns = {n: named.get(n) for n in (stamp_name, logged_name) if n}
+    columns = {n: named.get(n) for n in names}
     clocks = {
         n: clock.instants(frame[n], (c.unit if c else None) or _unit(n), c.format if c else None)
         for n, c in columns.items()
     }
-    logged = clocks[logged_name or stamp_name]  # type: ignore[index]
-    stamp = clocks[stamp_name or logged_name]  # type: ignore[index]
+    stamp, logged = clocks[names[0]], clocks[names[-1]]
     keep = (logged if logged_name else stamp).is_not_null()
     order = logged.filter(keep).arg_sort()
     frame, logged = frame.filter(keep)[order], logged.filter(keep)[order]

@@ -253,10 +253,9 @@ class Search:
     ) -> Change:
         """A change of one family's weights beside included causes, at its best size and noise."""
         trial, tried = self.trial, []
-        for level in levels:
+        for level in levels:  # made under RAISED, which expects the noise as a family does
             gained, size = trial.changed(point, level, included, family)
-            more = trial.expected(level.louder, NOMINAL) - trial.expected(level.louder, RAISED)
-            tried.append((level.value + more + gained, size, level.louder))
+            tried.append((level.value + gained, size, level.louder))
         value, size, noise = max(tried)
         return Change(Remainder(family, size), value, noise)
 

@@ -149,9 +149,12 @@ class Trial(hypotheses.Trial):
 
     def expected(self, noise: float, kind: str) -> float:
         """Log prior density of a level of process noise under a kind of remainder, less the
-        greatest one under `nominal`."""
+        greatest one under `nominal`.
+
+        Beside whatever remains the noise may be raised: what no cause describes, no family of
+        functions describes to the last either, and what that leaves over looks like noise."""
         usual = self.usual_spread
-        spread = RAISED_SPREAD if kind in (RAISED, INTERMITTENT) else usual
+        spread = usual if kind == NOMINAL else RAISED_SPREAD
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 
     def solve(self, total, logdet, louder, point, included, information, pull) -> Level:

@@ -4,7 +4,7 @@ A draft is a proposal: what was guessed from a name says CHECK, what was not fou
 beside each line stands what the data hold there.
 """
 
-from .tables import draft_table
-from .topics import draft
+from shiplog.draft.tables import draft_table
+from shiplog.draft.topics import draft
 
 __all__ = ["draft", "draft_table"]

@@ -14,11 +14,10 @@ from shiplog import units
 from shiplog.conversion import clock
 from shiplog.conversion.columns import busiest, text_of
 from shiplog.conversion.delimited import Table, read_table
+from shiplog.draft import facts, words
+from shiplog.draft.topics import NO_ACTUATOR
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.profile import TABLE_CHANNELS
-
-from . import facts, words
-from .topics import NO_ACTUATOR
 
 CHANNELS = {  # channel: how its column is called (without unit), its unit, and what its unit may be
     "latitude": (r"(.*_)?lat(itude)?", "deg"),
@@ -181,7 +180,7 @@ def _time(values: pl.Series, table: Table) -> Found:
         return Found(values.name, "time", None, check)
     except ShiplogError as error:
         if values.dtype.is_numeric():
-            step = float(values.cast(pl.Float64).diff().abs().median() or 0.0)  # type: ignore[arg-type]
+            step = clock.typical(values.cast(pl.Float64).diff())
             for unit, per in clock.UNIX:
                 if step and RATES_HZ[0] <= per / step <= RATES_HZ[1]:
                     return Found(values.name, "time", unit, "CHECK: of the step between rows")

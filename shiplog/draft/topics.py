@@ -9,10 +9,9 @@ from pathlib import Path
 
 import polars as pl
 
+from shiplog.draft import facts, words
 from shiplog.exceptions import LogUnreadable, ProfileError, listed
 from shiplog.logs.read import Contents, contents, fields, read
-
-from . import facts, words
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
 LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted

@@ -13,8 +13,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog.exceptions import LogUnreadable, listed
-
-from .write import CHUNK, CONTRACT
+from shiplog.logs.write import CHUNK, CONTRACT
 
 log = logging.getLogger(__name__)
 

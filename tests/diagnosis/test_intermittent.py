@@ -44,6 +44,18 @@ def test_pushes_at_one_place_are_found_there(reference):
     assert quiet.gain < 3.0
 
 
+def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference):
+    """Sway and yaw pushed more than usual, apart from each other, and surge as usual."""
+    record = straight.sailed(COUNT)
+    knots = segments.grid(record).knots
+    more = replace(UNREST, push=UNREST.push * np.array([1e-3, 2.0, 2.0]))
+    drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
+    pushed = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    linear = straight.passed(record, straight.columns_of(()), pushed=pushed, seed=5)
+    none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
+    assert unnamed.pulses_of(linear, none, reference, UNREST, weight).gain < 0.0
+
+
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
     """One on which the model ran away: rows of zeros, nothing of it seen."""
     linear = passed(40.0)
