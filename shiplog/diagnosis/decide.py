@@ -29,6 +29,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     kind = found.remainder
     best = search.recalled(posteriors.best_with(found, names, kind if not names else None))
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
+    mostly = mostly and not _imitated(search, best, names)
     trial.remainder = best.remainder
     verdict, structure, named, pulses = "undecided", None, (), None
     if names and mostly:
@@ -54,6 +55,16 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         found.ranking(), shown.found.louder, search.point(shown), shown.found, search.first,
         search.nothing.found, (), search.told,
     ), found  # fmt: skip
+
+
+def _imitated(search: Search, best: Hypothesis, names: Sequence[str]) -> bool:
+    """Whether what remains could mostly be one of the named causes, or that cause it: beside an
+    unknown force of the controls, an offset of the rudder is only a part of its form."""
+    shares = [
+        search.trial.imitated(search.point(best), best.found, label, best.remainder)
+        for label in best.causes if name_of(label) in names
+    ]  # fmt: skip
+    return any(share > thresholds.MOST for share in shares)
 
 
 def _named(

@@ -24,7 +24,8 @@ REMAINDER = 0.15
 FORM_ERROR = 0.02
 
 # Share of what a hypothesis explains. Beside a remainder, a cause is a name for the trial only
-# where it explains more than the remainder does.
+# where it explains more than the remainder does, and where the remainder could do no more than this
+# share of what the cause does.
 MOST = 0.5
 
 # Share of the held-out error. Where a plain regression leaves less than this share of the model's

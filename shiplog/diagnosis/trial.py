@@ -298,6 +298,25 @@ class Trial(hypotheses.Trial):
             found.append((gained - 0.5 * float(np.linalg.slogdet(whole)[1]), size))
         return max(found)
 
+    def imitated(self, point: Point, base: Found, label: str, remainder: Remainder) -> float:
+        """Share, 0 to 1, of what a cause does to the observations that a change of a family's
+        weights does as well, the campaign's own numbers free."""
+        family = self.families.get(remainder.kind)
+        if family is None:
+            return 0.0
+        columns, ref = self.reference.columns, self.reference
+        of, count = columns.of[label], len(ref.pull)
+        total = self.reference.counts * self.total(point, base.louder)[0][1:, 1:]
+        both = np.concatenate((of, family)).astype(int)
+        joined = total[np.ix_(np.arange(count), both)]
+        known = total[:count, :count] + ref.information
+        left = total[np.ix_(both, both)] - joined.T @ np.linalg.solve(known, joined)
+        does = base.numbers[label] / columns.unit[of]
+        own = does @ left[: len(of), : len(of)] @ does
+        across = left[len(of) :, : len(of)] @ does
+        free = left[len(of) :, len(of) :] + remainder.size**-2.0 * np.eye(len(family))
+        return float(across @ np.linalg.solve(free, across) / own) if own > 0.0 else 1.0
+
     def intermittent(self, point: Point, base: Found) -> unnamed.Pulses:
         """A force that comes and goes at one place along the ship; its gain over raised noise."""
         return unnamed.pulses(self, point, base)

@@ -104,6 +104,25 @@ def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
     assert (much.verdict, named(much)) == ("named", ["drag"])
 
 
+@pytest.mark.parametrize(("share", "word"), [(0.3, "named"), (0.7, "unknown")])
+def test_a_cause_that_the_remainder_imitates_is_not_named_beside_it(
+    trial, monkeypatch, share, word
+):
+    """What acts through the same inputs may be a part of the unknown force: then that is said."""
+    asked = []
+
+    def imitated(self, point, base, label, remainder):
+        asked.append((label, remainder.kind))
+        return share
+
+    monkeypatch.setattr(type(trial), "imitated", imitated)
+    sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
+    found = verdict(trial, sure, evidence={(DRAG, "time"): 80.0, (DRAG, NOMINAL): 70.0})
+    assert found.verdict == word
+    assert asked == [("drag", "time")]
+    assert word == "named" or found.structure.family == "time"
+
+
 def test_a_name_of_two_kinds_is_shown_in_the_likelier(trial):
     """A verdict that names a clock says which."""
     found = verdict(trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32})

@@ -109,6 +109,7 @@ def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
     differences = []
     for included, kind, size in HYPOTHESES[1:]:
         found = level(trial, point, noise, included, kind, size).value - nothing.value
+        found -= trial.expected(noise, kind) - trial.expected(noise, NOMINAL)
         families = () if kind == NOMINAL else (kind,)
         wanted = nats(trial, point, noise, included, families, size) - usual
         assert found == pytest.approx(wanted, abs=1e-5 * abs(usual) / 100.0)
@@ -167,7 +168,7 @@ def test_a_fixed_cause_stays_where_it_is(made):
 @pytest.mark.parametrize("included", ((), ("drag",)))
 def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
-    base = level(trial, point, 1.4, included)
+    base = level(trial, point, 1.4, included, RAISED)  # which expects the noise as a family does
     gained, size = trial.changed(point, base, included, family)
     each = [level(trial, point, 1.4, included, family, s).value for s in trials.SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
@@ -216,6 +217,31 @@ def test_a_change_acts_on_the_channels_that_it_pushes(made):
     assert trial.remainder == Remainder(RAISED)
 
 
+@pytest.mark.parametrize(
+    ("own", "low", "high"), [(0.0, 0.98, 1.0), (0.045, 0.3, 0.7), (1.0, 0.0, 0.01)]
+)
+def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, own, low, high):
+    """A cause that pushes as a function of time does, and so much besides as nothing else does.
+    What is not pushed at the knots, where process noise pushes too, is felt far more."""
+    usual, record, given = made
+    plain = straight.Straight(*made)
+    family = next(f for f in plain.unseen.families if f.name == "time")
+    at = family.columns - plain.unseen.families[0].columns[0]
+    pushed = plain.unseen.pushed(given.cut, plain.grid)[..., at[0]]
+    does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], pushed)
+    weight = does.std((0, 1)) + 1e-12
+    rest = np.random.default_rng(11).standard_normal(does.shape) * weight
+    j, columns = given.j.copy(), straight.columns_of(CAUSES)
+    j[..., columns.of["drag"][0]] = 30.0 * (does + own * rest)
+    trial = straight.Straight(usual, record, replace(given, j=j))
+    point = trial.at({})
+    base, _ = trial.scan(point, (), ("drag",), 1.0)
+    base.numbers["drag"] = np.ones(1)
+    share = trial.imitated(point, base, "drag", Remainder("time", 1e4))
+    assert low <= share <= high
+    assert trial.imitated(point, base, "drag", Remainder(RAISED)) == 0.0
+
+
 # --- levels of process noise
 
 
@@ -225,8 +251,7 @@ def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
     for noise in (0.5, 1.0, 1.3, 4.0):
         at = math.log(noise)
         assert trial.expected(noise, NOMINAL) == pytest.approx(norm(0.0, usual).logpdf(at) - top)
-        assert trial.expected(noise, "wind") == trial.expected(noise, NOMINAL)
-        for kind in (RAISED, INTERMITTENT):
+        for kind in (RAISED, INTERMITTENT, "wind", "controls"):
             wanted = norm(0.0, trials.RAISED_SPREAD).logpdf(at) - top
             assert trial.expected(noise, kind) == pytest.approx(wanted)
 
