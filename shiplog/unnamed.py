@@ -157,16 +157,20 @@ def _usual(trial: Trial, before, by, more) -> tuple[np.ndarray, np.ndarray]:
     )  # fmt: skip
 
 
-def pulses(trial: Trial, point: Point, base: Found) -> Pulses:
+def pulses(trial: Trial, point: Point, base: Found, usual: np.ndarray | None = None) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
-    accelerations go together as those of no other unrest do. Judged on what is left."""
+    accelerations go together as those of no other unrest do. Judged on what is left.
+
+    usual    acceleration [3] that the nominal process noise has at one place; none where None
+    """
     left, d = trial.left(point.linear, trial.solved(point, base))
-    return pulses_of(left, d, trial.reference, trial.unrest, trial.weight)
+    return pulses_of(left, d, trial.reference, trial.unrest, trial.weight, usual)
 
 
 def pulses_of(
-    linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray
-) -> Pulses:
+    linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray,
+    usual: np.ndarray | None = None,
+) -> Pulses:  # fmt: skip
     """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
     kept = weight > 0.0  # a segment that says nothing has no likelihood
     linear, weight = linear.pick(kept), weight[kept]
@@ -180,9 +184,12 @@ def pulses_of(
         return -0.5 * ref.counts * (float(weight @ each) + volume)
 
     def raised(factors: np.ndarray) -> float:
-        return value(replace(plain, push=plain.push * np.exp(factors)))
+        side = math.exp(0.5 * (factors[1] + factors[2]))
+        pulse = None if usual is None else usual * side
+        return value(replace(plain, push=plain.push * np.exp(factors), pulse=pulse))
 
-    # from day to day one channel's noise is raised by more than another's, with no device at work
+    # from day to day one channel's noise is raised by more than another's, with no device at work,
+    # and what usually pushes at one place pushes there more
     first = np.full(3, math.log(max(LOUDER, key=lambda v: value(plain.louder(v)))))
     about = {"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1}
     by_channel = -float(minimize(lambda at: -raised(at), first, method="Nelder-Mead",

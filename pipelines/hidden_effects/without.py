@@ -33,13 +33,14 @@ from shiplog.diagnosis import (
     thresholds,
     voyage_effects,
 )
-from shiplog.diagnosis.trial import INTERMITTENT, Trial
+from shiplog.diagnosis.trial import Trial
 
 WHOLE = "nothing"  # the decision as it is
 
 
 def _no_placebo(stack: ExitStack) -> None:
-    stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {INTERMITTENT: 0.0}))
+    stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
+    stack.enter_context(patch.object(Trial, "usual_push", None))
 
 
 def _no_form_error(stack: ExitStack) -> None:

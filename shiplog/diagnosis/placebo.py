@@ -10,10 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shiplog import unnamed
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.trial import SIZES
-from shiplog.segments import Grid
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
@@ -38,29 +36,6 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
             gained = max(_gained(own, towards, size) for size in sizes)
             most[name] = max(most[name], gained)
     return most
-
-
-def intermittent(campaign: Campaign, g: Grid, segments: float) -> float:
-    """Nats that an intermittent side force would gain on as many nominal segments as a trial has,
-    each part's numbers predicted by the others and itself, as a trial's are.
-
-    What pushes a ship at random often pushes it at one place, and in bursts. The evidence of such
-    a force grows with every segment, so that of the whole campaign is scaled.
-    """
-    reference = campaign.reference
-    linear = reference.nominal
-    if linear is None or not campaign.weight.sum():
-        return 0.0
-    pushed = campaign.discrepancy.pushed(linear.cut, g)
-    unit, share = reference.columns.unit, reference.counts
-    own = np.empty((len(linear.e), len(unit)))
-    for left_out, (rows, part) in enumerate(zip(campaign.rows, campaign.parts, strict=True)):
-        information, pull = campaign.prior_without(left_out)
-        gram = share * part[: 1 + len(pull), : 1 + len(pull)]
-        own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
-    left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
-    gain = unnamed.pulses_of(left, none, reference, reference.unrest, campaign.weight).gain
-    return max(gain, 0.0) * segments / float(campaign.weight.sum())
 
 
 def _gained(own: np.ndarray, towards: np.ndarray, size: float) -> float:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.diagnosis import placebo
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 from shiplog.hypotheses import Found, Level, Point
@@ -279,17 +278,12 @@ class Search:
         self._put(labels, remainder, max(value, base.evidence), point, base)
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
-        """An intermittent side force instead of raised process noise: a force that gains no more
-        than on nominal voyages is that noise and nothing else, and is not counted twice."""
-        if INTERMITTENT not in self.placebo:
-            usual = placebo.intermittent(
-                self.trial.campaign, self.trial.grid, float(self.trial.weight.sum())
-            )
-            self.placebo = {**self.placebo, INTERMITTENT: usual}
+        """An intermittent side force instead of raised process noise: a force that gains nothing
+        over it is that noise and nothing else, and is not counted twice."""
         raised = self.found[labels, RAISED]
         self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)
-        if tried.gain > self.placebo[INTERMITTENT]:
+        if tried.gain > 0.0:
             value = raised.evidence + tried.gain
             self._put(labels, Remainder(INTERMITTENT), value, point, raised.found, tried)
 

@@ -11,12 +11,13 @@ import math
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from shiplog import hypotheses, segments, structure, unnamed
 from shiplog.columns import HELD
-from shiplog.diagnosis import discrepancy
+from shiplog.diagnosis import discrepancy, intermittent
 from shiplog.diagnosis.nominal_campaign import (
     Campaign,
     parts_of,
@@ -318,8 +319,14 @@ class Trial(hypotheses.Trial):
         return float(across @ np.linalg.solve(free, across) / own) if own > 0.0 else 1.0
 
     def intermittent(self, point: Point, base: Found) -> unnamed.Pulses:
-        """A force that comes and goes at one place along the ship; its gain over raised noise."""
-        return unnamed.pulses(self, point, base)
+        """A force that comes and goes at one place along the ship; its gain over raised noise, of
+        which what is usual pushes at one place too."""
+        return unnamed.pulses(self, point, base, self.usual_push)
+
+    @cached_property
+    def usual_push(self) -> np.ndarray | None:
+        """Acceleration [3] that the nominal process noise has at one place."""
+        return intermittent.usual_push(self.campaign, self.grid)
 
     def acts_on(self, point: Point, base: Found, family: str) -> tuple[str, ...]:
         """Channels in which a change of a family pushes by more than a third of its most."""

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import straight
-from straight import SETTING, UNREST
+from straight import CAUSES, SETTING, UNREST
 
-from shiplog import segments, unnamed
+from shiplog import evidence, segments, unnamed
+from shiplog.diagnosis import intermittent
+from shiplog.unnamed import Pulses
 
 COUNT = 24
 LEVER = 0.3  # lengths ahead of midship at which the force acts
@@ -69,3 +71,66 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
     found = unnamed.pulses_of(away, none, reference, UNREST, np.where(lost, 0.0, 1.0))
     without = unnamed.pulses_of(linear.pick(~lost), none, reference, UNREST, np.ones(COUNT - 1))
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
+
+
+def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
+    """Bursts at one place: a force at that place unless they are usual there."""
+    linear = passed(40.0)
+    none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
+    found = unnamed.pulses_of(linear, none, reference, UNREST, weight)
+    usual = found.force * found.unit
+    again = unnamed.pulses_of(linear, none, reference, UNREST, weight, usual)
+    assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
+    assert found.gain > 30.0 and again.gain < 1.0
+    # beside a place of its own it is as much a force as before
+    elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
+    other = unnamed.pulses_of(linear, none, reference, UNREST, weight, elsewhere)
+    assert other.gain > 20.0
+
+
+# --- what is usual of it
+
+UNIT = np.array([0.0, 0.01, 0.004])
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What is left of the nominal campaign when the force is asked for, and the weights."""
+    said = {}
+
+    def pulses_of(linear, d, reference, unrest, weight):
+        left = evidence.weighed(linear, unrest).dd[:, 0, 0]
+        said.update(left=left, weight=weight)
+        assert not d.any()
+        return Pulses(0.0, said.get("gain", 7.0), 0.3, 2.0, UNIT)
+
+    monkeypatch.setattr(unnamed, "pulses_of", pulses_of)
+    return said
+
+
+def test_what_usually_pushes_at_one_place_is_asked_of_the_nominal_campaign(asked):
+    record, columns = straight.sailed(12), straight.columns_of(CAUSES)
+    made = straight.campaign(record, straight.passed(record, columns), columns)
+    grid = segments.grid(record)
+    assert intermittent.usual_push(made, grid) == pytest.approx(2.0 * UNIT)
+    assert asked["weight"].sum() == 12.0
+    assert intermittent.usual_push(replace(made, weight=np.zeros(12)), grid) is None
+    asked["gain"] = -1.0  # it pushes in each channel by itself
+    assert intermittent.usual_push(made, grid) is None
+
+
+def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
+    """Ten realistic sizes of a cause in all parts: nothing of it is left."""
+    columns = straight.columns_of(CAUSES)
+    record = straight.sailed(12)
+    numbers = np.zeros(columns.linearised)
+    numbers[columns.of["drag"]] = 5.0
+    left = {}
+    for own in (numbers, 0.0 * numbers):
+        given = straight.passed(record, columns, own, told=3.0)
+        made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
+        intermittent.usual_push(made, segments.grid(record))
+        left[bool(own.any())] = asked["left"]
+        before = evidence.weighed(given, straight.UNREST).dd[:, 0, 0]
+        assert not own.any() or before.min() > 3.0 * left[True].max()
+    assert left[True] == pytest.approx(left[False], rel=0.1)

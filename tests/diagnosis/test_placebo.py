@@ -7,12 +7,9 @@ import pytest
 import straight
 from straight import CAUSES
 
-from shiplog import evidence, segments, unnamed
-from shiplog.diagnosis import placebo
 from shiplog.diagnosis.placebo import placebos
 from shiplog.diagnosis.trial import SIZES
 from shiplog.reference import marginal
-from shiplog.unnamed import Pulses
 
 SHARE = 0.5
 
@@ -95,50 +92,3 @@ def test_what_parts_differ_by_is_no_placebo():
     )
     assert strict > 10.0
     assert free < 1.0
-
-
-# --- an intermittent force ------------------------------------------------------------------------
-
-GAIN = 7.0  # nats, on all nominal segments
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """What is left of the nominal campaign when the force is asked for, and the weights."""
-    said = {}
-
-    def pulses_of(linear, d, reference, unrest, weight):
-        left = evidence.weighed(linear, unrest).dd[:, 0, 0]
-        said.update(left=left, weight=weight)
-        assert not d.any()
-        return Pulses(0.0, GAIN, 0.0, 1.0, np.zeros(3))
-
-    monkeypatch.setattr(unnamed, "pulses_of", pulses_of)
-    return said
-
-
-def test_an_intermittent_force_has_the_placebo_of_as_many_nominal_segments(asked):
-    made = campaign(0.0)
-    grid = segments.grid(straight.sailed(12))
-    assert placebo.intermittent(made, grid, 6.0) == pytest.approx(0.5 * GAIN)
-    quieter = replace(made, weight=np.where(np.arange(12) < 4, 0.0, 1.0))
-    assert placebo.intermittent(quieter, grid, 6.0) == pytest.approx(0.75 * GAIN)
-    assert asked["weight"].sum() == 8.0
-    assert placebo.intermittent(replace(made, weight=np.zeros(12)), grid, 6.0) == 0.0
-
-
-def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
-    """Ten realistic sizes of a cause in all parts: nothing of it is left."""
-    columns = straight.columns_of(CAUSES)
-    record = straight.sailed(12)
-    numbers = np.zeros(columns.linearised)
-    numbers[columns.of["drag"]] = 5.0
-    left = {}
-    for own in (numbers, 0.0 * numbers):
-        given = straight.passed(record, columns, own, told=3.0)
-        made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
-        placebo.intermittent(made, segments.grid(record), 12.0)
-        left[bool(own.any())] = asked["left"]
-        before = evidence.weighed(given, straight.UNREST).dd[:, 0, 0]
-        assert not own.any() or before.min() > 3.0 * left[True].max()
-    assert left[True] == pytest.approx(left[False], rel=0.1)

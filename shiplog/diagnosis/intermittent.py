@@ -1,0 +1,35 @@
+"""A side force that comes and goes at one place, and what of it is usual for the ship.
+
+What pushes a ship at random often pushes it at one place, and in bursts. In a trial of rougher
+weather the same pushes are stronger, and no device is at work.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shiplog import unnamed
+from shiplog.diagnosis.nominal_campaign import Campaign
+from shiplog.segments import Grid
+
+
+def usual_push(campaign: Campaign, g: Grid) -> np.ndarray | None:
+    """Acceleration [3], root mean square, of the nominal process noise at one place, where it is
+    likelier to push at one place than in each channel by itself; None where it is not.
+
+    Each part's numbers are predicted by the others and itself, as a trial's are.
+    """
+    reference = campaign.reference
+    linear = reference.nominal
+    if linear is None or not campaign.weight.sum():
+        return None
+    pushed = campaign.discrepancy.pushed(linear.cut, g)
+    unit, share = reference.columns.unit, reference.counts
+    own = np.empty((len(linear.e), len(unit)))
+    for left_out, (rows, part) in enumerate(zip(campaign.rows, campaign.parts, strict=True)):
+        information, pull = campaign.prior_without(left_out)
+        gram = share * part[: 1 + len(pull), : 1 + len(pull)]
+        own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
+    left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
+    found = unnamed.pulses_of(left, none, reference, reference.unrest, campaign.weight)
+    return found.unit * found.force if found.gain > 0.0 else None
