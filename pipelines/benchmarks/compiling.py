@@ -21,7 +21,8 @@ from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import beside, load
 
 SEGMENTS, NODES = 64, 151  # of one call, as a diagnosis makes them
-WITH, WITHOUT = {"xla_cpu_use_fusion_emitters": True}, traced.COMPILER
+WITH: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": True}
+WITHOUT: dict[str, str | bool] = {**traced.COMPILER}
 
 
 def main() -> None:
