@@ -58,8 +58,8 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
 
 
 def _imitated(search: Search, best: Hypothesis, names: Sequence[str]) -> bool:
-    """Whether what remains could mostly be one of the named causes, or that cause it: beside an
-    unknown force of the controls, an offset of the rudder is only a part of its form."""
+    """Whether the remainder could do most of what one of the named causes does: beside an unknown
+    force of the controls, an offset of the rudder may be a part of that force."""
     shares = [
         search.trial.imitated(search.point(best), best.found, label, best.remainder)
         for label in best.causes if name_of(label) in names
