@@ -128,7 +128,7 @@ def _against(
 
 
 def _median(values: pl.Series) -> float:
-    return float(values.median()) if len(values) else float("nan")  # type: ignore[arg-type]
+    return float(np.median(values.drop_nulls().to_numpy())) if len(values) else float("nan")
 
 
 def force_line(forces: pl.DataFrame, voyage: str) -> str:

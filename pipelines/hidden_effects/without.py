@@ -105,6 +105,12 @@ def _no_practical_size(stack: ExitStack) -> None:
 def _no_share_of_causes(stack: ExitStack) -> None:
     """A cause is named however small a share of the error it explains."""
     stack.enter_context(patch.object(thresholds, "MOST", 0.0))
+    _no_imitation(stack)  # which asks for that number the other way round
+
+
+def _no_imitation(stack: ExitStack) -> None:
+    """A cause is named though the remainder beside it could do most of what it does."""
+    stack.enter_context(patch.object(Trial, "imitated", lambda *given: 0.0))
 
 
 def _fixed_time_scale(stack: ExitStack) -> None:
@@ -137,6 +143,7 @@ PARTS: Mapping[str, Callable[[ExitStack], None]] = {
     "baseline": _no_baseline,
     "practical-size": _no_practical_size,
     "share-of-causes": _no_share_of_causes,
+    "imitation": _no_imitation,
     "time-scale": _fixed_time_scale,
 }
 
