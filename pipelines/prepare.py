@@ -77,13 +77,7 @@ def ingest_logs(
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
-        log.info(
-            "%s: %s, %d rows, %d findings",
-            voyage.name,
-            state,
-            voyage.table.height,
-            len(voyage.report.findings),
-        )
+        log.info("%s: %s", voyage.name, state)
     return Ingested(reports, refused)
 
 

@@ -35,6 +35,8 @@ class Samples:
     spike   [n]     samples that are far off both neighbours
     whole   [n]     no message is missing before the next sample, however far off its stamp is
     blank   [m]     ns, times at which a message came without a usable value
+
+    resolution  the step in which the instrument counts, SI (position in m); 0 where none shows
     """
 
     time: np.ndarray
@@ -44,6 +46,14 @@ class Samples:
     blank: np.ndarray
     period_s: float
     tolerance_s: float
+    resolution: float = 0.0
+
+    def nearest_rows(self, times: np.ndarray) -> np.ndarray:
+        """Grid rows [m] bool that are the nearest to a sample; times [m] ns."""
+        near = np.zeros(len(times), bool)
+        inside = self.time[(self.time >= times[0]) & (self.time <= times[-1])]
+        near[np.rint((inside - times[0]) / STEP_NS).astype(np.int64)] = True
+        return near
 
 
 @dataclass(frozen=True)

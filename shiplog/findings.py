@@ -44,8 +44,22 @@ KINDS = (
 
 
 @dataclass(frozen=True, slots=True)
+class Instrument:
+    """How often and how finely one channel was recorded."""
+
+    channel: str
+    rate_hz: float
+    resolution: float  # the step in which it counts, in `unit`; 0 where none shows
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
 class VoyageReport:
-    """The contract's answer of `check` and `ingest` for one log."""
+    """The contract's answer of `check` and `ingest` for one log.
+
+    usable_s    seconds that can be averaged to 1 Hz; None where the log was not ingested
+    windows     of `table.WINDOW` such seconds in a row; None likewise
+    """
 
     name: str
     messages_read: int
@@ -53,6 +67,14 @@ class VoyageReport:
     rows: int
     seconds: float
     findings: tuple[Finding, ...] = field(default=())
+    usable_s: int | None = None
+    windows: int | None = None
+    instruments: tuple[Instrument, ...] = field(default=())
+
+    @property
+    def slowest(self) -> Instrument | None:
+        """The instrument that measures least often."""
+        return min(self.instruments, key=lambda one: one.rate_hz, default=None)
 
     @classmethod
     def from_json(cls, content: dict) -> VoyageReport:
@@ -61,6 +83,8 @@ class VoyageReport:
         return cls(
             content["name"], counts["read"], counts["lost"], content["rows"], content["seconds"],
             tuple(Finding(**finding) for finding in content["findings"]),
+            content.get("usable_s"), content.get("windows"),
+            tuple(Instrument(**one) for one in content.get("instruments", ())),
         )  # fmt: skip
 
     def as_json(self) -> dict:
@@ -69,5 +93,8 @@ class VoyageReport:
             "messages": {"read": self.messages_read, "lost": self.messages_lost},
             "rows": self.rows,
             "seconds": self.seconds,
+            "usable_s": self.usable_s,
+            "windows": self.windows,
+            "instruments": [asdict(one) for one in self.instruments],
             "findings": [asdict(finding) for finding in self.findings],
         }

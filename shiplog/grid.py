@@ -66,17 +66,21 @@ def mark_gaps(grid: Grid) -> None:
 
 
 def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, align.Samples]) -> None:
-    """Values that repeat although the ship moves; frozen ones, too long to be data."""
+    """Values that repeat although the ship moves; frozen ones, too long to be data.
+
+    What an instrument counts in steps stands still until the ship has gone a step.
+    """
     speed = np.nan_to_num(np.hypot(grid.columns["surge"], grid.columns["sway"]))
     turning = np.abs(np.nan_to_num(grid.columns["yaw_rate"]))
-    travel = {"position": np.cumsum(speed) * STEP_S, "heading": np.cumsum(turning) * STEP_S}
+    travel = {"position": np.cumsum(speed) * STEP_S}
+    if profile.sensors.yaw_rate is not None:  # else it is the heading's own derivative
+        travel["heading"] = np.cumsum(turning) * STEP_S
     for name, samples in sampled.items():
         runs = quality.repeats(samples.value)
         if name not in travel:
             runs = quality.improbable(runs, len(samples.time))
-        rows = quality.held_on_grid(
-            grid.times, samples.time, runs, travel.get(name), profile.sensors.noise(name)
-        )
+        least = 3.0 * profile.sensors.noise(name) + samples.resolution
+        rows = quality.held_on_grid(grid.times, samples.time, runs, travel.get(name), least)
         quality.mark(grid.marks, rows, Quality.HELD)
         intervals = [quality.seconds(i) for i in rows]
         lasted = [end - start for start, end in intervals]
@@ -96,27 +100,50 @@ def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, align.Samples]) 
             )
 
 
-def mark_jumps(grid: Grid, profile: Profile) -> None:
-    """Steps of the position or heading that the velocity and the yaw rate do not explain."""
-    usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
+def mark_jumps(grid: Grid, profile: Profile, sampled: dict[str, align.Samples]) -> None:
+    """Steps of the position or heading that the velocity and the yaw rate do not explain.
+
+    Looked for from one measured value to the next, not between rows that were interpolated.
+    """
     columns = {name: np.nan_to_num(column) for name, column in grid.columns.items()}
-    heading, turning = np.unwrap(columns["heading"]), columns["yaw_rate"]
+    heading, turning = columns["heading"], columns["yaw_rate"]
+    known = np.isfinite(grid.columns["heading"])
+    heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
     c, s = np.cos(heading), np.sin(heading)
     u, v = columns["surge"], columns["sway"]
     over_ground = np.stack((c * u - s * v, s * u + c * v), 1)
     position = np.stack((columns["x0"], columns["y0"]), 1)
-    noise = profile.sensors.noise
 
-    for row, step in quality.jumps(position, over_ground, usable, noise("position")):
+    found = []
+    for row, step in _jumps(grid, profile, sampled, "position", position, over_ground):
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
             grid.marks[row] |= int(Quality.JUMP)
-        grid.findings.append(_jump("position", row, step, "m", lost))
-    for row, step in quality.jumps(heading[:, None], turning[:, None], usable, noise("heading")):
+        found.append(_jump("position", row, step, "m", lost))
+    for row, step in _jumps(grid, profile, sampled, "heading", heading[:, None], turning[:, None]):
         if step > JUMP_RAD:
             grid.marks[row] |= int(Quality.JUMP)
         lost = _worth(step, turning[row])
-        grid.findings.append(_jump("heading", row, math.degrees(step), "deg", lost))
+        found.append(_jump("heading", row, math.degrees(step), "deg", lost))
+    grid.findings += found
+
+
+def _jumps(
+    grid: Grid,
+    profile: Profile,
+    sampled: dict[str, align.Samples],
+    name: str,
+    gone: np.ndarray,
+    rate: np.ndarray,
+) -> list[tuple[int, float]]:
+    """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are."""
+    samples = sampled[name]
+    usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
+    every = max(round(samples.period_s / STEP_S), 1)
+    if every > 1:
+        usable &= samples.nearest_rows(grid.times)
+    noise = math.hypot(profile.sensors.noise(name), samples.resolution / math.sqrt(12.0))
+    return quality.jumps(gone, rate, usable, noise, every)
 
 
 def _worth(step: float, rate: np.ndarray | float) -> float:

@@ -13,9 +13,10 @@ import numpy as np
 import polars as pl
 
 from shiplog import align, channels, midship, parity, quality
+from shiplog import table as tables
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
-from shiplog.findings import Finding, VoyageReport
+from shiplog.findings import Finding, Instrument, VoyageReport
 from shiplog.grid import Grid, mark_gaps, mark_holds, mark_jumps
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.parity import Estimate
@@ -24,6 +25,11 @@ from shiplog.profile import Actuator, Profile, Sensor, Source
 CLOCKS = {  # of a source: its column, and the one that it is held against
     "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
     "publish": ("publish_time", "log_time"),
+}  # fmt: skip
+
+SHOWN = {  # of a sensor: the unit of its resolution, and its factor from SI
+    "position": ("m", 1.0), "velocity": ("m/s", 1.0), "heading": ("deg", 1.0 / channels.DEGREE),
+    "yaw_rate": ("deg/s", 1.0 / channels.DEGREE), "wind": ("m/s", 1.0),
 }  # fmt: skip
 
 # Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
@@ -80,7 +86,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         _actuator(grid, actuator, driven[actuator.name])
     mark_gaps(grid)
     mark_holds(grid, profile, sampled)
-    mark_jumps(grid, profile)
+    mark_jumps(grid, profile, sampled)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}
@@ -92,6 +98,8 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     )
     estimates = tuple(parity.estimates(table, profile))
     said = parity.findings(estimates, table.height, profile)
+    named = table.lazy().with_columns(voyage=pl.lit(""))
+    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
     report = VoyageReport(
         name=reading.contents.path.stem,
         messages_read=reading.health.messages_read,
@@ -99,8 +107,18 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         rows=table.height,
         seconds=round(grid.seconds, 3),
         findings=(*reading.health.findings, *left_out, *grid.findings, *said),
+        usable_s=usable_s,
+        windows=windows,
+        instruments=tuple(_instrument(*one) for one in [*sampled.items(), *driven.items()]),
     )
     return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
+
+
+def _instrument(name: str, samples: align.Samples) -> Instrument:
+    unit, factor = SHOWN.get(name, ("", 0.0))
+    return Instrument(
+        name, round(1.0 / samples.period_s, 3), float(f"{samples.resolution * factor:.3g}"), unit
+    )
 
 
 def _span(base: np.ndarray, sampled: list[align.Samples]) -> tuple[int, int]:
@@ -212,7 +230,8 @@ def _samples(reading: Reading, profile: Profile, name: str) -> align.Samples:
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
     metric = _metric(samples.value, kind)
-    return replace(samples, spike=quality.spikes(metric, profile.sensors.noise(name)))
+    spike = quality.spikes(metric, profile.sensors.noise(name))
+    return replace(samples, spike=spike, resolution=quality.resolution(metric))
 
 
 def _metric(value: np.ndarray, kind: str) -> np.ndarray:
@@ -233,7 +252,7 @@ def _motion(
     if sensors.yaw_rate is not None:
         yaw_rate = grid.place("yaw_rate", sampled["yaw_rate"])[:, 0]
     else:
-        yaw_rate = np.gradient(heading, align.STEP_NS * 1e-9)
+        yaw_rate = align.onto(grid.times, _differentiated(sampled["heading"])).value[:, 0]
     position = grid.place("position", sampled["position"])
     datum = None
     if kind("position") == "geodetic":
@@ -249,6 +268,12 @@ def _motion(
         "surge": velocity[:, 0], "sway": velocity[:, 1], "yaw_rate": yaw_rate,
     }  # fmt: skip
     return datum
+
+
+def _differentiated(heading: align.Samples) -> align.Samples:
+    """The yaw rate [rad/s] at the heading's own samples; rows between them hold no more."""
+    rate = np.gradient(heading.value[:, 0], heading.time * 1e-9)
+    return replace(heading, value=rate[:, None])
 
 
 def _datum(reading: Reading, profile: Profile, position: align.Samples) -> tuple[float, float]:

@@ -186,8 +186,9 @@ def _descended(problem: Problem, value: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def fit(problem: Problem, start: np.ndarray) -> Fit | None:
-    """Gauss-Newton from `start`. None where there is too little to say how sure it is, or where
-    the voyage shows one parameter only together with another."""
+    """Gauss-Newton from `start`. None where there is too little to say how sure it is, where the
+    voyage shows one parameter only together with another, or where a slope is another one when the
+    sides are exchanged: then neither side shows more than its noise."""
     grid, free = problem.grid, problem.free
     usable = grid.run > ORDER
     block = np.cumsum(np.diff(grid.first // (BLOCK_S * ROWS), prepend=-1) != 0)[usable]
@@ -224,7 +225,9 @@ def fit(problem: Problem, start: np.ndarray) -> Fit | None:
         at = int(np.searchsorted(free, index))
         tool[..., at] = _whitened(_smooth(column), memory)[usable]
         step = -np.linalg.solve(here.cross(tool, here.slope), here.score(tool, value[free]))
-        reverse[index] += np.clip(step[at], -problem.prior[index], problem.prior[index])
+        if abs(step[at]) > problem.prior[index]:  # noise on both sides, and little else
+            return None
+        reverse[index] += step[at]
     quantile = float(stdtrit(max(len(names) - 1, 2), NINETY))
     return Fit(value, cov, reverse, quantile)
 

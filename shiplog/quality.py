@@ -17,6 +17,10 @@ from shiplog.findings import Finding
 LISTED = 20  # stretches of one kind on one channel that are said one by one; the rest is counted
 FROZEN_S = 3.0  # a value held longer than this is stale, not data
 SAID_HELD_S = 0.5
+SAME = 1e-9  # of the span of a channel: values nearer than that are one value
+FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
+LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
+MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
 
 
@@ -47,6 +51,27 @@ def repeats(value: np.ndarray) -> list[tuple[int, int]]:
         return []
     same = np.concatenate(([False], (np.diff(value, axis=0) == 0).all(axis=1)))
     return list(stretches(same))
+
+
+def resolution(value: np.ndarray) -> float:
+    """The step in which an instrument counts, of values [n, k] the coarsest; 0 where none shows.
+
+    An instrument counts in steps of q where nearly all differences between the values that it took
+    are whole multiples of q.
+    """
+    found = 0.0
+    for column in value.T:
+        apart = np.diff(np.unique(column))
+        span = float(apart.sum())
+        apart = apart[apart > SAME * span]  # what rounding of the arithmetic made is no difference
+        if len(apart) < FEWEST_STEPS:
+            continue
+        step = float(apart.min())
+        step = float(np.median(apart[apart < 1.5 * step]))  # rounding averaged away
+        off = np.abs(apart / step - np.round(apart / step))
+        if np.mean(off < LATTICE) >= MOST_ON_LATTICE:
+            found = max(found, step)
+    return found
 
 
 def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:
@@ -102,12 +127,13 @@ def held_on_grid(
     sampled: np.ndarray,
     runs: list[tuple[int, int]],
     travel: np.ndarray | None,
-    noise: float,
+    least: float,
 ) -> list[tuple[int, int]]:
-    """Runs of repeats as grid rows, where the ship moved by more than the instrument's noise.
+    """Runs of repeats as grid rows, where the ship moved by more than the instrument would show.
 
     times [m] ns; sampled [n] ns; travel [m]: how far the channel should have gone by each row,
-    integrated from its rate (None: no rate is known, and the runs are taken as they are).
+    integrated from its rate (None: no rate is known, and the runs are taken as they are);
+    least: how far it has to go to be seen, in the channel's unit.
     """
     kept = []
     for first, last in runs:
@@ -115,32 +141,33 @@ def held_on_grid(
         b = int(np.searchsorted(times, sampled[last], side="right")) - 1
         if b <= a or a >= len(times):
             continue
-        if travel is None or abs(travel[b] - travel[a]) > 3.0 * noise:
+        if travel is None or abs(travel[b] - travel[a]) > least:
             kept.append((a, b))
     return kept
 
 
 def jumps(
-    gone: np.ndarray, rate: np.ndarray, usable: np.ndarray, noise: float
+    gone: np.ndarray, rate: np.ndarray, usable: np.ndarray, noise: float, every_rows: int = 1
 ) -> list[tuple[int, float]]:
     """Rows whose step since the last usable row is not what the rate says, and by how much.
 
-    gone [m, k]: the channel; rate [m, k]: its derivative; usable [m]. The step is compared over
-    everything since the last usable row, so that a value held for a while and then caught up is
-    no jump; over a gap the rate is interpolated, and half of that travel is allowed as error.
+    gone [m, k]: the channel; rate [m, k]: its derivative; usable [m]: rows with a measured value,
+    `every_rows` apart where none is missing. The step is compared over everything since the last
+    usable row, so that a value held for a while and then caught up is no jump; over a gap the rate
+    is interpolated, and half of that travel is allowed as error.
     """
     step = STEP_NS * 1e-9
     rows = np.flatnonzero(usable)
     if len(rows) < 20:
         return []
-    every = np.arange(len(gone))
-    known = np.stack([np.interp(every, rows, column[rows]) for column in rate.T], axis=1)
+    at = np.arange(len(gone))
+    known = np.stack([np.interp(at, rows, column[rows]) for column in rate.T], axis=1)
     expected = np.zeros_like(known)
     np.cumsum(0.5 * (known[1:] + known[:-1]) * step, axis=0, out=expected[1:])
     error = np.linalg.norm(np.diff(gone[rows] - expected[rows], axis=0), axis=1)
     travel = np.linalg.norm(np.diff(expected[rows], axis=0), axis=1)
     limit = max(12.0 * 1.4826 * float(np.median(error)), 8.0 * noise)
-    limits = limit + np.where(np.diff(rows) > 1, 0.5 * travel, 0.0)
+    limits = limit + np.where(np.diff(rows) > 1.5 * every_rows, 0.5 * travel, 0.0)
     return [(int(rows[i + 1]), float(error[i])) for i in np.flatnonzero(error > limits)]
 
 

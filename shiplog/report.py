@@ -8,14 +8,22 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
-from shiplog.findings import CONTRACT, VoyageReport
+from shiplog.exceptions import listed
+from shiplog.findings import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.judgement import FEWEST
 from shiplog.profile import Profile
+from shiplog.table import WINDOW
 
 if TYPE_CHECKING:
     from shiplog.store import Entry
 
-MOST_FINDINGS = 12
+MOST_FINDINGS = 16  # lines on one log
+MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
+
+# Slower is said: a manoeuvring ship turns by degrees between two samples.
+SELDOM_HZ = 4.5
+# A coarser step is said: about three times what a good instrument is accurate to.
+COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "wind": 0.3}
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -50,19 +58,65 @@ def _cell(value: object) -> str:
 
 
 def voyage_lines(report: VoyageReport) -> list[str]:
-    """What one log's health is, in a few lines."""
+    """What one log's health is, in a few lines: at most a screen."""
     lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
+    head = f"{report.name}: {report.messages_read} messages read, {lost} lost; "
+    if report.usable_s is None:
+        return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
+    head += (
+        f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
+        f"{report.windows} {'window' if report.windows == 1 else 'windows'} of {WINDOW} s"
+    )
+    return [head, *_instruments(report.instruments), *_findings(report.findings)]
+
+
+def _instruments(instruments: Sequence[Instrument]) -> list[str]:
+    """Which of them measure seldom, and which count in coarse steps."""
+    rates: dict[float, list[str]] = {}
+    for one in instruments:
+        if one.rate_hz < SELDOM_HZ:
+            rates.setdefault(float(f"{one.rate_hz:.2g}"), []).append(one.channel)
     lines = [
-        f"{report.name}: {report.messages_read} messages read, {lost} lost; "
-        f"{report.rows} rows, {report.seconds:.1f} s"
+        f"  rate: {listed(names, most=4)} at {rate:g} Hz; what stands between two samples is "
+        "interpolated."
+        for rate, names in sorted(rates.items())
     ]
-    lines += [
-        f"  {finding.kind}: {finding.sentence}" for finding in report.findings[:MOST_FINDINGS]
+    coarse = [
+        f"{one.channel} {one.resolution:.2g} {one.unit}"
+        for one in instruments
+        if one.resolution > COARSE.get(one.channel, math.inf)
     ]
-    left = len(report.findings) - MOST_FINDINGS
-    if left > 0:
-        lines.append(f"  and {left} more findings (all of them with --json).")
+    if coarse:
+        lines.append(f"  resolution: {', '.join(coarse)}; this counts as accuracy.")
     return lines
+
+
+def _findings(findings: Sequence[Finding]) -> list[str]:
+    """Each by itself where they are few of a kind and channel, else their number and largest."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.kind, finding.channel), []).append(finding)
+    lines = []
+    for (kind, channel), group in groups.items():
+        if len(group) <= MOST_ALIKE:
+            lines += [f"  {kind}: {finding.sentence}" for finding in group]
+            continue
+        largest = max((f for f in group if f.start_s is not None), key=_size, default=group[0])
+        if largest.unit == "s":
+            total = sum(f.value or 0.0 for f in group)
+            lines.append(f"  {kind}: {channel}, {total:.1f} s in all; most: {largest.sentence}")
+        else:
+            lines.append(f"  {kind}: {channel}, {len(group)} times; most: {largest.sentence}")
+    left = len(lines) - MOST_FINDINGS
+    if left > 0:
+        lines = [*lines[:MOST_FINDINGS], f"  and {left} more lines."]
+    if any(len(group) > MOST_ALIKE for group in groups.values()) or left > 0:
+        lines.append("  all of them, one by one, with --json.")
+    return lines
+
+
+def _size(finding: Finding) -> float:
+    return abs(finding.value or 0.0)
 
 
 def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object]) -> dict:
@@ -75,8 +129,20 @@ def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object])
 
 
 def catalogue(entries: Sequence[Entry]) -> str:
-    rows = [(e.name, e.ship, e.start[:19], e.seconds, e.rows, e.findings) for e in entries]
-    return table(("voyage", "ship", "start", "seconds", "rows", "findings"), rows)
+    """What is in a store; figures that an older program did not write down stay open."""
+    rows = [
+        (
+            e.name, e.ship, e.start[:19], e.seconds,
+            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
+            e.findings,
+        )
+        for e in entries
+    ]  # fmt: skip
+    head = (
+        "voyage", "ship", "start", "seconds", "slowest, Hz", "usable, s", f"windows of {WINDOW} s",
+        "findings",
+    )  # fmt: skip
+    return table(head, rows)
 
 
 def estimated(profile: Profile) -> list[str]:

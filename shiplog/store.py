@@ -39,7 +39,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
     from shiplog.ingest import Voyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
-INGEST_VERSION = 3  # raised when the same log would become another table or report
+INGEST_VERSION = 4  # raised when the same log would become another table or report
 LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
 NEW, OLD = ".new", ".old"  # of a voyage's folder, hidden: while it is written, or replaced
 FACTS = ("sha256", "fingerprint", "source", "start", "profile", "report")  # every voyage.json
@@ -57,6 +57,9 @@ class Entry:
     rows: int
     seconds: float
     findings: int
+    rate_hz: float | None  # of the instrument that measures least often
+    usable_s: int | None
+    windows: int | None
     sha256: str
     fingerprint: str
     source: str
@@ -311,15 +314,19 @@ class Store:
             if facts is None:
                 log.warning("%s cannot be read and is passed over: ingest its log again", folder)
                 continue
-            report = facts["report"]
+            report = VoyageReport.from_json(facts["report"])
+            slowest = report.slowest
             entries.append(
                 Entry(
-                    report["name"],
+                    report.name,
                     facts["profile"]["ship"]["name"],
                     facts["start"],
-                    report["rows"],
-                    report["seconds"],
-                    len(report["findings"]),
+                    report.rows,
+                    report.seconds,
+                    len(report.findings),
+                    slowest.rate_hz if slowest else None,
+                    report.usable_s,
+                    report.windows,
                     facts["sha256"],
                     facts["fingerprint"],
                     facts["source"],

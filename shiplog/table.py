@@ -16,6 +16,7 @@ from shiplog.channels import UNUSABLE, Quality
 
 ONE_SECOND = pl.duration(seconds=1)
 ONE_DAY = timedelta(days=1)
+WINDOW = 100  # s, the paper's I at 1 Hz
 LEAST_SAMPLES = 5  # of ten: fewer is not an average over the second
 
 
@@ -109,6 +110,12 @@ def segments(seconds: pl.DataFrame) -> pl.DataFrame:
     return seconds.sort("voyage", "time").with_columns(
         segment=(pl.col("time").diff() != ONE_SECOND).fill_null(False).cum_sum().over("voyage")
     )
+
+
+def usable(seconds: pl.DataFrame) -> tuple[int, int]:
+    """Of a 1 Hz table, how many seconds it has and how many windows of `WINDOW` fit into them."""
+    lengths = seconds.group_by("voyage", "segment").len()["len"]
+    return seconds.height, int((lengths // WINDOW).sum())
 
 
 def with_elapsed(seconds: pl.DataFrame) -> pl.DataFrame:

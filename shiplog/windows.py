@@ -15,8 +15,9 @@ from torch import Tensor
 
 from shiplog import channels
 from shiplog.exceptions import WindowError
+from shiplog.table import WINDOW
 
-SIZE = 100  # the paper's I
+SIZE = WINDOW
 
 
 @dataclass(frozen=True)

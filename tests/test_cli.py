@@ -63,8 +63,9 @@ def test_ingest_answers_as_the_contract_says_and_is_idempotent(logs, store, tmp_
     assert content["contract"] == 1
     assert [v["name"] for v in content["voyages"]] == ["trip_1", "trip_2", "trip_3"]
     voyage = content["voyages"][0]
-    assert set(voyage) == {"name", "messages", "rows", "seconds", "findings"}
+    assert set(voyage) > {"name", "messages", "rows", "seconds", "findings"}
     assert voyage["messages"]["lost"] == 0 and voyage["rows"] == pytest.approx(1500, abs=5)
+    assert voyage["usable_s"] == pytest.approx(150, abs=1) and voyage["windows"] == 1
     assert "trip_1" in said
 
 

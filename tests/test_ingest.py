@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog import align
+from shiplog import align, quality, report
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
 from shiplog.ingest import ingest
@@ -187,6 +187,74 @@ def test_without_a_yaw_rate_sensor_the_heading_is_differentiated(voyage):
     start = text.index("[ignored]")
     text = text[:start] + text[text.index("[sensors.wind]") :]
     assert voyage(text=text).table["yaw_rate"].to_numpy() == pytest.approx(0.04, abs=1e-6)
+
+
+SLOW = {"/position": 1.0, "/velocity": 1.0, "/gyro": 0.5, "/wind": 1.0, "/rudder": 1.0}
+
+
+def slow(parts):
+    """The same log at about one message a second, its headings in whole degrees."""
+    parts = dict(parts)
+    for topic, period in SLOW.items():
+        every = round(10 * period)
+        parts = kept(parts, topic, np.arange(len(parts[topic].time)) % every == 0)
+    heading = np.round(parts["/gyro"].columns["heading_deg"]) % 360.0
+    return changed(parts, "/gyro", heading_deg=heading)
+
+
+def test_a_slow_coarse_log_is_said_to_be_one_and_is_not_full_of_faults(voyage):
+    done = voyage(slow(sailing.series(300.0)))
+    assert kinds(done.report) == []
+    assert (done.table["quality"] == 0).mean() > 0.99
+    found = {one.channel: (one.rate_hz, one.resolution) for one in done.report.instruments}
+    assert found["position"] == (1.0, 0.0)
+    assert found["heading"] == (2.0, pytest.approx(1.0))
+    assert found["propeller"] == (10.0, 0.0)
+    assert done.report.slowest.rate_hz == 1.0
+    lines = "\n".join(report.voyage_lines(done.report))
+    assert "rudder, velocity" in lines and "at 1 Hz" in lines and "heading 1 deg" in lines
+
+
+def test_a_step_in_a_slow_log_is_found_once(voyage):
+    parts = slow(sailing.series(300.0))
+    x = parts["/position"].columns["x_m"].copy()
+    x[150:] += 5.0
+    report_ = voyage(changed(parts, "/position", x_m=x)).report
+    ((kind, channel),) = kinds(report_)
+    assert (kind, channel) == ("jump", "position")
+    assert report_.findings[0].value == pytest.approx(5.0, abs=0.1)
+    assert report_.findings[0].start_s == pytest.approx(149.5, abs=0.6)
+
+
+def test_a_turn_through_a_gap_in_the_compass_is_no_jump(voyage):
+    parts = sailing.series()
+    heading = parts["/gyro"].columns["heading_deg"]
+    south = int(np.flatnonzero(np.diff(np.sign(heading - 180.0)))[0])  # where ingest wraps
+    mask = np.ones(len(heading), bool)
+    mask[south - 10 : south + 10] = False
+    assert "jump" not in {kind for kind, _ in kinds(voyage(kept(parts, "/gyro", mask)).report)}
+
+
+def test_usable_seconds_and_windows_are_counted(voyage):
+    parts = sailing.series(330.0)
+    mask = np.ones(len(parts["/gyro"].time), bool)
+    mask[1500:1600] = False  # ten seconds: 150 s before and 170 s after
+    report_ = voyage(kept(parts, "/gyro", mask)).report
+    assert report_.usable_s == pytest.approx(320, abs=2)
+    assert report_.windows == 2
+
+
+def test_many_findings_of_a_kind_are_summed_up_and_all_are_kept(voyage):
+    parts = sailing.series(300.0)
+    mask = np.ones(len(parts["/wind"].time), bool)
+    for second in range(10, 290, 4):
+        mask[10 * second : 10 * second + 6 + second // 100] = False
+    done = voyage(kept(parts, "/wind", mask)).report
+    assert len([f for f in done.findings if f.kind == "gap"]) == quality.LISTED + 1
+    (line,) = [line for line in report.voyage_lines(done) if "gap" in line]
+    total = sum(f.value for f in done.findings)
+    assert f"{total:.1f} s in all" in line and "from 201.9 s" in line
+    assert len(report.voyage_lines(done)) < 25
 
 
 @pytest.mark.parametrize(

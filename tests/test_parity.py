@@ -206,10 +206,11 @@ def test_body_velocities_without_fault_have_nothing_to_say():
     assert found(in_body_axes(5)) == {}
 
 
-def slalom(seconds=300.0, late=0.0, bias=0.0, scale=1.0):
+def slalom(seconds=300.0, late=0.0, bias=0.0, scale=1.0, swing=1.0):
     """Heading and rate in closed form; the ship lies still, and only turns."""
     t = np.arange(0.0, seconds, 0.1)
     frequencies, sizes = np.array([[0.11], [0.29], [0.53]]), np.array([[0.8], [0.3], [0.1]])
+    sizes = swing * sizes
     heading = (sizes * np.sin(frequencies * t)).sum(0)
     rate = (sizes * frequencies * np.cos(frequencies * (t - late))).sum(0)
     still = np.zeros(len(t))
@@ -233,6 +234,18 @@ def test_bias_and_scale_in_closed_form():
     values = {e.kind: e.value for e in parity.estimates(table, BODY) if e.channel == "yaw_rate"}
     assert values["yaw_rate_scale"] == pytest.approx(0.97, abs=1e-3)
     assert values["yaw_rate_bias"] == pytest.approx(0.01 / DEGREE, abs=2e-3)
+
+
+def test_a_ship_that_hardly_turns_shows_no_scale_and_no_delay():
+    """Its turning is a tenth of what either instrument adds as noise."""
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        table = slalom(seconds=1500.0, swing=2e-3)
+        noisy = table.with_columns(
+            heading=table["heading"] + rng.normal(0, 0.1 * DEGREE, table.height),
+            yaw_rate=table["yaw_rate"] + rng.normal(0, 0.1 * DEGREE, table.height),
+        )
+        assert not [e for e in parity.estimates(noisy, BODY) if e.notable]
 
 
 def test_a_steady_circle_tells_no_bias_from_a_scale(tmp_path):

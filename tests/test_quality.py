@@ -1,6 +1,7 @@
 """Faults are found where they are, and a manoeuvre is not a fault."""
 
 import numpy as np
+import pytest
 
 from shiplog import quality
 
@@ -25,8 +26,8 @@ def test_a_held_position_is_found_only_while_the_ship_moves():
     position = np.stack((0.5 * TIME, np.zeros(600)), axis=1)
     position[300:310] = position[299]
     runs = quality.repeats(position)
-    moving = quality.held_on_grid(GRID, GRID, runs, 0.5 * TIME, noise=0.02)
-    at_rest = quality.held_on_grid(GRID, GRID, runs, np.zeros(600), noise=0.02)
+    moving = quality.held_on_grid(GRID, GRID, runs, 0.5 * TIME, least=0.06)
+    at_rest = quality.held_on_grid(GRID, GRID, runs, np.zeros(600), least=0.06)
     assert moving == [(299, 309)]
     assert at_rest == []
 
@@ -38,6 +39,19 @@ def test_a_coarse_instrument_is_not_called_held():
     stuck[100] = stuck[99]
     stuck[200:215] = stuck[199]
     assert quality.improbable(quality.repeats(stuck), 600) == [(200, 214)]
+
+
+@pytest.mark.parametrize("step", [1.0, 0.01, 1.0 / 3.0])
+def test_the_step_in_which_an_instrument_counts_is_found(step):
+    motion = np.cumsum(RNG.normal(0, 3.0 * step, 600))
+    assert quality.resolution(step * np.round(motion / step)[:, None]) == pytest.approx(step)
+    assert quality.resolution(motion[:, None]) == 0.0
+    both = np.stack((motion, step * np.round(motion / step)), axis=1)
+    assert quality.resolution(both) == pytest.approx(step)
+
+
+def test_an_instrument_that_hardly_moves_shows_no_step():
+    assert quality.resolution(np.repeat(np.arange(4.0), 100)[:, None]) == 0.0
 
 
 def test_a_lost_second_is_a_jump_with_its_size():
