@@ -230,33 +230,39 @@ class Search:
         levels = trial.levels(point, included, usual)
         trial.remainder = Remainder(RAISED)
         return [
-            replace(level, value=level.value + trial.expected(level.louder, RAISED)
-                    - trial.expected(level.louder, NOMINAL))
+            replace(level, value=level.value + self._more(level.louder))
             for level in levels
         ]  # fmt: skip
 
     def _best(self, levels: Sequence[Level], kind: str) -> Level:
         """Of levels made under RAISED the best under a kind of remainder."""
-        trial = self.trial
-
-        def under(level: Level) -> Level:
-            more = trial.expected(level.louder, kind) - trial.expected(level.louder, RAISED)
-            return replace(level, value=level.value + more)
-
         if kind == RAISED:
             return max(levels, key=lambda level: level.value)
-        return max(map(under, levels), key=lambda level: level.value)
+        usual = [replace(one, value=one.value - self._more(one.louder)) for one in levels]
+        return max(usual, key=lambda level: level.value)
+
+    def _more(self, noise: float) -> float:
+        """Log prior density of a level of noise under `raised` over that under `nominal`."""
+        expected = self.trial.expected
+        return expected(noise, Remainder(RAISED)) - expected(noise, Remainder(NOMINAL))
 
     def _changed(
         self, point: Point, included: Sequence[str], levels: Sequence[Level], family: str
     ) -> Change:
-        """A change of one family's weights beside included causes, at its best size and noise."""
-        trial, tried = self.trial, []
-        for level in levels:  # made under RAISED, which expects the noise as a family does
-            gained, size = trial.changed(point, level, included, family)
-            tried.append((level.value + gained, size, level.louder))
-        value, size, noise = max(tried)
-        return Change(Remainder(family, size), value, noise)
+        """A change of one family's weights beside included causes, at its best size and noise.
+
+        The noise may be raised beside it, since no family describes to the last what no cause
+        describes. But the family explains more than the noise does only where it is likelier with
+        the usual noise than raised noise is alone; else its functions are fitted to noise."""
+        usual, raised = [], []
+        for level in levels:  # made under RAISED
+            gained, size = self.trial.changed(point, level, included, family)
+            value, noise = level.value + gained, level.louder
+            usual.append((value - self._more(noise), size, noise))
+            raised.append((value, size, noise))
+        noisy = max(usual)[0] > max(level.value for level in levels)
+        value, size, noise = max(raised if noisy else usual)
+        return Change(Remainder(family, size, noisy), value, noise)
 
     def _change(
         self, point: Point, labels: tuple[str, ...], one: Change, plain: Hypothesis, leads: bool

@@ -41,10 +41,17 @@ RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What remains beside the causes: a kind, and the size of a family's change."""
+    """What remains beside the causes: a kind, the size of a family's change, and whether the process
+    noise is raised beside that change."""
 
     kind: str = NOMINAL
     size: float = 1.0
+    noisy: bool = False
+
+    @property
+    def raises(self) -> bool:
+        """Whether the process noise is expected to be raised."""
+        return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
 
 class Trial(hypotheses.Trial):
@@ -69,7 +76,7 @@ class Trial(hypotheses.Trial):
     @property
     def pulse(self) -> bytes:
         """Tells one remainder of this trial from another."""
-        return super().pulse + f"{self.remainder.kind} {self.remainder.size}".encode()
+        return super().pulse + f"{self.remainder}".encode()
 
     # --- linearisation ---
 
@@ -141,21 +148,18 @@ class Trial(hypotheses.Trial):
         level = self.solve(
             total, self.volume(louder), louder, point, included, ref.information, ref.pull
         )
-        return replace(level, value=level.value + self.expected(louder, self.remainder.kind))
+        return replace(level, value=level.value + self.expected(louder, self.remainder))
 
     @property
     def usual_spread(self) -> float:
         """Standard deviation of the logarithm of the process noise from campaign to campaign."""
         return max(self.campaign.noise, LEAST_SPREAD)
 
-    def expected(self, noise: float, kind: str) -> float:
-        """Log prior density of a level of process noise under a kind of remainder, less the
-        greatest one under `nominal`.
-
-        Beside whatever remains the noise may be raised: what no cause describes, no family of
-        functions describes to the last either, and what that leaves over looks like noise."""
+    def expected(self, noise: float, beside: Remainder) -> float:
+        """Log prior density of a level of process noise beside a remainder, less the greatest one
+        beside `nominal`."""
         usual = self.usual_spread
-        spread = usual if kind == NOMINAL else RAISED_SPREAD
+        spread = RAISED_SPREAD if beside.raises else usual
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 
     def solve(self, total, logdet, louder, point, included, information, pull) -> Level:

@@ -197,6 +197,28 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     assert one.score - raised.score == pytest.approx(gain)
 
 
+@pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
+def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(gain, noisy):
+    """What gains a little beside noise that explains much is fitted to that noise."""
+    trial, point = trial_with({}, pushed=pushes())
+    trial.campaign = replace(trial.campaign, noise=0.05)  # its parts have the same noise
+    trial.changed = lambda p, level, labels, family: (gain, 3.0)
+    found = Search(trial, point, {})
+    trial.remainder = Remainder("raised")
+    levels = found._drawn(point, (), 1.0)
+    raised = max(level.value for level in levels)
+    usual = max(
+        level.value
+        - trial.expected(level.louder, Remainder("raised"))
+        + trial.expected(level.louder, Remainder())
+        for level in levels
+    )
+    assert usual + 2.0 < raised < usual + 60.0
+    change = found._changed(point, (), levels, "time")
+    assert change.remainder == Remainder("time", 3.0, noisy)
+    assert change.value == pytest.approx((raised if noisy else usual) + gain)
+
+
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
     """No cause has it: it is not named, and the kind of what remains is."""
     plain, point = trial_with({})

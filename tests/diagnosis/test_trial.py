@@ -109,7 +109,7 @@ def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
     differences = []
     for included, kind, size in HYPOTHESES[1:]:
         found = level(trial, point, noise, included, kind, size).value - nothing.value
-        found -= trial.expected(noise, kind) - trial.expected(noise, NOMINAL)
+        found -= trial.expected(noise, Remainder(kind)) - trial.expected(noise, Remainder())
         families = () if kind == NOMINAL else (kind,)
         wanted = nats(trial, point, noise, included, families, size) - usual
         assert found == pytest.approx(wanted, abs=1e-5 * abs(usual) / 100.0)
@@ -168,7 +168,7 @@ def test_a_fixed_cause_stays_where_it_is(made):
 @pytest.mark.parametrize("included", ((), ("drag",)))
 def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
-    base = level(trial, point, 1.4, included, RAISED)  # which expects the noise as a family does
+    base = level(trial, point, 1.4, included)
     gained, size = trial.changed(point, base, included, family)
     each = [level(trial, point, 1.4, included, family, s).value for s in trials.SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
@@ -250,17 +250,19 @@ def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
     top = norm(0.0, usual).logpdf(0.0)
     for noise in (0.5, 1.0, 1.3, 4.0):
         at = math.log(noise)
-        assert trial.expected(noise, NOMINAL) == pytest.approx(norm(0.0, usual).logpdf(at) - top)
-        for kind in (RAISED, INTERMITTENT, "wind", "controls"):
-            wanted = norm(0.0, trials.RAISED_SPREAD).logpdf(at) - top
-            assert trial.expected(noise, kind) == pytest.approx(wanted)
+        wanted = norm(0.0, usual).logpdf(at) - top
+        for beside in (Remainder(), Remainder("wind", 3.0)):
+            assert trial.expected(noise, beside) == pytest.approx(wanted)
+        wanted = norm(0.0, trials.RAISED_SPREAD).logpdf(at) - top
+        for beside in (Remainder(RAISED), Remainder(INTERMITTENT), Remainder("wind", 3.0, True)):
+            assert trial.expected(noise, beside) == pytest.approx(wanted)
 
 
 def test_campaigns_are_never_quite_alike(made):
     usual, record, given = made
     trial = straight.Straight(replace(usual, noise=0.0), record, given)
     wanted = -0.5 * (math.log(1.2) / trials.LEAST_SPREAD) ** 2
-    assert trial.expected(1.2, NOMINAL) == pytest.approx(wanted)
+    assert trial.expected(1.2, Remainder()) == pytest.approx(wanted)
 
 
 def test_levels_of_noise_differ_as_dense_gaussians_do(made):
@@ -273,7 +275,7 @@ def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     found, wanted = [], []
     for noise in (1.0, 1.4):
         one = level(trial, point, noise)
-        found.append(one.value - trial.expected(noise, NOMINAL))
+        found.append(one.value - trial.expected(noise, Remainder()))
         e, j, _, _, c, mean, usual_covariance, *_ = gaussian_of(trial, point, noise, sure)
         # of a power of the likelihood log|C| counts for its share, log|C + share·JUJᵀ| whole
         whole = c / SHARE + j @ usual_covariance @ j.T
