@@ -6,7 +6,10 @@ fixed features with unknown weights (Kennedy & O'Hagan 2001). The nominal campai
 weights of what a model sees; an unknown structure of the trial is a change of one family's weights.
 
 Motion, controls and wind have the products of ship hydrodynamics (Abkowitz 1964; moduli after
-Fedyaevsky & Sobolev 1964) beside smooth random features (Rahimi & Recht 2007).
+Fedyaevsky & Sobolev 1964) beside smooth random features (Rahimi & Recht 2007). What depends on
+position, heading or time acts from outside the ship: first a force along the earth's axes that is
+steady or grows evenly, as a line's or a tug's does, then smooth features. An even force is expected
+to be larger than what varies in every other way.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from shiplog.structure import Knots
 
 SEEN = ("motion", "controls", "wind")  # by a model of forces
 UNSEEN = ("position", "heading", "time")
+EVEN = {"position": 3, "heading": 1, "time": 2}  # features of an even force, the first ones
 WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, "time": 5}
 
 
@@ -57,8 +61,15 @@ class Family:
     def features(self, knots: Knots) -> np.ndarray:
         """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
         values = (_features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
-        out = structure.in_each_channel(values / np.sqrt(values.shape[-1]))
-        return _turned(out, knots) if self.name == "position" else out
+        plain = EVEN.get(self.name, 0)
+        out = structure.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
+        if self.name == "position":
+            out = _turned(out, knots)
+        if not plain:
+            return out
+        even = structure.in_each_channel(values[..., :plain])
+        even[..., 2, 2 * plain] = 0.0  # a steady moment is the ship's own
+        return np.concatenate((_turned(even, knots), out), -1)
 
 
 @dataclass(frozen=True)
@@ -99,6 +110,7 @@ def of(
         both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
         # a push that is always there depends on nothing
         level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
+        level[: EVEN.get(name, 0)] = 0.0  # but along the earth's axes it depends on the heading
         scale = np.sqrt(((both - level) ** 2).mean(0))
         # a feature that hardly varies says nothing, and must not be blown up
         scale = np.maximum(scale, 1e-3 * max(float(scale.max()), 1e-9))
@@ -127,11 +139,22 @@ def _waves(name: str, *campaigns: Knots) -> Waves | None:
 
 def _features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
     """[S, J, F]"""
-    smooth = waves(_inputs(name, knots))
+    inputs = _inputs(name, knots)
+    smooth = waves(inputs)
+    if name in UNSEEN:
+        return np.concatenate((_even(name, inputs, waves), smooth), -1)
     products = PRODUCTS.get(name)
     if products is None:
         return smooth
     return np.concatenate((*products(profile, knots), smooth), -1)
+
+
+def _even(name: str, inputs: np.ndarray, waves: Waves) -> np.ndarray:
+    """[S, J, EVEN] of a force along the earth's axes: steady, and growing with each input."""
+    steady = np.ones_like(inputs[..., :1])
+    if name == "heading":  # felt by the ship, a steady force already turns with it
+        return steady
+    return np.concatenate((steady, (inputs - waves.middle) / waves.width), -1)
 
 
 def _inputs(name: str, knots: Knots) -> np.ndarray:

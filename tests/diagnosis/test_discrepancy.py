@@ -154,6 +154,7 @@ def test_features_have_unit_size_together_in_each_channel():
         family = one(name, TWIN, at)
         features = family.features(at)
         assert features.shape == (4, 5, 3, len(family.columns))
+        features = features[..., 3 * discrepancy.EVEN.get(name, 0) :]  # those are each of that size
         if name == "position":
             features = features[..., 2:, :]  # two of the channels are turned into each other
         assert (features**2).sum(-1).mean((0, 1)) == pytest.approx(np.ones(features.shape[2]))
@@ -176,7 +177,33 @@ def test_only_what_no_model_has_is_taken_from_its_mean():
     for name in UNSEEN:
         family = one(name, TWIN, at)
         features = discrepancy._features(name, TWIN, family.waves, at)
-        assert family.level == pytest.approx(features.mean((0, 1)))
+        even = discrepancy.EVEN[name]
+        assert (family.level[:even] == 0.0).all()
+        assert family.level[even:] == pytest.approx(features.mean((0, 1))[even:])
+
+
+def test_an_even_force_is_steady_or_grows_with_place_or_time_along_the_earths_axes():
+    """Weights of the first features: a steady one, then one a metre north and east of the middle,
+    or one with time; not divided among the smooth features, and no steady moment."""
+    at = knots(seed=6)
+    c, s = np.cos(at.state[..., 4]), np.sin(at.state[..., 4])
+    for name, inputs in (
+        ("position", at.state[..., [0, 2]]), ("heading", np.zeros((*at.state.shape[:2], 0))),
+        ("time", at.driven[..., [-3]]),
+    ):  # fmt: skip
+        features, even = one(name, TWIN, at).features(at), discrepancy.EVEN[name]
+        spread = (inputs - inputs.mean((0, 1))) / inputs.std((0, 1))
+        growing = [np.ones(c.shape), *np.moveaxis(spread, -1, 0)]
+        assert len(growing) == even
+        for k, size in enumerate(growing):
+            assert features[..., :, k] == pytest.approx(
+                np.stack((c * size, -s * size, 0.0 * size), -1), abs=1e-12
+            )
+            assert features[..., :, even + k] == pytest.approx(
+                np.stack((s * size, c * size, 0.0 * size), -1), abs=1e-12
+            )
+            moment = features[..., 2, 2 * even + k]
+            assert moment == pytest.approx(size * (k > 0), abs=1e-12)
 
 
 def test_headings_features_are_harmonics_of_the_angle():
@@ -203,7 +230,8 @@ def test_a_pull_towards_the_north_turns_with_the_heading():
     state[..., 0, 4] = 0.5 * np.pi * np.arange(4)
     at = Knots(state, around.driven[:, :1])
     features = family.features(at)
-    each = len(family.columns) // 3
+    features = features[..., 3 * discrepancy.EVEN["position"] :]
+    each = features.shape[-1] // 3
     north, east, turn = (features[:, 0][..., c * each : (c + 1) * each] for c in range(3))
     pull = north[0, 0]
     assert np.abs(pull).max() > 0.01

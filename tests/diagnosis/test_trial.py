@@ -13,6 +13,7 @@ from straight import CAUSES, UNREST
 from shiplog.columns import HELD
 from shiplog.diagnosis import nominal_campaign
 from shiplog.diagnosis import trial as trials
+from shiplog.diagnosis.discrepancy import EVEN
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.hypotheses import Trial as Former
 
@@ -204,7 +205,7 @@ def test_a_change_acts_on_the_channels_that_it_pushes(made):
     plain = straight.Straight(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     weights = np.zeros(plain.unseen.count)
-    at = family.columns - plain.unseen.families[0].columns[0]
+    at = (family.columns - plain.unseen.families[0].columns[0])[3 * EVEN["time"] :]
     each = len(at) // 3  # channel by channel: sway's are in the middle
     weights[at[each : 2 * each]] = 20.0
     pushed = plain.unseen.pushed(plain.at({}).linear.cut, plain.grid) @ weights
@@ -227,7 +228,7 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     plain = straight.Straight(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     at = family.columns - plain.unseen.families[0].columns[0]
-    pushed = plain.unseen.pushed(given.cut, plain.grid)[..., at[0]]
+    pushed = plain.unseen.pushed(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
     does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], pushed)
     weight = does.std((0, 1)) + 1e-12
     rest = np.random.default_rng(11).standard_normal(does.shape) * weight
