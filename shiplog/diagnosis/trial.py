@@ -41,7 +41,7 @@ RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What remains beside the causes: a kind, the size of a family's change, and whether the process
+    """What remains beside the causes: a kind, the size of a family's change, and whether process
     noise is raised beside that change."""
 
     kind: str = NOMINAL
