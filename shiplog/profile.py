@@ -33,16 +33,20 @@ class Section(BaseModel):
 class Ship(Section):
     """Particulars. What is left out is estimated where it is needed, and said."""
 
-    name: str
-    length_m: float = Field(gt=0)
-    breadth_m: float | None = Field(default=None, gt=0)
-    draught_m: float | None = Field(default=None, gt=0)
-    mass_kg: float | None = Field(default=None, gt=0)
-    x_g_m: float | None = None
-    block_coefficient: float | None = Field(default=None, gt=0, le=1)
-    frontal_area_m2: float | None = Field(default=None, gt=0)
-    lateral_area_m2: float | None = Field(default=None, gt=0)
-    outline: tuple[tuple[float, float], ...] | None = None  # [ahead, starboard] points, m
+    name: str = Field(description="told apart from other ships by it")
+    length_m: float = Field(gt=0, description="between perpendiculars, m")
+    breadth_m: float | None = Field(default=None, gt=0, description="m")
+    draught_m: float | None = Field(default=None, gt=0, description="m")
+    mass_kg: float | None = Field(default=None, gt=0, description="kg")
+    x_g_m: float | None = Field(
+        default=None, description="centre of gravity ahead of midship, m; negative where astern"
+    )
+    block_coefficient: float | None = Field(default=None, gt=0, le=1, description="1")
+    frontal_area_m2: float | None = Field(default=None, gt=0, description="above water, m²")
+    lateral_area_m2: float | None = Field(default=None, gt=0, description="above water, m²")
+    outline: tuple[tuple[float, float], ...] | None = Field(
+        default=None, description="of the hull as it is drawn: points [ahead, starboard], m"
+    )
 
     @property
     def breadth(self) -> float:
@@ -53,15 +57,28 @@ class Ship(Section):
 class Source(Section):
     """Where one channel's values stand in a log, and how they become SI."""
 
-    topic: str
-    fields: tuple[str, ...] = ()
-    field: str | None = None
-    unit: str | None = None
-    units: tuple[str, ...] = ()
-    sign: float | tuple[float, ...] = 1.0
-    offset: float | tuple[float, ...] = 0.0  # raw value that stands for zero, in the raw unit
-    clock: Clock = "message"
-    tolerance_s: float | None = Field(default=None, gt=0)
+    topic: str = Field(description="of the log")
+    fields: tuple[str, ...] = Field(
+        default=(), description="where the values stand in a message, in the order of the kind; "
+        "a dot goes into a part of it"
+    )  # fmt: skip
+    field: str | None = Field(default=None, description="the same where there is one value")
+    unit: str | None = Field(default=None, description="of all values; SI where left out")
+    units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
+    sign: float | tuple[float, ...] = Field(
+        default=1.0, description="-1 turns the values round; one number, or one for each field"
+    )
+    offset: float | tuple[float, ...] = Field(
+        default=0.0, description="the raw value that stands for zero, in its unit"
+    )
+    clock: Clock = Field(
+        default="message", description="which time is when it was measured: the message's own "
+        "stamp, the recorder's, or the publisher's"
+    )  # fmt: skip
+    tolerance_s: float | None = Field(
+        default=None, gt=0, description="the longest time between two samples that are "
+        "interpolated, s; one and a half periods where left out"
+    )  # fmt: skip
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -97,10 +114,13 @@ class Source(Section):
 class Sensor(Source):
     """A sensor of the ship's motion or of the wind."""
 
-    kind: str | None = None
-    lever_arm_m: tuple[float, float] = (0.0, 0.0)  # [ahead, starboard] of midship
-    # accuracy, in `unit`; position always in m
-    sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = None
+    kind: str | None = Field(default=None, description="see the kinds below; the first one")
+    lever_arm_m: tuple[float, float] = Field(
+        default=(0.0, 0.0), description="where it stands: [ahead, starboard] of midship, m"
+    )
+    sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = Field(
+        default=None, description="accuracy, one standard deviation, in `unit`; of a position in m"
+    )
 
 
 KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
@@ -139,12 +159,12 @@ TABLE_CHANNELS = {
     ("yaw_rate", "rate"): ("yaw_rate",),
     ("wind", "from_bow"): ("wind_speed", "wind_angle"),
 }
-LABELS = (
-    "time",
-    "date",
-    "voyage",
-    "vessel",
-)  # columns of a table that say whose row it is, and when
+LABELS = {  # columns of a table that say whose row it is, and when
+    "time": "the row's time",
+    "date": "stands beside a `time` that is a time of day",
+    "voyage": "cuts the table into one log a value",
+    "vessel": "tells the ships of a table apart",
+}
 
 
 class Sensors(Section):
@@ -188,14 +208,25 @@ class Sensors(Section):
 class Actuator(Source):
     """One actuator value, in model order. SI: rad, rev/s, or 1 for a dimensionless command."""
 
-    name: str = Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")
-    kind: Literal["rudder", "propeller", "azimuth", "thruster"]
-    limits: tuple[float, float] | None = None  # in `unit`
-    position_m: tuple[float, float] = (0.0, 0.0)
-    direction_deg: float = 0.0  # where a fixed thruster pushes, from ahead towards starboard
-    diameter_m: float | None = Field(default=None, gt=0)
-    area_m2: float | None = Field(default=None, gt=0)
-    span_m: float | None = Field(default=None, gt=0)
+    name: str = Field(
+        pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="of its column; letters, digits and _"
+    )
+    kind: Literal["rudder", "propeller", "azimuth", "thruster"] = Field(
+        description="an azimuth is the angle of a unit that turns all the way round, its thruster "
+        "stands beside it at the same place"
+    )
+    limits: tuple[float, float] | None = Field(
+        default=None, description="[least, most], in `unit`; values beyond them are marked"
+    )
+    position_m: tuple[float, float] = Field(
+        default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
+    )
+    direction_deg: float = Field(
+        default=0.0, description="where a fixed thruster pushes, from ahead towards starboard, deg"
+    )
+    diameter_m: float | None = Field(default=None, gt=0, description="of a screw, m")
+    area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²")
+    span_m: float | None = Field(default=None, gt=0, description="of a rudder, m")
 
     @model_validator(mode="after")
     def _limited(self) -> Actuator:
@@ -219,36 +250,37 @@ class Actuator(Source):
 class Site(Section):
     """What a chart shows; all optional."""
 
-    banks: tuple[tuple[tuple[float, float], ...], ...] = ()
-    depth_m: float | None = None
-    density: float | None = None
-    datum: tuple[float, float] | None = None  # latitude, longitude [deg] of x₀ = y₀ = 0
+    banks: tuple[tuple[tuple[float, float], ...], ...] = Field(
+        default=(), description="vertical walls: lines of points [x0, y0], m"
+    )
+    depth_m: float | None = Field(default=None, description="of the water, m")
+    density: float | None = Field(default=None, description="of the water, kg/m³")
+    datum: tuple[float, float] | None = Field(
+        default=None, description="[latitude, longitude] of x0 = y0 = 0, deg; the first fix where "
+        "left out"
+    )  # fmt: skip
 
 
 class Column(Section):
-    """One column of a table that `convert` turns into a log: a key of [table] is its name.
+    """One column of a table that `convert` turns into a log: a key of [table] is its name."""
 
-    channel  what it holds. Position: `latitude` and `longitude`, or `x0` and `y0` (north and east
-             of a datum). Velocity: `sog` and `cog`, `velocity_north` and `velocity_east`, or
-             `surge` and `sway`. `heading`, or `quaternion_z` and `quaternion_w`; `yaw_rate`;
-             `wind_speed` and `wind_angle`; any actuator by its name. Which of them are needed
-             follows from the `kind` of each sensor. `time` is the row's time; `date` stands beside
-             a `time` that is a time of day; `voyage` cuts the table into one log a value; `vessel`
-             tells the ships of a table apart
-    unit     of numbers, such as "deg" or "kn". Of a time "s", "ms", "us" or "ns"; without one it is
-             Unix time by its size, or else seconds from any start
-    sign     -1 turns the column round
-    offset   the value that stands for zero, in the column's unit
-    format   of a time or date that is no ISO text, in strptime's letters: "%d.%m.%Y %H:%M:%S"
-    only     of a `vessel` column: the one value whose rows are this ship's
-    """
-
-    channel: str
-    unit: str | None = None
-    sign: float = 1.0
-    offset: float = 0.0
-    format: str | None = None
-    only: str | int | None = None
+    channel: str = Field(description="what it holds; see the channels below")
+    unit: str | None = Field(
+        default=None, description='of numbers, such as "deg" or "kn", SI where left out. Of a time '
+        '"s", "ms", "us" or "ns"; without one it is Unix time by its size, or else seconds from '
+        "any start"
+    )  # fmt: skip
+    sign: float = Field(default=1.0, description="-1 turns the column round")
+    offset: float = Field(
+        default=0.0, description="the value that stands for zero, in the column's unit"
+    )
+    format: str | None = Field(
+        default=None, description="of a time or date that is no ISO text, in strptime's letters: "
+        '"%d.%m.%Y %H:%M:%S"'
+    )  # fmt: skip
+    only: str | int | None = Field(
+        default=None, description="of a `vessel` column: the one value whose rows are this ship's"
+    )
 
 
 class Profile(Section):

@@ -61,10 +61,11 @@ def resolution(value: np.ndarray) -> float:
     """
     found = 0.0
     for column in value.T:
-        apart = np.diff(np.unique(column))
+        levels = np.sort(column)
+        apart: np.ndarray = levels[1:] - levels[:-1]
         span = float(apart.sum())
         apart = apart[apart > SAME * span]  # what rounding of the arithmetic made is no difference
-        if len(apart) < FEWEST_STEPS:
+        if len(apart) < FEWEST_STEPS:  # it hardly moved
             continue
         step = float(apart.min())
         step = float(np.median(apart[apart < 1.5 * step]))  # rounding averaged away

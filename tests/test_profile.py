@@ -1,9 +1,13 @@
 """Profiles that say what cannot be: refused in a user's words, with the key."""
 
+import textwrap
+from pathlib import Path
+
 import pytest
 import sailing
 
-from shiplog import profile
+from pipelines import profile_reference
+from shiplog import profile, units
 from shiplog.exceptions import ProfileError
 
 ARM, SIGMA = "lever_arm_m = [0.7, -0.2]", "sigma = 0.01"
@@ -53,3 +57,21 @@ def test_a_profile_that_is_no_text_or_no_file(tmp_path):
         profile.load(bad)
     with pytest.raises(ProfileError, match="is a folder"):
         profile.load(tmp_path)
+
+
+def test_the_reference_is_what_the_code_reads():
+    page = (Path(__file__).parent.parent / "docs" / "profile.md").read_text(encoding="utf-8")
+    assert page == profile_reference.text(), "python -m pipelines.profile_reference --markdown ..."
+
+
+def test_the_reference_has_every_key_kind_channel_and_unit():
+    page = profile_reference.text()
+    sections = (profile.Ship, profile.Sensor, profile.Actuator, profile.Site, profile.Column)
+    keys = {key for section in sections for key in section.model_fields}
+    kinds = {f'"{kind}"' for each in profile.KINDS.values() for kind in each}
+    channels = {name for names in profile.TABLE_CHANNELS.values() for name in names}
+    for word in (*keys, *kinds, *channels, *profile.LABELS, *units.TO_SI, *profile.shipped()):
+        assert f"`{word}`" in page
+    example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
+    ship = profile.parse(textwrap.dedent(example), "docs/profile.md")
+    assert ship.sensors.position.lever_arm_m == (3.2, 0.0)
