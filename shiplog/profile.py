@@ -130,6 +130,11 @@ KINDS = {  # what each sensor may be, the first being meant where `kind` is left
     "yaw_rate": ("rate",),
     "wind": ("from_bow",),
 }
+NEEDED = {  # sensors without which nothing can be said, and what records them
+    "position": "a GNSS fix or a local position",
+    "velocity": "speed and course over ground, or velocities",
+    "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
+}
 WIDTH = {
     "geodetic": 2,
     "local": 2,
@@ -423,10 +428,26 @@ def parse(text: str, source: str) -> Profile:
             units.factor(column.unit or "1")
         return profile
     except ValidationError as error:
+        if lacking := _sensors_lacking(error):
+            raise ProfileError(
+                f"The profile {source} has no {' and no '.join(lacking)}, and shiplog needs "
+                f"{' and '.join(NEEDED)} of a ship.",
+                hint="; ".join(f"{name}: record {NEEDED[name]}" for name in lacking)
+                + ". Where the log has it, add [sensors.NAME] by hand (docs/profile.md).",
+            ) from error
         raise ProfileError(
             f"The profile {source} cannot be used: {advice(error)}.",
             hint="mend these keys; the shipped profiles show each of them.",
         ) from error
+
+
+def _sensors_lacking(error: ValidationError) -> list[str]:
+    """The needed sensors that are not there; none where something else is wrong, too."""
+    places = [item["loc"] if item["type"] == "missing" else () for item in error.errors()]
+    if places == [("sensors",)]:
+        return list(NEEDED)
+    lacking = [name for name in NEEDED if ("sensors", name) in places]
+    return lacking if len(lacking) == len(places) else []
 
 
 SAID = {  # pydantic's kinds of error in a user's words

@@ -75,3 +75,22 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
     ship = profile.parse(textwrap.dedent(example), "docs/profile.md")
     assert ship.sensors.position.lever_arm_m == (3.2, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "said"),
+    [
+        (("position", "velocity"), "has no heading,"),
+        (("heading",), "has no position and no velocity,"),
+        ((), "has no position and no velocity and no heading,"),
+    ],
+)
+def test_what_a_log_does_not_have_is_said_with_what_records_it(sensors, said):
+    sections = sailing.PROFILE.split("[sensors.")
+    kept = [part for part in sections[1:] if part.startswith(sensors)]
+    ship, actuators = sections[0], "[[actuators]]" + sailing.PROFILE.split("[[actuators]]", 1)[1]
+    text = "".join((ship, *(f"[sensors.{part}" for part in kept), actuators))
+    with pytest.raises(ProfileError) as refused:
+        profile.parse(text, "circle.toml")
+    assert said in str(refused.value)
+    assert ("record a gyro or a GNSS compass" in str(refused.value)) == ("heading" not in sensors)
