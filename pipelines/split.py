@@ -130,21 +130,26 @@ def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
     ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]
     at = [0, *(int(elapsed[np.searchsorted(used, end)]) for end in ends), int(elapsed[-1]) + 1]
     named = [str(Part(name, begin, end)) for begin, end in pairwise(at) if begin < end]
-    windows_of = [
-        plan(own.filter(pl.col("elapsed").is_between(a, b, closed="left")), "ref", size).height
-        for a, b in pairwise(at)
+    parts_ = [
+        own.filter(pl.col("elapsed").is_between(a, b, closed="left")) for a, b in pairwise(at)
     ]
-    if len(named) < 3 or min(windows_of) == 0:
-        longest = int(HELD_OUT_SHARE * len(elapsed))
+    longest = [_longest(part) for part in parts_]
+    if len(named) < 3 or min(longest) < size:
         raise StoreError(
             f"{name} is the only voyage with a window of {size} s, and too short to be split in "
-            f"time: {HELD_OUT_SHARE:.0%} of its {len(elapsed)} usable seconds hold no window.",
-            hint=f"choose --window {max(longest, 2)} or shorter, or ingest a second voyage.",
+            f"time: the {', '.join(map(str, longest))} s in a row that are to train, validate and "
+            "test do not all hold one.",
+            hint=f"choose --window {max(min(longest), 2)} or shorter, or ingest a second voyage.",
         )
     return Split(
         training=(named[0],), validation=(named[1],), test=(named[2],),
         chosen_by="time, since there is but one voyage: the first part trains, the last one tests",
     )  # fmt: skip
+
+
+def _longest(seconds: pl.DataFrame) -> int:
+    """Seconds of the longest stretch without a missing one."""
+    return int(seconds.group_by("segment").len()["len"].max() or 0)  # type: ignore[arg-type]
 
 
 def _say_what_is_left_out(

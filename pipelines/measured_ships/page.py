@@ -1,0 +1,65 @@
+"""The table of all data sets, and a sentence on whether to believe each answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipelines.measured_ships.ships import DATA_SETS
+from pipelines.measured_ships.way import Way
+from shiplog import report
+
+HEAD = """# Measured ships, from their files to a verdict
+
+    python -m pipelines.measured_ships DATA --out measured --markdown docs/measured_ships.md
+
+Each data set goes the way of its owner: a profile (shipped, or drafted and mended where it says CHECK),
+`convert`, `ingest`, `train --model mmg`, `evaluate`, `diagnose` on the voyages that were not trained on.
+It ends with a verdict, or with the first thing that these data cannot give. None of the data are part
+of this repository. L is the paper's loss over windows of 100 s unless another window is given; the
+baselines hold the velocity, and fit a quadratic by least squares to the training voyages.
+"""
+
+
+def text(ways: Sequence[Way], program: str) -> str:
+    """The page. `program` is the commit whose answers these are."""
+    head = (
+        "ship", "voyages", "usable, s", "windows", "L", "hold", "least squares", "verdict",
+        "explained", "CPU, s",
+    )  # fmt: skip
+    lines = [HEAD, f"Program: {program}.\n", report.table(head, [_row(one) for one in ways]), ""]
+    for one in ways:
+        data = DATA_SETS[one.name]
+        lines += [f"## {data.ship}\n", f"> {_answer(one)}\n"]
+        if data.judgement:
+            lines.append(f"{data.judgement}\n")
+    return "\n".join(lines)
+
+
+def _row(one: Way) -> tuple[object, ...]:
+    evaluated, verdict = one.answers.get("evaluate"), one.answers.get("diagnose")
+    usable = sum(v["usable_s"] or 0 for v in one.voyages)
+    windows = sum(v["windows"] or 0 for v in one.voyages)
+    losses: tuple[object, ...] = ("-", "-", "-")
+    if evaluated:
+        floors = evaluated["floors"]
+        losses = tuple(_number(x) for x in
+                       (evaluated["loss"], floors["hold"], floors["least_squares"]))  # fmt: skip
+    said, explained = "-", "-"
+    if verdict:
+        named = ", ".join(dict.fromkeys(c["name"] for c in verdict["causes"]))
+        family = (verdict.get("structure") or {}).get("family")
+        said = named or ": ".join(filter(None, (verdict["verdict"], family)))
+        explained = f"{verdict.get('explained') or 0.0:.0%}"
+    elif one.stopped:
+        said = "ends before"
+    counted = (len(one.voyages), usable, windows) if one.voyages else ("-", "-", "-")
+    return (DATA_SETS[one.name].ship, *counted, *losses, said, explained, f"{one.cpu_s:.0f}")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"
+
+
+def _answer(one: Way) -> str:
+    verdict = one.answers.get("diagnose")
+    return verdict["sentence"] if verdict and not one.stopped else one.stopped
