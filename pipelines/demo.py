@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 DATASETS = ("ref", "d-ref")  # the paper's two voyages, and four that met the test's wind
 SEEDS = (0, 1, 2)
-NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden in her logs
+NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden in its logs
 RECIPE = Fast(iterations=200)  # a hundred fewer than usual: a demo is waited for
 
 
@@ -88,7 +88,9 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         f"{diagnosis.verdict.said}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
-        f"Look at it again: rerun {result.recording} {season.recording}"
+        f"Look at it again: rerun {result.recording} {season.recording}\n"
+        "Two more seasons wait, season3_* and season4_*: "
+        f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
     content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
     return Demo(ending, content, result.recording)

@@ -1,6 +1,7 @@
 """The known ship against closed forms, symmetries and figures that a naval architect expects."""
 
 import ast
+import itertools
 import json
 import math
 import tomllib
@@ -31,7 +32,7 @@ from pipelines.known_ship import (
     write_voyage,
 )
 from pipelines.known_ship import __main__ as command
-from pipelines.known_ship.sample_logs import PLANS, SEASON_2, SEED, voyages
+from pipelines.known_ship.sample_logs import PLANS, SEASONS, SEED, voyages
 from pipelines.known_ship.sensors import DATUM, Blemishes
 from pipelines.known_ship.ship import ANTENNA
 from pipelines.known_ship.voyage import PULSE_TIMES
@@ -463,7 +464,7 @@ def test_an_effect_of_no_strength_is_no_effect_to_the_last_bit():
 def test_the_committed_logs_are_what_she_still_sails(sailed, tmp_path):
     """To a step of resolution: another processor may round the last bit otherwise."""
     folder = Path(known_ship.__file__).parents[2] / "sample_logs"
-    for number in (0, 6):  # nothing hidden, and something
+    for number in (0, 6, 10):  # nothing hidden, and something
         plan, voyage = sailed[number]
         write_voyage(tmp_path / "a.mcap", voyage, seed=SEED + number, start=plan.start)
         again, committed = topics(tmp_path / "a.mcap"), topics(folder / f"{plan.name}.mcap")
@@ -648,9 +649,19 @@ def test_the_profile_is_of_this_ship():
 
 def test_the_sample_logs_are_small_and_complete():
     folder = Path(known_ship.__file__).parents[2] / "sample_logs"
-    names = {f"{plan.name}.mcap" for plan in (*PLANS, *SEASON_2)}
+    names = {f"{plan.name}.mcap" for plan in (*PLANS, *itertools.chain(*SEASONS.values()))}
     assert {p.name for p in folder.glob("*.mcap")} == names
-    assert sum(p.stat().st_size for p in folder.iterdir()) <= 16_000_000
+    assert sum(p.stat().st_size for p in folder.glob("*.mcap")) <= 22_000_000
+
+
+def test_the_samples_hide_two_things_nothing_and_something_outside_the_catalogue():
+    folder = Path(known_ship.__file__).parents[2] / "sample_logs"
+    key = json.loads((folder / "answers" / "key.json").read_text("utf-8"))
+    said = {voyage: [cause["name"] for cause in causes] for voyage, causes in key.items()}
+    wanted = {2: ["current", "clock_offset"], 3: [], 4: ["tether"]}
+    assert said == {f"season{s}_{k}": names for s, names in wanted.items() for k in (1, 2)}
+    listing = " ".join(p.name for p in folder.iterdir()) + (folder / "README.md").read_text("utf-8")
+    assert not [word for names in said.values() for word in names if word in listing]
 
 
 # --- blind cases --------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The eight logs that come with shiplog: six voyages as in the paper, and two of a next season."""
+"""The logs that come with shiplog: six voyages as in the paper, and two of each later season."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.known_ship import cases
 from pipelines.known_ship.sensors import Blemishes, write_voyage
 from pipelines.known_ship.ship import Effects
 from pipelines.known_ship.voyage import Voyage, sail
@@ -47,51 +48,80 @@ PLANS = (
     Plan("voyage_5", 1201.2, _day(2025, 10, 15, 1, 40), _wind(3.4, 3.8, 330.0, 50.0)),
     Plan("voyage_6", 1201.2, _day(2025, 10, 21, 5, 20), _wind(4.4, 4.9, 310.0, -40.0)),
 )  # fmt: skip
-SEASON_2 = (
-    Plan("season2_1", 900.9, _day(2026, 4, 14, 2, 0), _wind(1.8, 2.2, 120.0, 60.0)),
-    Plan("season2_2", 900.9, _day(2026, 4, 14, 3, 10), _wind(2.4, 2.0, 200.0, 40.0)),
-)
+SEASONS = {
+    2: (
+        Plan("season2_1", 900.9, _day(2026, 4, 14, 2, 0), _wind(1.8, 2.2, 120.0, 60.0)),
+        Plan("season2_2", 900.9, _day(2026, 4, 14, 3, 10), _wind(2.4, 2.0, 200.0, 40.0)),
+    ),
+    3: (
+        Plan("season3_1", 900.9, _day(2026, 10, 6, 1, 30), _wind(2.0, 1.6, 60.0, -50.0)),
+        Plan("season3_2", 900.9, _day(2026, 10, 6, 2, 20), _wind(1.7, 2.3, 280.0, 30.0)),
+    ),
+    4: (
+        Plan("season4_1", 900.9, _day(2027, 4, 20, 2, 15), _wind(2.2, 1.9, 240.0, 40.0)),
+        Plan("season4_2", 900.9, _day(2027, 4, 20, 3, 5), _wind(1.6, 2.1, 150.0, -60.0)),
+    ),
+}
 
 
-def drawn() -> tuple[Effects, dict]:
-    """What season 2 hides, and the key to it in the contract's names and units."""
-    rng = np.random.default_rng([SEED, 2])
-    speed, towards = rng.uniform(0.05, 0.14), rng.uniform(0.0, 360.0)
-    effects = Effects(
-        current_north=speed * math.cos(math.radians(towards)),
-        current_east=speed * math.sin(math.radians(towards)),
-    )
-    parameters = {
-        "speed": {"value": round(speed, 6), "unit": "m/s"},
-        "direction": {"value": round(towards, 4), "unit": "deg"},
-    }
-    return effects, {"name": "current", "parameters": parameters}
+def drawn(season: int) -> tuple[Effects, list[dict]]:
+    """What a season hides, and the key to it in the contract's names and units."""
+    rng = np.random.default_rng([SEED, season])
+    if season == 2:
+        speed, towards = rng.uniform(0.05, 0.14), rng.uniform(0.0, 360.0)
+        late = rng.uniform(0.3, 0.9)
+        effects = Effects(
+            current_north=speed * math.cos(math.radians(towards)),
+            current_east=speed * math.sin(math.radians(towards)),
+            clock_offset={"gnss": late},
+        )
+        return effects, [
+            {
+                "name": "current",
+                "parameters": {
+                    "speed": {"value": round(speed, 6), "unit": "m/s"},
+                    "direction": {"value": round(towards, 4), "unit": "deg"},
+                },
+            },
+            {
+                "name": "clock_offset",
+                "parameters": {
+                    "time": {"value": round(late, 4), "unit": "s"},
+                    "channel": {"value": "gnss", "unit": ""},
+                },
+            },
+        ]
+    if season == 4:  # no cause has this name; the family is the answer
+        changes, parameters = cases.OUTSIDE["tether"][1](rng, 1.0)
+        return Effects(**changes), [
+            {"name": "tether", "family": "position", "parameters": parameters}
+        ]
+    return Effects(), []
 
 
 def voyages() -> list[tuple[Plan, Voyage]]:
-    """All eight, in the order in which they were sailed."""
-    hidden, _ = drawn()
-    sailed = []
-    for number, plan in enumerate((*PLANS, *SEASON_2)):
-        effects = hidden if plan in SEASON_2 else Effects()
-        sailed.append(
-            (plan, sail(plan.seconds, seed=SEED + number, wind=plan.wind, effects=effects))
-        )
-    return sailed
+    """All of them, in the order in which they were sailed."""
+    planned = [(plan, Effects()) for plan in PLANS]
+    for season, plans in SEASONS.items():
+        planned += [(plan, drawn(season)[0]) for plan in plans]
+    return [
+        (plan, sail(plan.seconds, seed=SEED + number, wind=plan.wind, effects=effects))
+        for number, (plan, effects) in enumerate(planned)
+    ]
 
 
 def write_sample_logs(folder: str | Path) -> None:
-    """Sail and write all eight logs, the README and the key. The same bytes every time."""
+    """Sail and write all logs, the README and the key. The same bytes every time."""
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    answers = folder / "answers"
+    answers.mkdir(parents=True, exist_ok=True)
     for number, (plan, voyage) in enumerate(voyages()):
         write_voyage(
             folder / f"{plan.name}.mcap", voyage,
             seed=SEED + number, start=plan.start, blemishes=plan.blemishes,
         )  # fmt: skip
-    _, cause = drawn()
-    key = {"season2_1": [cause], "season2_2": [cause]}
-    (folder / "hidden.key.json").write_text(json.dumps(key, indent=2) + "\n", encoding="utf-8")
+    key = {plan.name: drawn(season)[1] for season, plans in SEASONS.items() for plan in plans}
+    (answers / "key.json").write_text(json.dumps(key, indent=2) + "\n", encoding="utf-8")
     (folder / "README.md").write_text(_readme(), encoding="utf-8")
 
 
@@ -99,7 +129,7 @@ def _readme() -> str:
     rows = "\n".join(
         f"| {plan.name} | {plan.seconds} | {plan.start:%Y-%m-%d %H:%M} | "
         f"{plan.wind.speed} to {plan.wind.speed_end} |"
-        for plan in (*PLANS, *SEASON_2)
+        for plan in (*PLANS, *(plan for plans in SEASONS.values() for plan in plans))
     )
     return _README.format(rows=rows, blemishes=_blemishes())
 
@@ -157,7 +187,8 @@ is when it measured; messages reach the recorder (`log_time`) 5 to 40 ms later.
 
 {blemishes}
 
-Something is hidden in `season2_1` and `season2_2`: the same ship and the same instruments half a
-year later, and yet a model of voyages 1 to 6 will not follow them. What it is, and how large,
-stands in `hidden.key.json`. No code reads that file; look at it after `shiplog diagnose`.
+Seasons 2, 3 and 4 are the same ship and the same instruments half a year later each. In some of
+them something is hidden, and a model of voyages 1 to 6 will not follow them; one season may hide
+more than one thing, or nothing, or what no catalogue has. `shiplog diagnose` is to say which. No
+code reads `answers/`; look there afterwards.
 """
