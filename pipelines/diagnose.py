@@ -62,7 +62,7 @@ def diagnose_run(
         raise RunError(
             f"{run.name} is of {run.profile.ship.name!r} with {listed(run.profile.columns)}; the "
             f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
-            hint="diagnose a ship with a model of her own.",
+            hint="diagnose a ship with a model of its own.",
         )
     recorded = trial.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.made_on) and not run.given

@@ -62,7 +62,7 @@ class Stretch:
         towards = TOWARDS[CHANNELS.index(self.channel)][0 if self.peak > 0.0 else 1]
         turning = self.channel == "yaw_rate"
         what, unit, full = (
-            ("moment", "N m", "her full turning moment")
+            ("moment", "N m", "its full turning moment")
             if turning
             else ("force", "N", "full thrust")
         )

@@ -92,9 +92,8 @@ def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, align.Samples]) 
         )
         brief = [s for s in lasted if s < quality.SAID_HELD_S]
         if brief:
-            sentence = (
-                f"{name} repeats itself briefly, {len(brief)} times, {sum(brief):.1f} s in all."
-            )
+            often = "once" if len(brief) == 1 else f"{len(brief)} times"
+            sentence = f"{name} repeats itself briefly, {often}, {sum(brief):.1f} s in all."
             grid.findings.append(
                 Finding("held", name, sentence, value=float(len(brief)), unit="times")
             )

@@ -303,7 +303,7 @@ def sentence(
     if verdict == "coverage":
         return "Not trained in these conditions: record data there first, then ask again."
     if verdict == "external":
-        return "The ship was pushed, held or towed: no force of her own explains these stretches."
+        return "The ship was pushed, held or towed: no force of its own explains these stretches."
     return (
         "No change found: the errors are those that the model already had in its nominal voyages."
     )

@@ -248,7 +248,7 @@ def _place(data: Series, geodetic: bool) -> Iterator[Regime]:
     north, east = x0 >= np.median(x0), y0 >= np.median(y0)
     for up, long in ((True, "north"), (False, "south")):
         for right, short in ((True, "east"), (False, "west")):
-            words = f"in the {long}-{short} of her waters"
+            words = f"in the {long}-{short} of its waters"
             if not geodetic:
                 words = (
                     f"where x₀ {'≥' if up else '<'} {np.median(x0):.0f} m "

@@ -90,7 +90,7 @@ def verdict(
     if context.lost and decision.structure is not None:
         notes.insert(
             0,
-            f"{context.lost}. It does not simulate this ship, or her profile reads her wrongly: "
+            f"{context.lost}. It does not simulate this ship, or its profile reads it wrongly: "
             f"what is left depends most on {decision.structure.family}.",
         )
     named = {n.cause.label for n in decision.named}

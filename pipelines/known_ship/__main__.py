@@ -2,6 +2,8 @@
 
 python -m pipelines.known_ship FOLDER
     the sample logs into that folder, such as sample_logs
+python -m pipelines.known_ship table trips.csv
+    some trips as one table, for the tutorial
 python -m pipelines.known_ship case SEED FOLDER --key KEY
     a blind case into that folder, and what is hidden in it into the file KEY, elsewhere
 """
@@ -13,6 +15,7 @@ import sys
 
 from pipelines.known_ship import cases
 from pipelines.known_ship.sample_logs import write_sample_logs
+from pipelines.known_ship.trips import write_trips
 
 PROGRAM = "python -m pipelines.known_ship"
 
@@ -20,6 +23,9 @@ PROGRAM = "python -m pipelines.known_ship"
 def main(arguments: list[str]) -> None:
     if arguments[:1] == ["case"]:
         _case(arguments[1:])
+        return
+    if arguments[:1] == ["table"] and len(arguments) == 2:
+        write_trips(arguments[1])
         return
     parser = argparse.ArgumentParser(
         prog=PROGRAM, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -307,6 +307,13 @@ def _pulsed(one: Found, rows: pl.DataFrame) -> Found:
     return replace(one, unit="pwm", check="CHECK: the neutral pulse", more="offset = 1500.0")
 
 
+SIZES = {  # of an actuator, which only physical models ask for
+    "rudder": "# area_m2 = 0.0  # CHECK: train --model mmg needs it\n"
+    "# span_m = 0.0  # CHECK: likewise\n",
+    "propeller": "# diameter_m = 0.0  # CHECK: train --model mmg needs it\n",
+}
+
+
 def _actuator(kind: str, one: Found) -> str:
     field, unit = FIELDS[kind]
     offset = "offset = 1500.0  # CHECK: the neutral pulse\n" if one.unit == "pwm" else ""
@@ -314,6 +321,7 @@ def _actuator(kind: str, one: Found) -> str:
         f'[[actuators]]\nname = "{one.channel}"\nkind = "{kind}"\n'
         f'topic = "/{kind}/{one.channel}"\nfield = "{field}"\nunit = "{unit or one.unit}"\n{offset}'
         "position_m = [0.0, 0.0]  # CHECK: ahead and to starboard of midship\n"
+        f"{SIZES.get(kind, '')}"
     )
 
 
