@@ -47,7 +47,7 @@ class Stretch:
     """One event, in the channel where it is most beyond her.
 
     peak     the largest force [N], or moment [N m] where the channel is yaw_rate
-    percent  of full thrust; of her full turning moment where the channel is yaw_rate
+    percent  of full thrust; of its full turning moment where the channel is yaw_rate
     """
 
     voyage: str

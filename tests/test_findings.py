@@ -114,12 +114,13 @@ def test_a_fault_is_written_into_a_voyage_of_its_own_and_nowhere_else(tmp_path):
     ingest_logs([log], None, store)
     profile = store.profile(["voyage_1"])
     before = store.tables(["voyage_1"])[0].collect()
-    _, write = faults.FAULTS["yaw_rate_bias"]
-    name = faults._written(store, log, profile, "yaw_rate_bias", write)
+    size, write = faults.FAULTS["yaw_rate_bias"]
+    assert size(0.3) == "value 0.09 deg/s"
+    name = faults._written(store, log, profile, "yaw_rate_bias-0.3", write, 0.3)
     assert store.select() == ["voyage_1", name]
     assert store.tables(["voyage_1"])[0].collect().equals(before)
     after = store.tables([name])[0].collect()
-    assert (after["yaw_rate"] - before["yaw_rate"]).to_numpy() == pytest.approx(np.radians(0.3))
+    assert (after["yaw_rate"] - before["yaw_rate"]).to_numpy() == pytest.approx(np.radians(0.09))
     same = [n for n in before.columns if n not in ("voyage", "yaw_rate", "heading")]
     assert after.select(same).equals(before.select(same))
     turned = np.exp(1j * (after["heading"] - before["heading"]).to_numpy())

@@ -88,7 +88,7 @@ def wind_from_starboard(data: Series, windows: pl.DataFrame) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("regime", "words"),
-    [(astern, ["astern"]), (in_the_north_east, ["in the north-east of her waters"]),
+    [(astern, ["astern"]), (in_the_north_east, ["in the north-east of its waters"]),
      (late, ["in the last third of the campaign"]), (wind_from_starboard, ["wind from starboard"])],
 )  # fmt: skip
 def test_where_it_is_wrong_is_said(driven, regime, words):

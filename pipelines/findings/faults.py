@@ -29,21 +29,39 @@ from shiplog.store import Store
 Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become
 
 DEGREE = np.pi / 180.0
-# Of a size that a yard would find: (what is written, in the contract's words, and how)
-FAULTS: dict[str, tuple[str, Callable[[Columns, np.ndarray], None]]] = {
-    "none": ("", lambda c, t: None),
-    "heading_offset": ("angle 3 deg", lambda c, t: _add(c, "heading", 3.0 * DEGREE)),
-    "yaw_rate_bias": ("value 0.3 deg/s", lambda c, t: _add(c, "yaw_rate", 0.3 * DEGREE)),
-    "yaw_rate_scale": ("value 1.06", lambda c, t: _scale(c, "yaw_rate", 1.06)),
-    "clock_offset, position": ("time 0.5 s", lambda c, t: _late(c, t, 0.5, "x0", "y0")),
-    "clock_offset, velocity": ("time 0.5 s", lambda c, t: _late(c, t, 0.5, "surge", "sway")),
-    "antenna_offset": ("x 0.3 m, y -0.25 m", lambda c, t: _antenna(c, 0.3, -0.25)),
-    "rudder_offset": ("3 deg each", lambda c, t: _add(c, "rudder", -3.0 * DEGREE)),
-    "rudder_delay": ("time 1 s", lambda c, t: _late(c, t, -1.0, "rudder")),
-    "rudder_lag": ("time 1.2 s", lambda c, t: _ahead(c, t, 1.2, "rudder")),
-    "thrust_loss": ("factor about 0.85", lambda c, t: _scale(c, "prop", 0.85**-0.5)),
-    "wind_direction_offset": ("angle 12 deg", lambda c, t: _add(c, "wind_angle", 12 * DEGREE)),
-    "wind_speed_scale": ("value 1.15", lambda c, t: _scale(c, "wind_speed", 1.15)),
+SHARES = (1.0, 0.3)  # of a size that a yard would find
+# What is written at a share of its size: in the contract's words, and how
+FAULTS: dict[str, tuple[Callable[[float], str], Callable[[Columns, np.ndarray, float], None]]] = {
+    "none": (lambda s: "", lambda c, t, s: None),
+    "heading_offset": (
+        lambda s: f"angle {3 * s:.2g} deg", lambda c, t, s: _add(c, "heading", 3.0 * s * DEGREE)),
+    "yaw_rate_bias": (
+        lambda s: f"value {0.3 * s:.2g} deg/s",
+        lambda c, t, s: _add(c, "yaw_rate", 0.3 * s * DEGREE)),
+    "yaw_rate_scale": (
+        lambda s: f"value {1 + 0.06 * s:.3f}", lambda c, t, s: _scale(c, "yaw_rate", 1 + 0.06 * s)),
+    "clock_offset, position": (
+        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: _late(c, t, 0.5 * s, "x0", "y0")),
+    "clock_offset, velocity": (
+        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: _late(c, t, 0.5 * s, "surge", "sway")),
+    "antenna_offset": (
+        lambda s: f"x {0.3 * s:.2g} m, y {-0.25 * s:.2g} m",
+        lambda c, t, s: _antenna(c, 0.3 * s, -0.25 * s)),
+    "rudder_offset": (
+        lambda s: f"{3 * s:.2g} deg each", lambda c, t, s: _add(c, "rudder", -3.0 * s * DEGREE)),
+    "rudder_delay": (
+        lambda s: f"time {s:.2g} s", lambda c, t, s: _late(c, t, -s, "rudder")),
+    "rudder_lag": (
+        lambda s: f"time {1.2 * s:.2g} s", lambda c, t, s: _ahead(c, t, 1.2 * s, "rudder")),
+    "thrust_loss": (
+        lambda s: f"factor about {1 - 0.15 * s:.3g}",
+        lambda c, t, s: _scale(c, "prop", (1 - 0.15 * s) ** -0.5)),
+    "wind_direction_offset": (
+        lambda s: f"angle {12 * s:.2g} deg",
+        lambda c, t, s: _add(c, "wind_angle", 12.0 * s * DEGREE)),
+    "wind_speed_scale": (
+        lambda s: f"value {1 + 0.15 * s:.3f}",
+        lambda c, t, s: _scale(c, "wind_speed", 1 + 0.15 * s)),
 }  # fmt: skip
 
 ESSO_TRIAL = ("random_06-Aug-2020_16_24_25_4", "random_06-Aug-2020_16_24_25_6")
@@ -68,35 +86,37 @@ def other_ship(folder: Path, out: Path) -> str:
 def _table(
     store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path
 ) -> str:
-    """A row a fault: what was written, and what was said of it."""
+    """A row a fault and share: what was written, and what was said of it."""
     of = {path.stem: path for path in logs}
     others = tuple(n for n in store.select([nominal]) if n not in trial and "+" not in n)
     run = physics(store, out / "base", Split(training=others, validation=()))
     profile = store.profile(trial)
     rows = []
     for fault, (size, write) in FAULTS.items():
-        folder = out / fault.replace(", ", "-")
-        if not (folder / "verdict.json").exists():
-            names = [_written(store, of[n], profile, fault, write) for n in trial]
-            diagnose_run(run, store, names, folder)
-        said = json.loads((folder / "verdict.json").read_text("utf-8"))
-        rows.append((fault, size, *_said(said, fault)))
+        for share in SHARES if fault != "none" else (1.0,):
+            label = fault.replace(", ", "-") + ("" if share == 1.0 else f"-{share:g}")
+            folder = out / label
+            if not (folder / "verdict.json").exists():
+                names = [_written(store, of[n], profile, label, write, share) for n in trial]
+                diagnose_run(run, store, names, folder)
+            said = json.loads((folder / "verdict.json").read_text("utf-8"))
+            rows.append((fault, size(share), *_said(said, fault)))
     return report.table(("written", "size", "said", "least that would be seen"), rows)
 
 
-def _written(store: Store, log: Path, profile: Profile, fault: str, write) -> str:
-    """The voyage with that fault in the store, under a name of its own."""
+def _written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:
+    """The voyage with that share of a fault in the store, under a name of its own."""
     voyage = ingest(log, profile)
     seconds = voyage.table["time"].dt.epoch("ns").to_numpy() / 1e9
     columns = {c.name: c.to_numpy().copy() for c in voyage.table if c.dtype == pl.Float64}
-    write(columns, seconds - seconds[0])
+    write(columns, seconds - seconds[0], share)
     columns["heading"] = np.angle(np.exp(1j * columns["heading"]))
-    name = f"{voyage.name}+{fault}"
+    name = f"{voyage.name}+{label}"
     table = voyage.table.with_columns(pl.Series(n, v) for n, v in columns.items())
     store.add(
         replace(
             voyage, name=name, table=table, report=replace(voyage.report, name=name),
-            contents=replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{fault}"),
+            contents=replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{label}"),
         )
     )  # fmt: skip
     return name
