@@ -95,7 +95,9 @@ def pictured(exhibit: Exhibit) -> Pictured:
 
 
 def _spoken(names: tuple[str, ...]) -> str:
-    return " and ".join(name.replace("_", " ") for name in names)
+    """Causes in words; what one of them is of stands in brackets: "clock offset (gnss)"."""
+    spoken = [name.replace("_", " ").partition(":") for name in names]
+    return " and ".join(f"{cause} ({of})" if of else cause for cause, _, of in spoken)
 
 
 def _pushed(exhibit: Exhibit) -> pl.DataFrame:
