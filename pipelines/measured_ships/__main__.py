@@ -13,7 +13,6 @@ import logging
 import sys
 from pathlib import Path
 
-from pipelines.hidden_effects import program
 from pipelines.measured_ships import page, way
 from pipelines.measured_ships.ships import DATA_SETS
 
@@ -29,7 +28,7 @@ def main() -> int:
     given = parser.parse_args()
     logging.basicConfig(format="%(message)s", level=logging.INFO)
     ways = [way.go(name, DATA_SETS[name], given.data, given.out) for name in given.only]
-    text = page.text(ways, program.name(program.identity()))
+    text = page.text(ways)
     if given.markdown is None:
         print(text)
     else:

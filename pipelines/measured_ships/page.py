@@ -21,13 +21,19 @@ training voyages.
 """
 
 
-def text(ways: Sequence[Way], program: str) -> str:
-    """The page. `program` is the commit whose answers these are."""
+def text(ways: Sequence[Way]) -> str:
+    """The page, with the commits whose answers these are."""
+    programs = dict.fromkeys(name for one in ways for name in one.programs)
     head = (
         "ship", "voyages", "usable, s", "windows", "L", "hold", "least squares", "verdict",
         "explained", "CPU, s",
     )  # fmt: skip
-    lines = [HEAD, f"Program: {program}.\n", report.table(head, [_row(one) for one in ways]), ""]
+    lines = [
+        HEAD,
+        f"Program: {', '.join(programs)}.\n",
+        report.table(head, [_row(one) for one in ways]),
+        "",
+    ]
     for one in ways:
         data = DATA_SETS[one.name]
         lines += [f"## {data.ship}\n", f"> {_answer(one)}\n"]
