@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pipelines.measured_ships.judgements import JUDGEMENTS
 from pipelines.measured_ships.ships import DATA_SETS
 from pipelines.measured_ships.way import Way
 from shiplog import report
@@ -35,10 +36,8 @@ def text(ways: Sequence[Way]) -> str:
         "",
     ]
     for one in ways:
-        data = DATA_SETS[one.name]
-        lines += [f"## {data.ship}\n", f"> {_answer(one)}\n"]
-        if data.judgement:
-            lines.append(f"{data.judgement}\n")
+        lines += [f"## {DATA_SETS[one.name].ship}\n", f"> {_answer(one)}\n"]
+        lines += [f"{JUDGEMENTS[one.name]}\n"] if one.name in JUDGEMENTS else []
     return "\n".join(lines)
 
 

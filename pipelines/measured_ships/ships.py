@@ -1,4 +1,4 @@
-"""The data sets: what their owners would type, and whether to believe what is answered."""
+"""The data sets: what their owners would type."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ class DataSet:
     vessel    which ship of a table that holds several
     train     more arguments of `train`
     trial     patterns of the voyages in question; none: the split's test voyages
-    judgement whether a naval architect would believe it
     """
 
     ship: str
     folder: str
-    judgement: str
     tables: tuple[str, ...] = ()
     logs: tuple[str, ...] = ()
     profile: str | None = None
@@ -33,80 +31,104 @@ class DataSet:
 
 DATA_SETS: dict[str, DataSet] = {
     "esso-osaka": DataSet(
-        "Esso Osaka, 3 m model, pond", "frt-ds-esso", "",
-        tables=("random/*", "turning/*", "zigzag/*", "berthing/*"), profile="esso-osaka",
+        "Esso Osaka, 3 m model, pond",
+        "frt-ds-esso",
+        tables=("random/*", "turning/*", "zigzag/*", "berthing/*"),
+        profile="esso-osaka",
     ),
     "esso-osaka, published": DataSet(
-        "the same, published coefficients", "frt-ds-esso", "",
-        tables=("random/*", "turning/*", "zigzag/*", "berthing/*"), profile="esso-osaka",
-        train=("--no-fit",), trial=("*",),
+        "the same, published coefficients",
+        "frt-ds-esso",
+        tables=("random/*", "turning/*", "zigzag/*", "berthing/*"),
+        profile="esso-osaka",
+        train=("--no-fit",),
+        trial=("*",),
     ),
     "kvlcc2": DataSet(
-        "KVLCC2, 7 m model, HSVA", "kvlcc2_simman", "Believable. All zigzags are of one series. On these six windows a plain regression predicts "
-        "zigzags better than the physics, and `evaluate` says so.",
-        tables=("hsva_cpmc_zigzag_20hz_model.parquet",), profile="kvlcc2",
+        "KVLCC2, 7 m model, HSVA",
+        "kvlcc2_simman",
+        tables=("hsva_cpmc_zigzag_20hz_model.parquet",),
+        profile="kvlcc2",
         train=("--window", "50"),
     ),
     "kvlcc2, full scale": DataSet(
-        "KVLCC2, MARIN, scaled up", "kvlcc2_simman", "Believable. All six tests are of one series.",
-        tables=("marin_free_fullscale.parquet",), profile="kvlcc2-full-scale",
+        "KVLCC2, MARIN, scaled up",
+        "kvlcc2_simman",
+        tables=("marin_free_fullscale.parquet",),
+        profile="kvlcc2-full-scale",
     ),
     "blueboat": DataSet(
-        "BlueBoat, 1.2 m, fjord", "blueboat_ntnu",
-        "Believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: nothing is "
-        "known to have changed, and the data are too few to be sure of it.",
-        tables=("blueboat_10hz.parquet",), profile="blueboat", train=("--window", "20"),
+        "BlueBoat, 1.2 m, fjord",
+        "blueboat_ntnu",
+        tables=("blueboat_10hz.parquet",),
+        profile="blueboat",
+        train=("--window", "20"),
     ),
     "milliampere": DataSet(
-        "milliAmpere, 5 m ferry", "milliampere1_physical",
-        "Believable. Three runs at about 0.1 m/s: it says how much more is needed, and of what kind.",
-        tables=("maneuvering1", "nlp1", "qp1"), profile="milliampere", train=("--window", "50"),
+        "milliAmpere, 5 m ferry",
+        "milliampere1_physical",
+        tables=("maneuvering1", "nlp1", "qp1"),
+        profile="milliampere",
+        train=("--window", "50"),
     ),
     "other_ship": DataSet(
-        "3 m ship of another simulator", "other_ship",
-        "Right. That campaign's README says 0.12 m/s towards 140 deg, and nothing else.",
-        logs=("*.mcap",), profile="other_ship.toml", train=("--voyages", "nominal_*"),
+        "3 m ship of another simulator",
+        "other_ship",
+        logs=("*.mcap",),
+        profile="other_ship.toml",
+        train=("--voyages", "nominal_*"),
         trial=("trial_*",),
     ),
     "usv_fuzhou": DataSet(
-        "USV, 3.6 m, 2 Hz", "usv_fuzhou",
-        "Believable. Two runs of 126 and 210 s at 2 Hz, one of them full of gaps: a smoke test.",
-        tables=("usv_2hz.parquet",), mended={"length_m = 1.0": "length_m = 3.6"},
+        "USV, 3.6 m, 2 Hz",
+        "usv_fuzhou",
+        tables=("usv_2hz.parquet",),
+        mended={
+            "length_m = 1.0": "length_m = 3.6",
+        },
         train=("--model", "feedforward", "--window", "15"),
     ),
     "qixing": DataSet(
-        "USV, Qixing bay, no actuators", "qixing_usv_drift",
-        "Believable. What drives the ship is not in the data. `ingest` says that the velocity comes "
-        "0.10 s after the position, half an interval of this 5 Hz receiver, in six of seven runs.",
+        "USV, Qixing bay, no actuators",
+        "qixing_usv_drift",
         tables=("usv_nmea_5hz.parquet",),
     ),
     "tycho-brahe": DataSet(
-        "Tycho Brahe, ferry, 1 Hz", "oresund_ferries", "Believable. The angles of the thrusters are in the table as sines and cosines, their speeds "
-        "not at all: a model has nothing to be driven by.",
-        tables=("ferries_1hz.parquet",), vessel="tycho-brahe",
+        "Tycho Brahe, ferry, 1 Hz",
+        "oresund_ferries",
+        tables=("ferries_1hz.parquet",),
+        vessel="tycho-brahe",
         mended={
             "length_m = 1.0": "length_m = 111.2",
-            "# No heading was recognised, and shiplog needs one.":
-                '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"',
+            "# No heading was recognised, and shiplog needs one.": '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"',
             "[table]": '[table]\n"Stävad kurs (deg)" = { channel = "heading", unit = "deg" }',
         },
     ),
     "aurora": DataSet(
-        "Aurora, ferry, 1 Hz, no heading", "oresund_ferries", "Right. This ferry's table has no heading.",
-        tables=("ferries_1hz.parquet",), vessel="aurora",
+        "Aurora, ferry, 1 Hz, no heading",
+        "oresund_ferries",
+        tables=("ferries_1hz.parquet",),
+        vessel="aurora",
     ),
     "hakusan": DataSet(
-        "Hakusan, container ship, 1 Hz", "hakusan", "Right. Yaw rate, roll, pitch and rudder in counts without a scale are all there is.", tables=("hakusan_1hz.parquet",),
+        "Hakusan, container ship, 1 Hz",
+        "hakusan",
+        tables=("hakusan_1hz.parquet",),
     ),
     "mcap, location": DataSet(
-        "GNSS and sensors, JSON", "mcap", "Right. A position and a sensor, of no vehicle that steers.", logs=("json/t2m_location_sensor.mcap",),
+        "GNSS and sensors, JSON",
+        "mcap",
+        logs=("json/t2m_location_sensor.mcap",),
     ),
     "mcap, battery": DataSet(
-        "battery, speed, location", "mcap", "Right. A car's position, speed and battery.",
+        "battery, speed, location",
+        "mcap",
         logs=("json/foxglove_tutorial_battery_speed_location.mcap",),
     ),
     "mcap, AIS": DataSet(
-        "Baltic AIS, 637 ships", "mcap", "Right. Four seconds of AIS hold one or two reports of a ship.",
-        logs=("protobuf/keelson_sjofartsverket_ais.mcap",), vessel="230980670",
+        "Baltic AIS, 637 ships",
+        "mcap",
+        logs=("protobuf/keelson_sjofartsverket_ais.mcap",),
+        vessel="230980670",
     ),
-}  # fmt: skip
+}
