@@ -29,6 +29,12 @@ class DataSet:
     trial: tuple[str, ...] = ()
 
 
+HEADING = """[sensors.heading]
+topic = "/gyro"
+field = "heading_deg"
+unit = "deg"
+"""
+
 DATA_SETS: dict[str, DataSet] = {
     "esso-osaka": DataSet(
         "Esso Osaka, 3 m model, pond",
@@ -100,7 +106,7 @@ DATA_SETS: dict[str, DataSet] = {
         vessel="tycho-brahe",
         mended={
             "length_m = 1.0": "length_m = 111.2",
-            "# No heading was recognised, and shiplog needs one.": '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"',
+            "# No heading was recognised, and shiplog needs one.": HEADING,
             "[table]": '[table]\n"Stävad kurs (deg)" = { channel = "heading", unit = "deg" }',
         },
     ),
