@@ -230,8 +230,8 @@ class Actuator(Source):
         default=0.0, description="where a fixed thruster pushes, from ahead towards starboard, deg"
     )
     diameter_m: float | None = Field(default=None, gt=0, description="of a screw, m")
-    area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²")
-    span_m: float | None = Field(default=None, gt=0, description="of a rudder, m")
+    area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²; estimated")
+    span_m: float | None = Field(default=None, gt=0, description="of a rudder, m; estimated")
 
     @model_validator(mode="after")
     def _limited(self) -> Actuator:

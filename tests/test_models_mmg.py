@@ -757,8 +757,6 @@ def test_a_blade_is_as_wide_whichever_way_its_sensor_counts():
     ("key", "actuator", "part"),
     [
         ("diameter_m", "propeller", "propeller"),
-        ("area_m2", "rudder", "rudder"),
-        ("span_m", "rudder", "rudder"),
     ],
 )
 def test_a_size_that_is_missing_is_asked_for_by_name(key, actuator, part):

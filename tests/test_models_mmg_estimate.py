@@ -8,6 +8,7 @@ import pytest
 from shiplog import profile as profiles
 from shiplog.models.mmg import estimate
 from shiplog.models.mmg.estimate import Particulars
+from shiplog.models.mmg.geometry import geometry_of
 from shiplog.profile import Ship, Site
 
 ESSO = Particulars(
@@ -227,3 +228,32 @@ def test_kijimas_formula_is_held_where_its_ships_end():
     light = replace(ESSO, breadth=2.0, mass=1.0)  # C_b B/L = 0.55
     assert estimate.hull(light)["y_r"] == pytest.approx(-1.5 * 0.2, abs=0.01)
     assert estimate.hull(box(10.0, 6.0, 2.0, 1.0))["y_r"] == 0.9  # m' alone is 1.2
+
+
+def test_a_rudder_without_sizes_is_a_rudder_of_the_rules():
+    """DNV by hand: 3.0 · 0.20114/100 · (1 + 25 · (0.48925/3)²) = 0.010046 m², shared by two."""
+    two, bare = profiles.load("esso-vectwin"), {"area_m2": None, "span_m": None}
+    lacking = tuple(a.model_copy(update=bare) if a.kind == "rudder" else a for a in two.actuators)
+    found, _, said = geometry_of(two.model_copy(update={"actuators": lacking}))
+    area = 3.0 * 0.201 / 100.0 * (1.0 + 25.0 * (0.489 / 3.0) ** 2)
+    assert [r.area for r in found.rudders] == pytest.approx([area / 2.0] * 2)
+    assert [r.span for r in found.rudders] == pytest.approx([(1.5 * area / 2.0) ** 0.5] * 2)
+    assert sum("rudder_port: area" in sentence for sentence in said) == 1
+    single = profiles.load("esso-osaka")  # whose own rudder is 0.0106 m²
+    lacking = tuple(
+        a.model_copy(update=bare) if a.kind == "rudder" else a for a in single.actuators
+    )
+    (rudder,) = geometry_of(single.model_copy(update={"actuators": lacking}))[0].rudders
+    own = next(a for a in single.actuators if a.kind == "rudder")
+    assert rudder.area == pytest.approx(own.area_m2, rel=0.25)
+    assert rudder.span == pytest.approx(own.span_m, rel=0.25)
+
+
+def test_a_rudder_of_known_span_has_the_usual_chord():
+    ship = profiles.load("esso-osaka")
+    lacking = tuple(
+        a.model_copy(update={"area_m2": None, "span_m": 0.15}) if a.kind == "rudder" else a
+        for a in ship.actuators
+    )
+    (rudder,) = geometry_of(ship.model_copy(update={"actuators": lacking}))[0].rudders
+    assert (rudder.area, rudder.span) == pytest.approx((0.15**2 / 1.5, 0.15))

@@ -308,7 +308,7 @@ def _pulsed(one: Found, rows: pl.DataFrame) -> Found:
 
 
 SIZES = {  # of an actuator, which only physical models ask for
-    "rudder": "# area_m2 = 0.0  # CHECK: train --model mmg needs it\n"
+    "rudder": "# area_m2 = 0.0  # CHECK: estimated by train --model mmg where left out\n"
     "# span_m = 0.0  # CHECK: likewise\n",
     "propeller": "# diameter_m = 0.0  # CHECK: train --model mmg needs it\n",
 }

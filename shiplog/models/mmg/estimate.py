@@ -12,11 +12,12 @@ from math import log10, pi, sqrt
 
 import numpy as np
 
-from shiplog.profile import Profile
+from shiplog.profile import Actuator, Profile
 
 GRAVITY = 9.80665  # m/s²
 VISCOSITY = 1.1e-6  # m²/s, water of 16 °C
 SALT, FRESH = 1025.0, 998.0  # kg/m³
+ASPECT = 1.5  # span over mean chord of a ship's rudder
 BLOCK = (0.35, 1.0)
 FULLEST = 0.2  # C_b B/L; a full tanker's is 0.15, and the regressions are of merchant ships
 BROADEST = 0.2  # B/L of the shape that the wind regression is asked for
@@ -107,6 +108,26 @@ def particulars(profile: Profile) -> tuple[Particulars, tuple[str, ...]]:
         said.append(f"lateral area {lateral:.3g} m² estimated as 0.355 of length by breadth")
     main = Particulars(length, breadth, draught, mass, block, x_g, density, frontal, lateral)
     return main, tuple(said)
+
+
+def rudder_size(rudder: Actuator, count: int, p: Particulars) -> tuple[float, float, str]:
+    """Area [m²] and span [m] of one of `count` rudders, and a sentence where they are estimated.
+
+    What DNV asks for at least of all rudders together, A = L d/100 (1 + 25 (B/L)²), shared evenly
+    (Det Norske Veritas, Rules for Ships, 2000); a span of 1.5 mean chords.
+    """
+    area, span, said = rudder.area_m2, rudder.span_m, []
+    if area is None:
+        if span is None:
+            whole = p.length * p.draught / 100.0 * (1.0 + 25.0 * (p.breadth / p.length) ** 2)
+            area, how = whole / count, "from length, breadth and draught"
+        else:
+            area, how = span**2 / ASPECT, f"from its span of {span:.3g} m"
+        said.append(f"area {area:.3g} m² {how}")
+    if span is None:
+        span = sqrt(ASPECT * area)
+        said.append(f"span {span:.3g} m of {ASPECT} mean chords")
+    return area, span, f"{rudder.name}: {' and '.join(said)} estimated" if said else ""
 
 
 def inertia(p: Particulars) -> dict[str, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from shiplog.exceptions import ProfileError, listed, nearest
-from shiplog.models.mmg.estimate import Particulars, particulars
+from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
 from shiplog.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
@@ -107,19 +107,16 @@ def geometry_of(
         for a in profile.actuators
         if a.kind == "propeller" and "propeller" not in off
     )  # fmt: skip
+    blades = [a for a in profile.actuators if a.kind == "rudder" and "rudder" not in off]
+    sizes = [rudder_size(a, len(blades), main) for a in blades]
+    said = (*said, *(sentence for *_, sentence in sizes if sentence))
     rudders = tuple(
         Rudder(
-            column[a.name],
-            a.name,
-            *a.position_m,
-            _needed(a, "area_m2", "rudder"),
-            _needed(a, "span_m", "rudder"),
-            _reach(a) > WIDE,
-            _slipstream(a, propellers),
+            column[a.name], a.name, *a.position_m, area, span,
+            _reach(a) > WIDE, _slipstream(a, propellers),
         )
-        for a in profile.actuators
-        if a.kind == "rudder" and "rudder" not in off
-    )
+        for a, (area, span, _) in zip(blades, sizes, strict=True)
+    )  # fmt: skip
     thrusters = tuple(
         Thruster(
             column[a.name],
