@@ -85,6 +85,9 @@ def log(case: cases.Case, leg: cases.Leg, folder):
     return path
 
 
+pytestmark = pytest.mark.former
+
+
 @pytest.fixture(scope="module")
 def sea(tmp_path_factory):
     """The whole way, once: run, store, what is usual, the diagnosis of a trial with a current."""
