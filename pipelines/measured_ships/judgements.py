@@ -4,13 +4,13 @@ from __future__ import annotations
 
 JUDGEMENTS: dict[str, str] = {
     "esso-osaka": (
-        "Believable. All trials are of one ship in one summer, so that no change is what to expect; "
-        "physics leave half of the regression's L on trials that were held out."
+        "Believable. All trials are of one ship in one summer, so that no change is what to "
+        "expect; physics leave half of the regression's L on trials that were held out."
     ),
     "esso-osaka, published": (
-        "The position's clock is right: the sensors alone say 0.95 s between position and velocity. "
-        "That the wind pushes half as hard athwart as published returns on every part of the data. "
-        "The wind's clock is unconfirmed; and half of the error is left, most of it in yaw rate."
+        "Half of it. The position's clock is right: the sensors alone say 0.95 s between position "
+        "and velocity. That the wind pushes half as hard athwart as published, the random trials "
+        "alone say, too. The wind's clock is unconfirmed, and half of the error is left."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "

@@ -8,6 +8,7 @@ from pipelines.measured_ships.judgements import JUDGEMENTS
 from pipelines.measured_ships.ships import DATA_SETS
 from pipelines.measured_ships.way import Way
 from shiplog import report
+from shiplog.table import WINDOW
 
 HEAD = """# Measured ships, from their files to a verdict
 
@@ -16,9 +17,8 @@ HEAD = """# Measured ships, from their files to a verdict
 Each data set goes the way of its owner: a profile (shipped, or drafted and mended where it says
 CHECK), `convert`, `ingest`, `train --model mmg`, `evaluate`, `diagnose` on the voyages that were
 not trained on. It ends with a verdict, or with the first thing that these data cannot give. None of
-the data are part of this repository. L is the paper's loss over windows of 100 s unless another
-window is given; the baselines hold the velocity, and fit a quadratic by least squares to the
-training voyages.
+the data are part of this repository. L is the paper's loss; the baselines hold the velocity, and
+fit a quadratic by least squares to the training voyages.
 """
 
 
@@ -26,8 +26,8 @@ def text(ways: Sequence[Way]) -> str:
     """The page, with the commits whose answers these are."""
     programs = dict.fromkeys(name for one in ways for name in one.programs)
     head = (
-        "ship", "voyages", "usable, s", "windows", "L", "hold", "least squares", "verdict",
-        "explained", "CPU, s",
+        "ship", "voyages", "usable, s", "windows of 100 s", "L on windows of, s", "L", "hold",
+        "least squares", "verdict", "explained", "CPU, s",
     )  # fmt: skip
     lines = [
         HEAD,
@@ -45,11 +45,13 @@ def _row(one: Way) -> tuple[object, ...]:
     evaluated, verdict = one.answers.get("evaluate"), one.answers.get("diagnose")
     usable = sum(v["usable_s"] or 0 for v in one.voyages)
     windows = sum(v["windows"] or 0 for v in one.voyages)
-    losses: tuple[object, ...] = ("-", "-", "-")
+    losses: tuple[object, ...] = ("-", "-", "-", "-")
     if evaluated:
         floors = evaluated["floors"]
-        losses = tuple(_number(x) for x in
-                       (evaluated["loss"], floors["hold"], floors["least_squares"]))  # fmt: skip
+        given = DATA_SETS[one.name].train
+        window = given[given.index("--window") + 1] if "--window" in given else str(WINDOW)
+        each = (evaluated["loss"], floors["hold"], floors["least_squares"])
+        losses = (window, *(_number(x) for x in each))
     said, explained = "-", "-"
     if verdict:
         named = ", ".join(dict.fromkeys(c["name"] for c in verdict["causes"]))
