@@ -130,10 +130,10 @@ def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
     ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]
     at = [0, *(int(elapsed[np.searchsorted(used, end)]) for end in ends), int(elapsed[-1]) + 1]
     named = [str(Part(name, begin, end)) for begin, end in pairwise(at) if begin < end]
-    parts_ = [
-        own.filter(pl.col("elapsed").is_between(a, b, closed="left")) for a, b in pairwise(at)
+    longest = [
+        _longest(own.filter(pl.col("elapsed").is_between(a, b, closed="left")))
+        for a, b in pairwise(at)
     ]
-    longest = [_longest(part) for part in parts_]
     if len(named) < 3 or min(longest) < size:
         raise StoreError(
             f"{name} is the only voyage with a window of {size} s, and too short to be split in "
@@ -149,7 +149,7 @@ def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
 
 def _longest(seconds: pl.DataFrame) -> int:
     """Seconds of the longest stretch without a missing one."""
-    return int(seconds.group_by("segment").len()["len"].max() or 0)  # type: ignore[arg-type]
+    return max(seconds.group_by("segment").len()["len"].to_list(), default=0)
 
 
 def _say_what_is_left_out(

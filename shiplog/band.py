@@ -38,8 +38,8 @@ def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float =
     """From errors [N, I, 6] of held-out rollouts and the model's own spread there.
 
     groups   voyages they are of. The quantile is that of a split conformal interval (Vovk et al.
-             2005) with each voyage one observation, since what one voyage brings (her wind, her
-             water) errs in all of her windows; with few voyages no further than MOST.
+             2005) with each voyage one observation, since what one voyage brings (its wind, its
+             water) errs in all of its windows; with few voyages no further than MOST.
 
     Rollouts that diverged are left out: no band would hold them.
     """

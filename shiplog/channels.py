@@ -25,8 +25,12 @@ class Channel:
     @property
     def label(self) -> str:
         """Axis title: degrees where a person reads angles."""
-        unit = {"rad": "deg", "rad/s": "deg/s"}.get(self.unit, self.unit)
-        return f"{self.name.replace('_', ' ')} {self.symbol} [{unit}]"
+        return f"{self.name.replace('_', ' ')} {self.symbol} [{self.display_unit}]"
+
+    @property
+    def display_unit(self) -> str:
+        """The unit on the axis."""
+        return {"rad": "deg", "rad/s": "deg/s"}.get(self.unit, self.unit)
 
     @property
     def to_display(self) -> float:

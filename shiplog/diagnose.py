@@ -136,7 +136,7 @@ class _Search:
     def _unexplained(self) -> list[Found]:
         """What unknown structures explain beside all that was found. Beside a thruster that nobody
         records none of motion is asked: it moves the ship as no model knows, and what is left of
-        that goes with her motion."""
+        that goes with its motion."""
         found = self.structures.found(self.point, self.base, self.included)
         return found if self.pulses is None else [f for f in found if f.name != MOVED]
 

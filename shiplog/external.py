@@ -1,7 +1,7 @@
 """Stretches that no force of the ship can explain: pushed, caught, towed or held by hand.
 
 A balance of forces. What is left unexplained, times mass with added mass, against all that the
-ship could do: her screws at full power with the rudders turned through their slipstream, and what
+ship could do: its screws at full power with the rudders turned through their slipstream, and what
 wind, hull and the model's usual misfit could add to that. A force beyond has come from outside.
 """
 
@@ -32,19 +32,19 @@ USUAL = 5.0  # times the spread of what this model leaves of this ship
 GUST = 1.2  # of the measured wind speed, from whichever side is worst
 STILL = 0.05  # of full power: below, a screw stands
 RESTS = 5.0  # s that screws have stood before their jets are gone
-RESTING = 0.5  # of her means that stay allowed then: a thruster that nobody records
+RESTING = 0.5  # of its means that stay allowed then: a thruster that nobody records
 DOUBT = 5.0  # s around a jump of position or heading, where velocities are not believed
 LEAST = 2.0  # s
 GAP = 5.0  # s: after a shorter break it is still the same event
 EDGE = 0.5  # an event begins and ends where its force passes half of the peak
-LOOSE = 0.5  # of her full acceleration: how far the knots may go before data pull them
+LOOSE = 0.5  # of its full acceleration: how far the knots may go before data pull them
 ANGLES = 13  # settings of a rudder that are tried
 TOWARDS = (("ahead", "astern"), ("to starboard", "to port"), ("to starboard", "to port"))
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """One event, in the channel where it is most beyond her.
+    """One event, in the channel where it is most beyond it.
 
     peak     the largest force [N], or moment [N m] where the channel is yaw_rate
     percent  of full thrust; of its full turning moment where the channel is yaw_rate
@@ -68,8 +68,8 @@ class Stretch:
         )
         return (
             f"A {what} of {abs(self.peak):.3g} {unit} {towards} ({self.percent:.0f} % of {full}) "
-            f"for {self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of hers does "
-            "that."
+            f"for {self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of its own "
+            "does that."
         )
 
     def as_json(self) -> dict:
@@ -108,7 +108,7 @@ def find(
     physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
     """
     if not physics.geometry.propellers and not physics.geometry.thrusters:
-        return ()  # who knows what drives her
+        return ()  # who knows what drives it
     weighed = balance(linear, d, unrest, record, physics, values)
     beyond = np.abs(weighed.force) > weighed.limit + SURE * weighed.sd
     beyond &= ~_contradicted(record, weighed.rows)[:, None]
@@ -279,7 +279,7 @@ def _event(
     high = np.flatnonzero(share[last + 1 :] < EDGE) + last + 1
 
     def crossing(inside: int, outside: int) -> float:
-        """When it passed EDGE; the knot inside, where that was beyond her but below EDGE."""
+        """When it passed EDGE; the knot inside, where that was beyond it but below EDGE."""
         way = (share[inside] - EDGE) / (share[inside] - share[outside])
         return float(time[inside] + max(way, 0.0) * (time[outside] - time[inside]))
 

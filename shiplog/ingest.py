@@ -27,9 +27,9 @@ CLOCKS = {  # of a source: its column, and the one that it is held against
     "publish": ("publish_time", "log_time"),
 }  # fmt: skip
 
-SHOWN = {  # of a sensor: the unit of its resolution, and its factor from SI
-    "position": ("m", 1.0), "velocity": ("m/s", 1.0), "heading": ("deg", 1.0 / channels.DEGREE),
-    "yaw_rate": ("deg/s", 1.0 / channels.DEGREE), "wind": ("m/s", 1.0),
+RESOLVED = {  # of a sensor: the channel whose unit its resolution has
+    "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
+    "yaw_rate": channels.YAW_RATE, "wind": channels.WIND_SPEED,
 }  # fmt: skip
 
 # Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
@@ -115,10 +115,10 @@ def build(reading: Reading, profile: Profile) -> Voyage:
 
 
 def _instrument(name: str, samples: align.Samples) -> Instrument:
-    unit, factor = SHOWN.get(name, ("", 0.0))
-    return Instrument(
-        name, round(1.0 / samples.period_s, 3), float(f"{samples.resolution * factor:.3g}"), unit
-    )
+    channel = RESOLVED.get(name)
+    finest = samples.resolution * channel.to_display if channel else 0.0
+    unit = channel.display_unit if channel else ""
+    return Instrument(name, round(1.0 / samples.period_s, 3), float(f"{finest:.3g}"), unit)
 
 
 def _span(base: np.ndarray, sampled: list[align.Samples]) -> tuple[int, int]:

@@ -215,7 +215,7 @@ class Run:
         return simulator.model, start, stand_in, simulator.theta[:count]
 
     def ship(self) -> tuple[MMG, Start]:
-        """Her MMG as somebody published it, or as her particulars suggest: fitted to nothing."""
+        """Its MMG as somebody published it, or as its particulars suggest: fitted to nothing."""
         geometry, usual = self._published()
         return mmg.MMG(geometry), Start(usual.values, usual.spread, usual.low, usual.high)
 

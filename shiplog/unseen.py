@@ -190,7 +190,7 @@ def _heading(psi: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.nda
 
 
 def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndarray]:
-    """Bumps over the places she was at: forces in body axes, and earth-fixed ones turned there."""
+    """Bumps over the places it was at: forces in body axes, and earth-fixed ones turned there."""
     centres = [place.mean(0)]
     for _ in range(PLACES - 1):  # each as far as can be from those before
         away = np.min([((place - c) ** 2).sum(1) for c in centres], axis=0)

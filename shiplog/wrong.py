@@ -243,7 +243,7 @@ def _wind(data: Series) -> Iterator[Regime]:
 
 
 def _place(data: Series, geodetic: bool) -> Iterator[Regime]:
-    """Quarters of where she was, and of where she looked. A local frame need not face north."""
+    """Quarters of where it was, and of where it looked. A local frame need not face north."""
     x0, y0 = data.measured[..., 0], data.measured[..., 2]
     north, east = x0 >= np.median(x0), y0 >= np.median(y0)
     for up, long in ((True, "north"), (False, "south")):

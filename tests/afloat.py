@@ -1,4 +1,4 @@
-"""Records in memory: the known ship's own voyages, and the project's MMG under her helm."""
+"""Records in memory: the known ship's own voyages, and the project's MMG under its helm."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WIDE = Wide(
     np.array([1.0, 0.3, 1.0, 0.3, 0.2, 0.1]),
     np.array([0.02, 0.02, 0.02]),
 )
-UNREST = Unrest(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes her
+UNREST = Unrest(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes it
     np.array([0.007, 0.0076, 0.0066, 0.0073, 0.0006, 0.0013]),
     np.array([7e-4, 7e-4, 5e-4]),
     4.0,
@@ -57,7 +57,7 @@ def controls(sailed: known_ship.Voyage) -> np.ndarray:
 def record(
     sailed: known_ship.Voyage, state: np.ndarray | None = None, noise: float = 1.0
 ) -> Record:
-    """A voyage at 10 Hz with instruments' noise; `state` [K, 6] instead of her own path."""
+    """A voyage at 10 Hz with instruments' noise; `state` [K, 6] instead of its own path."""
     rng = np.random.default_rng(1)
     if state is None:
         state = np.stack(
@@ -78,7 +78,7 @@ def record(
 
 
 def pushed(sailed: known_ship.Voyage, push: np.ndarray) -> np.ndarray:
-    """States [K, 6] of the project's MMG, with her controls and wind, under `push` [K, 3]: forces
+    """States [K, 6] of the project's MMG, with its controls and wind, under `push` [K, 3]: forces
     in N and N m that no actuator makes. Explicit Euler at 0.1 s."""
     start = jnp.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
     return np.asarray(_sail(start, controls(sailed), true_wind(sailed), push))

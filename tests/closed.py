@@ -27,7 +27,7 @@ def path(t: np.ndarray) -> np.ndarray:
 
 
 def apparent(state: np.ndarray) -> np.ndarray:
-    """The wind she feels [n, 2], ahead and to starboard."""
+    """The wind it feels [n, 2], ahead and to starboard."""
     c, s = np.cos(state[:, 4]), np.sin(state[:, 4])
     north, east = TRUE_WIND
     return np.stack((c * north + s * east + state[:, 1], c * east - s * north + state[:, 3]), -1)

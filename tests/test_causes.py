@@ -23,7 +23,7 @@ from shiplog.record import Record
 TWIN = profiles.load("esso-vectwin")  # velocity over ground, by an antenna 0.3 m ahead
 SINGLE = profiles.load("esso-osaka")  # velocity in body axes, at midship; one rudder
 LOG = TWIN.sensors.velocity.model_copy(update={"kind": "body", "lever_arm_m": (0.8, -0.2)})
-APART = TWIN.model_copy(  # a speed log of her own: where the antenna stands is no matter to it
+APART = TWIN.model_copy(  # a speed log of its own: where the antenna stands is no matter to it
     update={"sensors": TWIN.sensors.model_copy(update={"velocity": LOG})}
 )
 FERRY = profiles.load("milliampere")  # neither rudder nor wind sensor nor gyro
@@ -283,7 +283,7 @@ NORTH, EAST = 0.11, -0.07
 
 
 def free_body(state: np.ndarray, off: tuple[str, ...] = ("propeller", "rudder", "wind")):
-    """Acceleration of a hull that no water holds, in a current, and her masses m_x, m_y, I."""
+    """Acceleration of a hull that no water holds, in a current, and its masses m_x, m_y, I."""
     model, values = extended([Current()], without=off)
     names = model.base.names
     free = np.array([n.startswith("hull.") for n in names])
@@ -307,7 +307,7 @@ def drifting(heading, rate) -> np.ndarray:
 
 
 def test_a_ship_at_rest_in_the_water_drifts_with_the_current():
-    """Her hull feels the water and not the ground: adrift she keeps her way, held she does not."""
+    """Its hull feels the water and not the ground: adrift it keeps its way, held it does not."""
     heading = np.linspace(-3.0, 3.0, 13)
     model, values = extended([Current()], without=("propeller", "rudder", "wind"))
     still = np.zeros((13, 4)), np.zeros((13, 2))
@@ -319,7 +319,7 @@ def test_a_ship_at_rest_in_the_water_drifts_with_the_current():
 
 def test_turning_in_a_current_by_hand():
     """The free body moves through the water by its own equations; over ground, the water's
-    velocity in body axes turns away under her: d/dt(RᵀV) = r (V_y, -V_x) in body axes."""
+    velocity in body axes turns away under it: d/dt(RᵀV) = r (V_y, -V_x) in body axes."""
     rng = np.random.default_rng(4)
     heading, r = rng.uniform(-3, 3, 20), rng.uniform(-0.2, 0.2, 20)
     u, v = rng.uniform(-0.5, 0.5, 20), rng.uniform(-0.2, 0.2, 20)  # through the water
@@ -339,7 +339,7 @@ def test_turning_in_a_current_by_hand():
 
 
 def test_wind_over_ground_and_not_over_the_water():
-    """A current that carries the ship leaves the wind that she feels over ground as it is."""
+    """A current that carries the ship leaves the wind that it feels over ground as it is."""
     model, values = extended([Current()], without=("propeller", "rudder"))
     heading = np.linspace(-3.0, 3.0, 13)
     wind = np.tile([3.0, 1.0], (13, 1))
@@ -379,7 +379,7 @@ def test_payload_by_the_rigid_body_equations():
 
 
 def forces(label: str, numbers, state, actuator, wind, without=()) -> np.ndarray:
-    """X, Y, N of a ship that does not turn, from her accelerations: mass times acceleration."""
+    """X, Y, N of a ship that does not turn, from its accelerations: mass times acceleration."""
     cause = BY[label].on(setting())
     model, values = extended([cause], without=without)
     found = acceleration(model, values, numbers, state, actuator, wind)
@@ -680,7 +680,7 @@ MISSING = {
 @EVERY
 def test_what_a_ferry_cannot_be_asked(cause):
     """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested.
-    What turns her thrusters may be late or aslant as a rudder may."""
+    What turns its thrusters may be late or aslant as a rudder may."""
     said = cause.missing(setting(FERRY))
     if cause.label not in MISSING:
         assert said is None
@@ -912,7 +912,7 @@ def test_a_ship_that_stays_has_no_map_of_the_bottom():
 
 
 def test_sizes_follow_the_ship():
-    """Shares of her speed, length and mass; a ship twice as fast meets twice the current."""
+    """Shares of its speed, length and mass; a ship twice as fast meets twice the current."""
     plain = setting()
     fast = replace(plain, scale={**plain.scale, "speed": 1.2, "length": 300.0})
     assert Current().sizes(fast) == pytest.approx(2.0 * Current().sizes(plain))

@@ -1,7 +1,7 @@
 """From logs to a verdict on the known ship, with seeds that nobody looked at before.
 
-One campaign of hers as she is and one with a current go the whole way through MCAP, the store and
-the pipelines; what is usual for her is learnt there once. Other trials are then judged against it.
+One campaign of the ship as it is and one with a current go the whole way through MCAP, the store
+and the pipelines; what is usual for it is learnt there once. Other trials are judged against it.
 """
 
 import json
@@ -60,7 +60,7 @@ from shiplog.causes import Cause, Parameter
 class Tide(Cause):
     name = "far_tether"
     kind = "environment"
-    story = "A long line pulls her."
+    story = "A long line pulls it."
     equation = "X₀ = {north:.2f} N, Y₀ = {east:.2f} N along the earth's axes"
     parameters = (Parameter("north", "N", 1.0, 0.1), Parameter("east", "N", 1.0, 0.1))
 
@@ -308,7 +308,7 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
     theta = held.before.theta.copy()
     theta[
         list(held.before.model.names).index("hull.x_0f")
-    ] *= -200.0  # drives her instead of braking
+    ] *= -200.0  # drives it instead of braking
     wild = HeldOut(held.cut, replace(held.before, theta=theta), held.trial)
     said = wild.lost(None)
     assert "worse than one that keeps its velocities" in said
@@ -319,7 +319,7 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
              "the propeller's sign turned round", "the wind blowing towards"),
 )  # fmt: skip
 def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
-    """Each is its own inverse: turned back, the model is as good as it was. Her current is in it:
+    """Each is its own inverse: turned back, the model is as good as it was. Its current is in it:
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
     (turned,) = [w for s, w in conventions.other(PROFILE, cut) if said in s]
@@ -1036,7 +1036,7 @@ def turned(seen):
 
 
 def mirrored(seen):
-    """Port is starboard: the ship, her rudders, the pond and the wind."""
+    """Port is starboard: the ship, its rudders, the pond and the wind."""
     state = seen.state * [1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
     actuator = seen.actuator[:, [1, 0, 2]] * [-1.0, -1.0, 1.0]
     return replace(seen, state=state, actuator=actuator, wind=seen.wind * [1.0, -1.0])

@@ -24,7 +24,7 @@ def found(record) -> tuple[Stretch, ...]:
 
 
 def under(sailed, force, noise=1.0):
-    """Her record with `force` (X, Y in N, N in N m) on her from START to END."""
+    """Its record with `force` (X, Y in N, N in N m) on it from START to END."""
     push = np.zeros((len(sailed.time), 3))
     push[(sailed.time >= START) & (sailed.time < END)] = force
     return afloat.record(sailed, afloat.pushed(sailed, push), noise)
@@ -54,7 +54,7 @@ def test_what_she_could_do_herself_is_no_push(sailed):
 
 
 def test_another_ship_under_a_crude_model_is_not_pushed(sailed):
-    """The known ship shares no formula with the estimated MMG that she is judged by."""
+    """The known ship shares no formula with the estimated MMG that it is judged by."""
     assert found(afloat.record(sailed)) == ()
 
 

@@ -74,7 +74,7 @@ def test_marin_at_hsvas_scale_keeps_what_froude_keeps(shared_data):
 
 
 def turning(seconds: float = 60.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """A ship on a circle of 10 m at 0.5 m/s, 10 Hz, her rudder a slow sine."""
+    """A ship on a circle of 10 m at 0.5 m/s, 10 Hz, its rudder a slow sine."""
     t = np.arange(0.0, seconds, 0.1)
     heading = 0.05 * t
     return t, {

@@ -152,7 +152,7 @@ def test_the_mirrored_ship_sails_the_mirrored_path():
         helm=mirrored, start=(1, 0.3, -2, -0.1, -0.4, 0.02),
     )  # fmt: skip
     assert state(other) == pytest.approx(state(one) * (1, 1, -1, -1, -1, -1), abs=1e-8)
-    # and the ship as she is does not: her propeller turns one way only
+    # and the ship as it is does not: its propeller turns one way only
     asymmetric = sail(60.0, seed=0, wind=CALM, helm=hold(0, 0, 10), start=(0,) * 6)
     assert np.rad2deg(asymmetric.yaw_rate[-1]) > 0.1
 
@@ -387,7 +387,7 @@ def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
     assert shallow.surge[-1] < 0.98 * deep.surge[-1]
     elsewhere = sail(60.0, **kept, effects=replace(effects, shoal_east=2000.0))
     assert state(elsewhere) == pytest.approx(state(deep), abs=1e-5)
-    # more water moves with her: the same push aside, from rest, gets her under way more slowly
+    # more water moves with it: the same push aside, from rest, gets it under way more slowly
     out = np.empty((2, 11))
     at_rest = np.zeros(11)
     at_rest[[0, 2]] = 5.0, -3.0
@@ -783,7 +783,7 @@ def test_a_case_is_logs_without_a_trace_and_a_key_elsewhere(tmp_path):
             records = [(m.name, m.metadata) for m in reader.iter_metadata()]
             described.append((channels, schemas, records, list(reader.iter_attachments())))
     assert described[0] == described[1]
-    assert described[0][2][0][1]["ship"] == Ship().name  # her own name would tell the seed
+    assert described[0][2][0][1]["ship"] == Ship().name  # its own name would tell the seed
 
     key = json.loads((tmp_path / "keys" / "hidden.json").read_text())
     assert [c["name"] for c in key["causes"]] == ["side_thrust", "heading_offset"]

@@ -40,7 +40,7 @@ def state(voyage) -> np.ndarray:
 # --- the sample logs' laws --------------------------------------------------------------------
 
 
-WITHOUT_LAWS = {  # where she ended after 120 s when forces had no `Laws`
+WITHOUT_LAWS = {  # where it ended after 120 s when forces had no `Laws`
     "everything": (
         Effects(
             turbulence=1.0, shallow_water=1.1, shoal_length=6.0, shoal_north=3.0, shoal_east=-2.0,
@@ -158,7 +158,7 @@ def test_suction_lever_and_power_of_speed_are_the_banks():
 
 
 def test_cross_flow_drag_follows_its_powers():
-    """∫|2ξ|^m dξ over the hull is 1/(m + 1); a skewed end growth turns her in pure sway."""
+    """∫|2ξ|^m dξ over the hull is 1/(m + 1); a skewed end growth turns it in pure sway."""
     ship = Ship()
     law = Hull(cross_flow_power=1.8, end_growth=1.4, end_power=3.0, end_skew=0.4)
     c = physics.coefficients(ship, replace(Laws(), hull=law))

@@ -323,7 +323,7 @@ def test_what_was_not_used_does_not_pull():
 
 
 def test_a_linearisation_expects_where_its_path_will_be_pulled():
-    """Nothing pushes her, but the rudder turns her by a tenth less than the model has it: pulled,
+    """Nothing pushes it, but the rudder turns it by a tenth less than the model has it: pulled,
     the path says so by a push. Once the model has it right there is none, and what is expected
     before that is linearised there is off by what is not linear: a tenth of the tenth."""
     true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
@@ -347,8 +347,8 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
 
 
 def weaving(late: float) -> Record:
-    """A ship that the toy is exactly, her rudder weaving 0.3 sin(0.8 t), acting `late`:
-    ṙ = b δ - c r in closed form; she lies still otherwise."""
+    """A ship that the toy is exactly, its rudder weaving 0.3 sin(0.8 t), acting `late`:
+    ṙ = b δ - c r in closed form; it lies still otherwise."""
     t = SEEN.time
     w, amplitude = 0.8, 0.3
     phase = np.arctan2(w, DAMP)

@@ -107,7 +107,7 @@ def test_headings_run_on_and_gaps_are_bridged_the_short_way():
 def test_wind_comes_as_components():
     found = read(table(50))
     assert found.wind == pytest.approx(np.tile([0.0, 2.0], (50, 1)), abs=1e-12)
-    # at 1 m/s ahead, heading north: the true wind comes from 1 m/s astern of what she feels
+    # at 1 m/s ahead, heading north: the true wind comes from 1 m/s astern of what it feels
     assert found.true_wind == pytest.approx(np.tile([-1.0, 2.0], (50, 1)), abs=1e-12)
     quiet = table(50).drop("wind_speed", "wind_angle")
     calm = PROFILE.model_copy(update={"sensors": PROFILE.sensors.model_copy(update={"wind": None})})

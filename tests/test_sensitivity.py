@@ -103,7 +103,7 @@ def test_a_ship_at_rest_heading_north_has_an_east_wind_from_starboard():
 @pytest.mark.parametrize(
     ("state", "true", "apparent"),
     [  # x0, u, y0, v, ψ, r; worked by hand
-        ((0, 2, 0, 0, 0, 0), (0, 0), (2, 0)),  # her own speed comes from ahead
+        ((0, 2, 0, 0, 0, 0), (0, 0), (2, 0)),  # its own speed comes from ahead
         ((0, 0, 0, 1, 0, 0), (0, 0), (1, math.pi / 2)),  # drifting to starboard, from starboard
         ((0, 0, 0, 0, math.pi / 2, 0), (3, 0), (3, -math.pi / 2)),  # heading east, north to port
         ((9, 4, 9, 0, math.pi, 0.1), (-1, -3), (math.hypot(5, 3), math.atan2(3, 5))),

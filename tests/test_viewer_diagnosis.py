@@ -25,7 +25,7 @@ def straight(voyage, speed):
 
 
 def tracks(voyage, model, speed):
-    """Two windows of 100 s, each from where the ship was; she went 0.5 m/s."""
+    """Two windows of 100 s, each from where the ship was; it went 0.5 m/s."""
     return straight(voyage, speed).select(
         pl.lit(model).alias("model"), "voyage", (pl.col("time") // 100).cast(pl.Int64)
         .alias("window"), "time",

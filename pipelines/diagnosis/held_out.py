@@ -115,7 +115,7 @@ class HeldOut(Rollouts):
         A cause of the error makes it less, and surely so where little evidence speaks for it: what
         is outside the catalogue looks a little like something in it. An instrument's fault is a
         fault though it is worth nothing, but not where it makes the error more; so is what differs
-        from her nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
+        from its nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
         steps of a second hide a lag of a third of one. A model that has learned of it, and gains
         by being fitted again beside it, is so without each cause, too. Of two voyages the other
         need not know what one shows: what is there beyond doubt is asked again by their halves.
@@ -184,7 +184,7 @@ class HeldOut(Rollouts):
         )  # fmt: skip
 
     def _sure(self, one: Named, alone: bool) -> bool:
-        """Whether it differs from her nominal campaign beyond doubt, or from all that a smooth
+        """Whether it differs from its nominal campaign beyond doubt, or from all that a smooth
         function of a network's inputs says."""
         ref = self.trial.reference
         wanted = diagnose.SURE * (1.0 if alone else BESIDE)
@@ -225,7 +225,7 @@ class HeldOut(Rollouts):
 
     def lost(self, found: Gain | None) -> str:
         """Why no name would be believed: a sign turned round does far more for the rollouts than
-        all that was named, or they are worse than a ship that keeps her velocities, with what was
+        all that was named, or they are worse than a ship that keeps its velocities, with what was
         named in them too. Empty where neither holds."""
         own = float(self.losses_before.sum(1).mean())
         after = own if found is None else min(own, found.after)

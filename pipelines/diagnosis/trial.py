@@ -139,13 +139,13 @@ def model_of(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Exten
 
 
 def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[str, np.ndarray]:
-    """What these causes' forces need, as the run has it or as her setting says."""
+    """What these causes' forces need, as the run has it or as its setting says."""
     held = {} if run.extension is None else run.extension.constants
     return constants_of(causes, setting) | dict(held)
 
 
 def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
-    """Ship and place of a diagnosis; her speed is that of the `usual` voyages."""
+    """Ship and place of a diagnosis; its speed is that of the `usual` voyages."""
     speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     places, spacing = _places(recorded, PLACES)

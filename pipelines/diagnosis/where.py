@@ -1,4 +1,4 @@
-"""Where a model is wrong: by channel, where it never was, where no force of hers explains it."""
+"""Where a model is wrong: by channel, where it never was, where no force of its own explains it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The 3 m Esso Osaka: her sensors, her published model, her own identified one, her wind."""
+"""The 3 m Esso Osaka: its sensors, its published model, its own identified one, its wind."""
 
 from __future__ import annotations
 

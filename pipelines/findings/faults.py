@@ -1,7 +1,7 @@
 """Known faults, written into measured voyages.
 
-The ship and her model, the waves, the wind and the noise are not ours; one thing is changed in what
-two of her voyages recorded. Her model was learned from the others. What is written is worked out
+The ship and its model, the waves, the wind and the noise are not ours; one thing is changed in what
+two of its voyages recorded. Its model was learned from the others. What is written is worked out
 here from the table alone, and shares nothing with the causes that are to find it.
 """
 
@@ -161,7 +161,7 @@ def _late(c: Columns, t: np.ndarray, seconds: float, *names: str) -> None:
 
 
 def _ahead(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
-    """What is shown, that the ship's own follows with this time constant; of her own without steps,
+    """What is shown, that the ship's own follows with this time constant; of its own without steps,
     or what is shown would be a row of spikes."""
     second = np.ones(11) / 11.0
     for n in _of(c, name):

@@ -50,7 +50,7 @@ class Settings:
 
     jobs: int = 1
     keep: bool = False  # logs, store, base and report of each case
-    share: bool = False  # one base model for all cases of a ship: her nominal campaign is the same
+    share: bool = False  # one base model for all cases of a ship: its nominal campaign is the same
     rivals: bool = False  # simpler methods too, once the verdict is sealed
     former: bool = False  # and today's decision, once the verdict is sealed
     oracle: bool = False  # and what the truth would gain, once the verdict is sealed

@@ -1,4 +1,4 @@
-"""Blind cases: a sister ship, a campaign of hers as she is, and one with something hidden in it.
+"""Blind cases: a sister ship, a campaign of it as it is, and one with something hidden in it.
 
 All of a case follows from its seed. What is hidden is drawn apart from ship, laws, weather, helm
 and noise: the same seed with another cause is the same campaign with another cause. The logs do
@@ -110,7 +110,7 @@ def _wind_force(rng: np.random.Generator, size: float) -> Drawn:
 
 
 def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
-    """A shoal whose line runs some way through the part of the pond that she uses."""
+    """A shoal whose line runs some way through the part of the pond that it uses."""
     strength, length = _within(rng, 0.5, 1.2) * size, rng.uniform(4.0, 10.0)
     off, at, towards = rng.uniform((0.0, -np.pi, -np.pi), (15.0, np.pi, np.pi))
     north, east = off * math.cos(at), off * math.sin(at)
@@ -307,7 +307,7 @@ def draw(
         effects = replace(effects, **changes)
         causes.append(Cause(name, large, parameters, family))
     return Case(
-        seed=seed, ship=replace(varied(seed), name=Ship().name),  # her name would tell the seed
+        seed=seed, ship=replace(varied(seed), name=Ship().name),  # its name would tell the seed
         laws=laws.drawn(_stream(seed, "laws")),
         causes=tuple(causes), ordinary=ordinary, effects=effects,
         nominal=_legs(seed, "nominal", NOMINAL_DAY, DURATIONS[NOMINAL[seconds]]),

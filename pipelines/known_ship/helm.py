@@ -76,8 +76,8 @@ MANOEUVRES = (  # what, how often, shortest and longest [s]
 class Operator:
     """Draws a manoeuvre, holds it for a while, and turns back when the bank comes near.
 
-    He sees the pond and the ship, never her instruments: what is hidden in a sensor does not
-    change her path.
+    He sees the pond and the ship, never its instruments: what is hidden in a sensor does not
+    change its path.
     """
 
     rng: np.random.Generator

@@ -1,4 +1,4 @@
-"""The numbers of the known ship, and what can be hidden in her, in her sensors or in the water."""
+"""The numbers of the known ship, and what can be hidden in it, in its sensors or in the water."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Ship:
     wind_yaw_2: float = 0.100  # N'_2, sin 2γ
 
     def symmetrical(self) -> Ship:
-        """The same ship with a propeller that does not rotate her jet: port mirrors starboard."""
+        """The same ship with a propeller that does not rotate its jet: port mirrors starboard."""
         return replace(self, swirl=0.0, port_share=0.5)
 
 

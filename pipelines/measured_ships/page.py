@@ -23,15 +23,13 @@ fit a quadratic by least squares to the training voyages.
 
 
 def text(ways: Sequence[Way]) -> str:
-    """The page, with the commits whose answers these are."""
-    programs = dict.fromkeys(name for one in ways for name in one.programs)
+    """The page: a table, and each data set's answer below it."""
     head = (
         "ship", "voyages", "usable, s", "windows of 100 s", "L on windows of, s", "L", "hold",
         "least squares", "verdict", "explained", "CPU, s",
     )  # fmt: skip
     lines = [
         HEAD,
-        f"Program: {', '.join(programs)}.\n",
         report.table(head, [_row(one) for one in ways]),
         "",
     ]

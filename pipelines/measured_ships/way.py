@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipelines.hidden_effects import program
 from pipelines.hidden_effects.run import DONE, LOST, OUR_SHIPLOG, Settings, step
 from pipelines.measured_ships.ships import DataSet
 
@@ -25,7 +24,6 @@ class Way:
     stopped   the sentence with which a command ended the way; empty where none did
     answers   of `voyages`, `evaluate` and `diagnose`: their JSON, where they came to one
     cpu_s     of all commands together
-    programs  whose commands they were
     """
 
     name: str
@@ -33,7 +31,6 @@ class Way:
     answers: dict[str, Any]
     cpu_s: float
     traceback: bool
-    programs: tuple[str, ...]
 
     @property
     def voyages(self) -> list[dict[str, Any]]:
@@ -64,8 +61,7 @@ def go(name: str, one: DataSet, data: Path, out: Path) -> Way:
     said = said.replace(f"{folder}/", "")
     answers = {p.stem: json.loads(p.read_text("utf-8")) for p in folder.glob("*.answer")}
     traced = any("Traceback" in s["stderr"] or "unexpected fault" in s["stderr"] for s in done)
-    programs = program.names(done, [s["step"] for s in done])
-    return Way(name, said, answers, sum(s["cpu_s"] for s in done), traced, programs)
+    return Way(name, said, answers, sum(s["cpu_s"] for s in done), traced)
 
 
 def _commands(one: DataSet, data: Path, folder: Path):

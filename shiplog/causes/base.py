@@ -131,7 +131,7 @@ class Cause:
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
     rough: ClassVar[bool] = False  # no two waters have its form: what it leaves is not another's
-    answers: ClassVar[bool] = False  # it is how she answers to forces: to unknown ones nobody knows
+    answers: ClassVar[bool] = False  # it is how it answers to forces: to unknown ones nobody knows
 
     @property
     def label(self) -> str:
@@ -149,7 +149,7 @@ class Cause:
 
     @property
     def renames(self) -> bool:
-        """Whether it only says otherwise what drives the ship or where she is measured: a network
+        """Whether it only says otherwise what drives the ship or where it is measured: a network
         that is fitted to the affected data, without symmetry or origin, takes that in, too."""
         return False
 

@@ -88,7 +88,7 @@ class WindForce(Cause):
         return np.ones(3) if self.lacking else super().sizes(setting)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        if self.lacking:  # which way it turns her depends on what stands on deck
+        if self.lacking:  # which way the wind turns the ship depends on what stands on deck
             return np.array([0.0, 0.0, -3.0]), np.full(3, np.inf)
         return super().bounds(setting)
 

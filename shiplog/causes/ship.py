@@ -241,7 +241,7 @@ class Payload(Cause):
 
 
 def _steering(profile: Profile) -> list[int]:
-    """Columns of the rudders; of a ship without, of what turns her thrusters."""
+    """Columns of the rudders; of a ship without, of what turns its thrusters."""
     return _columns(profile, "rudder") or _columns(profile, "azimuth")
 
 

@@ -47,7 +47,7 @@ ACTUATORS = (  # kind, how its column is called, the unit where nothing says one
     ("propeller", r"(.*_)?(rpm|rps|n_prop|prop\w*|shaft\w*|revs?)(_\w+|\d)?|n_?\d?", "rps"),
     ("thruster", r"(thr\w*|throttle\w*|pwm\w*|motor\w*|esc\w*|servo\w*)", "1"),
 )
-LABELS = {
+LABEL_COLUMNS = {  # how a label's column is called
     "time": r"t(_(s|sec|ms|us|ns|utc))?|time\w*|stamp\w*|utc\w*|(base_?)?date_?time|epoch\w*|"
             r"unix\w*|.*_timestamp|(gps|gnss|log|rec)_?time\w*",
     "date": r"date(_utc)?|day|(gps|gnss|utc)_?date",
@@ -143,7 +143,7 @@ def _matching(frame: pl.DataFrame, pattern: str, channel: str, taken: Iterable[s
 def _labels(table: Table, path: Path, vessel: str | None) -> list[Found]:
     frame = table.frame
     labels: list[Found] = []
-    for channel, pattern in LABELS.items():
+    for channel, pattern in LABEL_COLUMNS.items():
         names = [n for n in frame.columns if re.fullmatch(pattern, words.bare(n))]
         if channel == "time":
             names = [n for n in frame.columns if isinstance(frame[n].dtype, pl.Datetime)] + names

@@ -234,7 +234,7 @@ def rudder(p: Particulars, area: float, span: float) -> dict[str, float]:
 def wind(p: Particulars) -> dict[str, float]:
     """Fujiwara's coefficients for a superstructure in the Esso Osaka's proportions.
 
-    A boat broader than L/5 gets the coefficients of one that broad and of her height-to-breadth
+    A boat broader than L/5 gets the coefficients of one that broad and of its height-to-breadth
     ratio. As a last guard X₁ is limited to [-1.5, -0.3], Y₁ to [0.5, 1.4] and the rest to ±0.3.
     """
     narrower = min(1.0, BROADEST * p.length / p.breadth)
