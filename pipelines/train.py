@@ -21,7 +21,7 @@ import torch
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import choose_split, plan, refuse_shared_rows, say
-from shiplog import band, engine, runs, seeds, train, windows
+from shiplog import band, runs, seeds, train, windows
 from shiplog.arguments import refuse_taken
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
@@ -31,6 +31,7 @@ from shiplog.runs import Run
 from shiplog.simulate import simulate
 from shiplog.store import Store
 from shiplog.train import Progress
+from shiplog.training import network_gradient
 from shiplog.windows import Windows
 
 log = logging.getLogger(__name__)
@@ -143,7 +144,9 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
     learnt = _cut(run, run.training(), run.windows())
     learnt = windows.jittered(learnt, seeds.generator(seed, "jitter"))
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
-    training, validation = (engine.batch(w, scale, shape, torch.float32) for w in (learnt, held))
+    training, validation = (
+        network_gradient.batch(w, scale, shape, torch.float32) for w in (learnt, held)
+    )
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
 
     def keep(progress: Progress) -> None:

@@ -14,10 +14,11 @@ import torch
 from scipy.optimize import minimize
 from torch import Tensor
 
-from shiplog import engine, seeds
+from shiplog import seeds
 from shiplog.config import Fast, Paper
-from shiplog.engine import Batch
 from shiplog.models.feedforward import FeedForward
+from shiplog.training import network_gradient
+from shiplog.training.network_gradient import Batch
 
 HISTORY = ("epoch", "training", "validation", "smoothed")
 
@@ -58,27 +59,24 @@ def paper(
     The regulariser λ‖θ‖² of Eq. 7 has the gradient 2λθ, which is Adam's `weight_decay`.
     """
     weights = [p.detach().clone() for p in model.weights]
+    moments = [torch.zeros_like(w) for w in [*weights, *weights]]
     scale = (model.scaling, model.shape)
-    parameters = [torch.nn.Parameter(w) for w in weights]
-    adam = torch.optim.Adam(
-        parameters,
-        lr=settings.learning_rate,
-        weight_decay=2.0 * settings.regularisation,
-        foreach=True,
-    )
+    rate, decay = settings.learning_rate, 2.0 * settings.regularisation
     stream = seeds.generator(seed, "batches")
     if resume is None:
-        start = engine.loss_only(weights, validation, *scale)
+        start = network_gradient.loss_only(weights, validation, *scale)
         progress = Progress(0, weights, [w.clone() for w in weights], start, start, start)
         progress.history.append((0, math.nan, start, start))
     else:
         progress = resume
-        _restore(parameters, adam, stream, progress)
+        weights = [w.clone() for w in progress.weights]
+        moments = [m.clone() for m in progress.moments] or moments
+        if progress.stream is not None:
+            stream.set_state(progress.stream)
 
     def snapshot() -> None:
-        progress.weights = [p.detach().clone() for p in parameters]
-        states = [adam.state[p] for p in parameters]
-        progress.moments = [s[k].clone() for k in ("exp_avg", "exp_avg_sq") for s in states if s]
+        progress.weights = [w.clone() for w in weights]
+        progress.moments = [m.clone() for m in moments]
         progress.stream = stream.get_state()
 
     count = training.velocity.shape[1]
@@ -88,16 +86,13 @@ def paper(
         for rows in torch.tensor_split(torch.randperm(count, generator=stream), settings.subsets):
             if len(rows) == 0:
                 continue
-            values = [p.detach() for p in parameters]
-            loss, gradients = engine.loss_and_gradient(values, training.pick(rows), *scale)
-            for parameter, gradient in zip(parameters, gradients, strict=True):
-                parameter.grad = gradient
-            adam.step()
+            picked = training.pick(rows)
+            loss, gradients = network_gradient.loss_and_gradient(weights, picked, *scale)
             progress.steps += 1
+            network_gradient.adam(weights, moments, gradients, progress.steps, rate, decay)
             total += loss * len(rows) / count
-        values = [p.detach() for p in parameters]
-        loss = engine.loss_only(values, validation, *scale)
-        _note(progress, values, total, loss, settings.smoothing)
+        loss = network_gradient.loss_only(weights, validation, *scale)
+        _note(progress, weights, total, loss, settings.smoothing)
         if checkpoint is not None and progress.epoch % every == 0:
             snapshot()
             checkpoint(progress)
@@ -113,24 +108,6 @@ def _paper_done(progress: Progress, settings: Paper) -> bool:
     latest = progress.history[-1][2]
     limit = settings.rise * (progress.first - progress.best) + progress.best
     return progress.epoch > settings.least_epochs and latest > limit
-
-
-def _restore(parameters, adam, stream: torch.Generator, progress: Progress) -> None:
-    """Put weights, Adam's moments and the random stream back."""
-    with torch.no_grad():
-        for parameter, weight in zip(parameters, progress.weights, strict=True):
-            parameter.copy_(weight)
-    if progress.moments:
-        half = len(progress.moments) // 2
-        for parameter, mean, square in zip(
-            parameters, progress.moments[:half], progress.moments[half:], strict=True
-        ):
-            adam.state[parameter] = {
-                "step": torch.tensor(float(progress.steps)), "exp_avg": mean.clone(),
-                "exp_avg_sq": square.clone(),
-            }  # fmt: skip
-    if progress.stream is not None:
-        stream.set_state(progress.stream)
 
 
 def _note(
@@ -155,7 +132,7 @@ def fast(
     """
     scale = (model.scaling, model.shape)
     weights = [p.detach().clone() for p in model.weights]
-    start = engine.loss_only(weights, validation, *scale)
+    start = network_gradient.loss_only(weights, validation, *scale)
     progress = Progress(0, weights, [w.clone() for w in weights], start, start, start)
     progress.history.append((0, math.nan, start, start))
     _warm_start(weights, training, scale, settings, seed)
@@ -171,7 +148,7 @@ def fast(
     latest = {"training": math.nan}
 
     def objective(flat: np.ndarray) -> tuple[float, np.ndarray]:
-        loss, gradients = engine.loss_and_gradient(unpack(flat), training, *scale)
+        loss, gradients = network_gradient.loss_and_gradient(unpack(flat), training, *scale)
         latest["training"] = loss
         slope = torch.cat([g.flatten() for g in gradients]).double().numpy()
         if not (math.isfinite(loss) and np.isfinite(slope).all()):
@@ -182,7 +159,7 @@ def fast(
     def after(flat: np.ndarray) -> None:
         progress.epoch += 1
         values = unpack(flat)
-        loss = engine.loss_only(values, validation, *scale)
+        loss = network_gradient.loss_only(values, validation, *scale)
         _note(progress, values, latest["training"], loss, settings.smoothing)
         best_at = min(progress.history[1:], key=lambda row: row[2])[0]
         if progress.epoch - best_at >= settings.patience:
@@ -212,8 +189,7 @@ def _warm_start(
     """Adam on windows of a few steps, in place; learning rate falling to zero on a cosine."""
     pieces = shortened(training, settings.warm_steps)
     count = pieces.velocity.shape[1]
-    parameters = [torch.nn.Parameter(w) for w in weights]
-    adam = torch.optim.Adam(parameters, lr=settings.warm_learning_rate, foreach=True)
+    moments = [torch.zeros_like(w) for w in [*weights, *weights]]
     stream = seeds.generator(seed, "warm start")
     total = settings.warm_epochs * settings.warm_subsets
     step = 0
@@ -223,13 +199,10 @@ def _warm_start(
             if len(rows) == 0:
                 continue
             fall = 0.5 * (1.0 + math.cos(math.pi * step / total))
-            adam.param_groups[0]["lr"] = settings.warm_learning_rate * fall
-            values = [p.detach() for p in parameters]
-            _, gradients = engine.loss_and_gradient(values, pieces.pick(rows), *scale)
-            for parameter, gradient in zip(parameters, gradients, strict=True):
-                parameter.grad = gradient
-            adam.step()
+            _, gradients = network_gradient.loss_and_gradient(weights, pieces.pick(rows), *scale)
             step += 1
+            rate = settings.warm_learning_rate * fall
+            network_gradient.adam(weights, moments, gradients, step, rate)
 
 
 def shortened(data: Batch, steps: int) -> Batch:

@@ -20,7 +20,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"store", "windows", "correct"},
     {"models"},
     {"arguments", "user_causes"},
-    {"engine", "simulate", "coverage", "sensitivity"},
+    {"training", "simulate", "coverage", "sensitivity"},
     {"identify", "band", "gain"},
     {
         "evaluate",

@@ -4,12 +4,13 @@ import polars as pl
 import pytest
 import sailing
 import torch
-from test_engine import network, windows
+from small_networks import network, windows
 
-from shiplog import engine, runs, train
+from shiplog import runs, train
 from shiplog.config import Config, Network, Paper, Split
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
+from shiplog.training import network_gradient
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))
@@ -24,7 +25,7 @@ def begun(tmp_path):
     data = windows(5, 12, actuators=2)
     model = network(SHAPE, data).float()
     run = runs.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
-    batches = [engine.batch(data, model.scaling, SHAPE, torch.float32)] * 2
+    batches = [network_gradient.batch(data, model.scaling, SHAPE, torch.float32)] * 2
     return run, model, batches
 
 

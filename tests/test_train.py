@@ -4,11 +4,12 @@ import copy
 
 import pytest
 import torch
-from test_engine import by_autograd, network, windows
+from small_networks import by_autograd, network, windows
 
-from shiplog import engine, seeds, train
+from shiplog import seeds, train
 from shiplog.config import Config, Fast, Paper, Split
 from shiplog.models.feedforward import Shape
+from shiplog.training import network_gradient
 
 SHAPE = Shape(3, width=12, depth=2)
 
@@ -16,7 +17,7 @@ SHAPE = Shape(3, width=12, depth=2)
 def setting(dtype=torch.float64):
     learnt, held = windows(7, 15, seed=1), windows(3, 15, seed=2)
     model = network(SHAPE, learnt, seed=3)
-    batches = [engine.batch(w, model.scaling, SHAPE, dtype) for w in (learnt, held)]
+    batches = [network_gradient.batch(w, model.scaling, SHAPE, dtype) for w in (learnt, held)]
     return learnt, held, model, batches
 
 
@@ -54,7 +55,7 @@ def test_the_history_is_smoothed_and_the_best_weights_are_those_of_the_smallest_
     for value, shown in zip(validation[1:], smoothed[1:], strict=True):
         average = 0.1 * value + 0.9 * average
         assert shown == pytest.approx(average)
-    again = engine.loss_only(progress.best_weights, batches[1], model.scaling, SHAPE)
+    again = network_gradient.loss_only(progress.best_weights, batches[1], model.scaling, SHAPE)
     assert again == pytest.approx(min(validation)) == pytest.approx(progress.best)
 
 
@@ -121,16 +122,16 @@ def test_the_fast_recipe_learns_repeats_itself_and_depends_on_its_seed():
     assert first.best == min(losses) < losses[0]
     assert first.history[1:] == again.history[1:]
     assert other.history[1:] != first.history[1:]
-    trained = engine.loss_only(first.best_weights, batches[1], model.scaling, SHAPE)
+    trained = network_gradient.loss_only(first.best_weights, batches[1], model.scaling, SHAPE)
     assert trained == pytest.approx(first.best, rel=1e-6)
     learnt = [row[1] for row in first.history[1:]]
-    assert learnt[-1] < 0.5 * engine.loss_only(
+    assert learnt[-1] < 0.5 * network_gradient.loss_only(
         list(model.weights), batches[0], model.scaling, SHAPE
     )
 
 
 def test_shortened_windows_are_the_same_rows_cut_up():
-    data = engine.Batch(
+    data = network_gradient.Batch(
         torch.arange(11 * 2 * 3.0).view(11, 2, 3), torch.zeros(11, 2, 1), torch.ones(10, 2)
     )
     pieces = train.shortened(data, 5)

@@ -1,0 +1,1 @@
+"""Training of networks: the gradient of a rollout, recipes, queues."""
