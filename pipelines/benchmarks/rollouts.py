@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import platform
 import shutil
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import jax
 import numpy as np
 
+from pipelines.benchmarks.machine import cores, processor
 from shiplog import profile
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.identify import Identified, identify
@@ -164,20 +163,6 @@ def refit(
     bounds = (known.low, known.high)
     found = identify(model, known.values, known.spread, data, bounds=bounds, free=free)
     return time.perf_counter() - began, found
-
-
-def processor() -> str:
-    """Its name as the kernel has it, where there is one to ask."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
-
-
-def cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def main() -> None:
