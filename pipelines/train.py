@@ -1,27 +1,23 @@
-"""Voyages to a trained network: windows, one process a seed."""
+"""Voyages to a trained network: windows, then a training for each seed."""
 
 from __future__ import annotations
 
 import logging
-import os
-import signal
-import threading
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import torch
 
+from pipelines.bars import Bars
 from pipelines.prepare import seconds
 from pipelines.provenance import Answer, provenance
 from pipelines.split import choose_split, plan, refuse_shared_rows, say
-from shiplog import band, runs, seeds, train, windows
+from shiplog import band, runs, seeds, windows
 from shiplog.arguments import refuse_taken
 from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
@@ -30,8 +26,10 @@ from shiplog.models.feedforward import scaling
 from shiplog.runs import Run
 from shiplog.simulate import simulate
 from shiplog.store import Store
-from shiplog.train import Progress
 from shiplog.training import network_gradient
+from shiplog.training.job import Training
+from shiplog.training.network_training import Progress
+from shiplog.training.queue import Report, Task, work
 from shiplog.windows import Windows
 
 log = logging.getLogger(__name__)
@@ -39,6 +37,30 @@ log = logging.getLogger(__name__)
 
 def train_run(config: Config, store: Store, out: Path) -> Run:
     """Train every seed of a run; goes on where an interrupted one stopped. Raises ShiplogError."""
+    begun = begin(config, store, out)
+    tasks = tasks_of(begun.run)
+    failures = do(tasks)
+    if failures:
+        said = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        raise RunError(
+            f"{len(failures)} of {len(tasks)} trainings did not end: {said}.",
+            hint="give the same command again: finished seeds and checkpoints are kept.",
+        )
+    return finish(begun)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A run that is being trained: its partial folder, and what finishing it needs."""
+
+    run: Run
+    held: pl.DataFrame
+    store: Store
+    began: float
+
+
+def begin(config: Config, store: Store, out: Path) -> Begun:
+    """The partial folder of a run, with all that its seeds need. Raises ShiplogError."""
     split = config.split
     profile = store.profile([*split.training, *split.validation])
     profile.require_actuators()
@@ -49,46 +71,49 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
 
     names = (profile.actuator_names, profile.wind_names)
     size = config.window
-    reference = windows.cut(learnt, plan(learnt, "ref", size), size, *names)
+    standard = learnt.filter(pl.col("voyage").is_in(config.standard)) if config.standard else learnt
+    reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
     chosen = plan(learnt, config.data, size)
     windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
     run = runs.create(
         out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
     )
     log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
+    return Begun(run, held, store, time.time())
 
-    began = time.time()
-    todo = [seed for seed in config.seeds if not run.finished(seed)]
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    workers = max(1, min(cores, len(todo)))
-    with (
-        _one_thread(),
-        ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool,
-    ):
-        futures = {pool.submit(train_seed, run.path, seed): seed for seed in todo}
-        try:
-            for future in as_completed(futures):
-                best, epochs, took = future.result()
-                log.info(
-                    "seed %d: best validation L %.0f after %d epochs, %.0f s",
-                    futures[future],
-                    best,
-                    epochs,
-                    took,
-                )
-        except BrokenProcessPool as error:
-            raise RunError(
-                "A training process was ended from outside, perhaps for want of memory.",
-                hint="give the same command again: finished seeds and checkpoints are kept.",
-            ) from error
-        except BaseException:  # or the pool waits for seeds that may take hours
-            for process in active_children():
-                process.terminate()
-            raise
-    run.save_band(_band(run, held))
-    return run.finish(provenance(store, split, began))
+
+def finish(begun: Begun) -> Run:
+    """The run with its name, all seeds being trained."""
+    run = begun.run
+    run.save_band(_band(run, begun.held))
+    return run.finish(provenance(begun.store, run.config.split, begun.began))
+
+
+def tasks_of(run: Run) -> list[Task]:
+    """The trainings of a run that are not finished."""
+    return [
+        Task(f"{run.name}, seed {seed}", train_seed, (run.path, seed))
+        for seed in run.config.seeds
+        if not run.finished(seed)
+    ]
+
+
+def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
+    """Do all trainings, with progress on stderr. Returns those that failed, and why."""
+    failures: dict[str, str] = {}
+    with Bars([task.name for task in tasks]) as bars, closing(work(tasks, workers)) as events:
+        for event in events:
+            bars.show(event.task.name, event.share, event.ended)
+            if not event.ended:
+                continue
+            if event.failure:
+                failures[event.task.name] = event.failure
+                log.warning("%s: %s", event.task.name, event.failure)
+            else:
+                best, epochs, took = event.result
+                said = (event.task.name, best, epochs, took)
+                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *said)
+    return failures
 
 
 def _band(run: Run, held: pl.DataFrame) -> band.Band:
@@ -100,45 +125,8 @@ def _band(run: Run, held: pl.DataFrame) -> band.Band:
     return band.calibrate(error, spread, len(run.config.split.validation))
 
 
-def _end_with_parent() -> None:
-    """In a training process: whatever ends the command ends this too, and Ctrl-C is the command's
-    to handle."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-
-    def wait() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """One core, one training: numerical libraries of child processes read this at import.
-
-    Two threads on products this small wait for each other more than they work, and on a busy
-    machine for each other alone.
-    """
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
-    """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
-    torch.set_num_threads(1)
-    began = time.time()
-    run = runs.open_folder(path)
+def training_of(run: Run, seed: int) -> Training:
+    """One seed of a begun run, with its windows."""
     config = run.config
     scale, shape = run.scaling(), run.shape
     learnt = _cut(run, run.training(), run.windows())
@@ -148,22 +136,19 @@ def train_seed(path: Path, seed: int) -> tuple[float, int, float]:
         network_gradient.batch(w, scale, shape, torch.float32) for w in (learnt, held)
     )
     model = run.empty_model().initialise(seeds.generator(seed, "weights"))
+    return Training(config, seed, model, training, validation)
+
+
+def train_seed(path: Path, seed: int, report: Report | None = None) -> tuple[float, int, float]:
+    """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
+    torch.set_num_threads(1)
+    began = time.time()
+    run = runs.open_folder(path)
 
     def keep(progress: Progress) -> None:
         run.save_checkpoint(seed, progress)
 
-    if config.recipe == "paper":
-        progress = train.paper(
-            model,
-            training,
-            validation,
-            config.paper,
-            seed,
-            resume=run.load_checkpoint(seed),
-            checkpoint=keep,
-        )
-    else:
-        progress = train.fast(model, training, validation, config.fast, seed)
+    progress = training_of(run, seed).run(run.load_checkpoint(seed), keep, report=report)
     run.save_seed(seed, progress)
     return progress.best, progress.epoch, time.time() - began
 

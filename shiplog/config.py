@@ -62,6 +62,7 @@ class Fast(Section):
     iterations: int = Field(default=300, gt=0)
     patience: int = Field(default=40, gt=0)  # iterations without a better validation loss
     smoothing: float = Field(default=0.1, gt=0, le=1)
+    most_windows: int = Field(default=256, gt=0)  # of a set with more, each seed takes as many
 
 
 class Network(Section):
@@ -104,6 +105,7 @@ class Config(Section):
     recipe: Literal["paper", "fast"] = "fast"
     seeds: tuple[int, ...] = (0,)
     split: Split
+    standard: tuple[str, ...] = ()  # voyages whose means scale the network; all training ones
     network: Network = Field(default_factory=lambda: Network(wind_input="components"))
     paper: Paper = Paper()
     fast: Fast = Fast()

@@ -55,7 +55,7 @@ from shiplog.record import Record
 from shiplog.reference import Start
 from shiplog.report import finite
 from shiplog.sensitivity import Simulator
-from shiplog.train import HISTORY, Progress
+from shiplog.training.network_training import HISTORY, Progress
 
 HELD = 1e-9  # spread of numbers that a diagnosis leaves where they are
 

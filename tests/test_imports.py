@@ -25,7 +25,6 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {
         "evaluate",
         "floors",
-        "train",
         "crossvalidation",
         "identifiability",
         "residual",

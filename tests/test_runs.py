@@ -6,11 +6,12 @@ import sailing
 import torch
 from small_networks import network, windows
 
-from shiplog import runs, train
+from shiplog import runs
 from shiplog.config import Config, Network, Paper, Split
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient
+from shiplog.training.network_training import paper
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))
@@ -31,7 +32,7 @@ def begun(tmp_path):
 
 def test_a_run_comes_back_as_it_was(begun):
     run, model, batches = begun
-    progress = train.paper(model, *batches, Paper(most_epochs=3), seed=0)
+    progress = paper(model, *batches, Paper(most_epochs=3), seed=0)
     for seed in CONFIG.seeds:
         run.save_seed(seed, progress)
     done = run.finish({"shiplog": "test"})
@@ -50,10 +51,10 @@ def test_a_run_comes_back_as_it_was(begun):
 def test_a_checkpoint_on_disk_resumes_bit_by_bit(begun):
     run, model, batches = begun
     settings = Paper(most_epochs=9)
-    whole = train.paper(model, *batches, settings, seed=0)
-    train.paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
+    whole = paper(model, *batches, settings, seed=0)
+    paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
                 checkpoint=lambda p: run.save_checkpoint(0, p))  # fmt: skip
-    resumed = train.paper(model, *batches, settings, seed=0, resume=run.load_checkpoint(0))
+    resumed = paper(model, *batches, settings, seed=0, resume=run.load_checkpoint(0))
     assert resumed.history[1:] == whole.history[1:]
     assert all(torch.equal(a, b) for a, b in zip(resumed.weights, whole.weights, strict=True))
     run.save_seed(0, resumed)
@@ -62,7 +63,7 @@ def test_a_checkpoint_on_disk_resumes_bit_by_bit(begun):
 
 def test_the_same_command_goes_on_and_another_is_refused(begun):
     run, model, batches = begun
-    run.save_seed(0, train.paper(model, *batches, Paper(most_epochs=1), seed=0))
+    run.save_seed(0, paper(model, *batches, Paper(most_epochs=1), seed=0))
     out = run.path.with_name("run")
     again = runs.create(out, CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
     assert again.finished(0)
@@ -87,7 +88,7 @@ def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path)
 
 def test_a_torn_weight_file_is_named(begun):
     run, model, batches = begun
-    run.save_seed(0, train.paper(model, *batches, Paper(most_epochs=1), seed=0))
+    run.save_seed(0, paper(model, *batches, Paper(most_epochs=1), seed=0))
     path = run.path / "seed0" / "model.safetensors"
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):

@@ -155,8 +155,7 @@ def timed(count: int, rounds: int, peers: bool) -> None:
 
 
 def trained(count: int, seconds: float) -> tuple[int, float]:
-    """Updates in so many seconds of wall time, and memory above rest [MiB], the update's own
-    results and Adam's moments (4 MiB) not counted."""
+    """Updates in so many seconds of wall time, and the memory of one above rest [MiB]."""
     data = problem(count)
     update = with_adam(ours(*data, ""), data[0])
     cpu_seconds(lambda: torch.ones(64, 64) @ torch.ones(64, 64))

@@ -6,12 +6,10 @@ Knows no disk: what must last is handed to `checkpoint`, and comes back as `resu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
 import torch
-from scipy.optimize import minimize
 from torch import Tensor
 
 from shiplog import seeds
@@ -21,6 +19,8 @@ from shiplog.training import network_gradient
 from shiplog.training.network_gradient import Batch
 
 HISTORY = ("epoch", "training", "validation", "smoothed")
+OUT_OF_REACH = 1e30  # the value of a rollout that runs away: the line search shortens its step
+KEPT_POINTS = 6  # of a line search; it seldom asks more
 
 
 @dataclass
@@ -51,6 +51,8 @@ def paper(
     checkpoint: Checkpoint | None = None,
     every: int = 250,
     resume: Progress | None = None,
+    pause: int | None = None,
+    report: Callable[[float], None] | None = None,
 ) -> Progress:
     """Adam on three random subsets an epoch until the validation loss has risen, Sec. 4.3.
 
@@ -80,7 +82,8 @@ def paper(
         progress.stream = stream.get_state()
 
     count = training.velocity.shape[1]
-    while not _paper_done(progress, settings):
+    until = math.inf if pause is None else progress.epoch + pause
+    while not paper_done(progress, settings) and progress.epoch < until:
         progress.epoch += 1
         total = 0.0
         for rows in torch.tensor_split(torch.randperm(count, generator=stream), settings.subsets):
@@ -96,18 +99,23 @@ def paper(
         if checkpoint is not None and progress.epoch % every == 0:
             snapshot()
             checkpoint(progress)
-        if not math.isfinite(loss) and not math.isfinite(total):
-            break  # diverged for good: the best weights stand
+        if report is not None:
+            report(
+                min(0.99, progress.epoch / max(settings.most_epochs or settings.least_epochs, 1))
+            )
     snapshot()
     return progress
 
 
-def _paper_done(progress: Progress, settings: Paper) -> bool:
+def paper_done(progress: Progress, settings: Paper) -> bool:
+    """Whether the stopping rule holds, Eq. 24, or no loss is a number any more."""
+    _, training, validation, _ = progress.history[-1]
+    if progress.epoch and not (math.isfinite(training) or math.isfinite(validation)):
+        return True  # diverged for good: the best weights stand
     if settings.most_epochs is not None and progress.epoch >= settings.most_epochs:
         return True
-    latest = progress.history[-1][2]
     limit = settings.rise * (progress.first - progress.best) + progress.best
-    return progress.epoch > settings.least_epochs and latest > limit
+    return progress.epoch > settings.least_epochs and validation > limit
 
 
 def _note(
@@ -122,65 +130,99 @@ def _note(
 
 
 def fast(
-    model: FeedForward, training: Batch, validation: Batch, settings: Fast, seed: int
+    model: FeedForward,
+    training: Batch,
+    validation: Batch,
+    settings: Fast,
+    seed: int,
+    report: Callable[[float], None] | None = None,
 ) -> Progress:
     """Short windows with Adam, then L-BFGS (Liu and Nocedal, 1989) on the whole rollouts.
 
     Warm start: every window cut into pieces of `warm_steps` Euler steps, which bend the network
-    into shape cheaply and without the long rollouts' chaos. Then full-batch L-BFGS on the paper's
-    loss with its regulariser, keeping the weights with the smallest validation loss.
+    into shape cheaply and without the long rollouts' chaos. Then L-BFGS on the paper's loss with
+    its regulariser, keeping the weights with the smallest validation loss. Of a set with more than
+    `most_windows` each seed takes as many at random.
     """
     scale = (model.scaling, model.shape)
     weights = [p.detach().clone() for p in model.weights]
     start = network_gradient.loss_only(weights, validation, *scale)
     progress = Progress(0, weights, [w.clone() for w in weights], start, start, start)
     progress.history.append((0, math.nan, start, start))
+    count = training.velocity.shape[1]
+    if count > settings.most_windows:
+        order = torch.randperm(count, generator=seeds.generator(seed, "windows"))
+        training = training.pick(order[: settings.most_windows].sort().values)
     _warm_start(weights, training, scale, settings, seed)
+    penalty = settings.regularisation
 
-    shapes = [w.shape for w in weights]
-    sizes = [w.numel() for w in weights]
-    dtype = weights[0].dtype
+    def objective(values: list[Tensor]) -> tuple[float, list[Tensor]]:
+        loss, gradients = network_gradient.loss_and_gradient(values, training, *scale)
+        squares = sum(float(v.square().sum()) for v in values)
+        return loss + penalty * squares, [
+            g.add_(v, alpha=2.0 * penalty) for g, v in zip(gradients, values, strict=True)
+        ]
 
-    def unpack(flat: np.ndarray) -> list[Tensor]:
-        parts = torch.from_numpy(flat).to(dtype).split(sizes)
-        return [part.view(shape) for part, shape in zip(parts, shapes, strict=True)]
-
-    latest = {"training": math.nan}
-
-    def objective(flat: np.ndarray) -> tuple[float, np.ndarray]:
-        loss, gradients = network_gradient.loss_and_gradient(unpack(flat), training, *scale)
-        latest["training"] = loss
-        slope = torch.cat([g.flatten() for g in gradients]).double().numpy()
-        if not (math.isfinite(loss) and np.isfinite(slope).all()):
-            return 1e30, np.zeros_like(flat)  # the line search shortens its step
-        penalty = settings.regularisation
-        return loss + penalty * float(flat @ flat), slope + 2.0 * penalty * flat
-
-    def after(flat: np.ndarray) -> None:
+    since = 0  # iterations without a better validation loss
+    for value in lbfgs(objective, weights, settings.memory, settings.iterations):
         progress.epoch += 1
-        values = unpack(flat)
-        loss = network_gradient.loss_only(values, validation, *scale)
-        _note(progress, values, latest["training"], loss, settings.smoothing)
-        best_at = min(progress.history[1:], key=lambda row: row[2])[0]
-        if progress.epoch - best_at >= settings.patience:
-            raise StopIteration
-
-    minimize(
-        objective,
-        torch.cat([w.flatten() for w in weights]).double().numpy(),
-        jac=True,
-        method="L-BFGS-B",
-        callback=after,
-        options={
-            "maxcor": settings.memory,
-            "maxiter": settings.iterations,
-            "maxfun": 3 * settings.iterations,
-            "ftol": 1e-9,
-            "gtol": 1e-8,
-        },
-    )
+        best = progress.best
+        loss = network_gradient.loss_only(weights, validation, *scale)
+        squares = sum(float(w.square().sum()) for w in weights)
+        _note(progress, weights, value - penalty * squares, loss, settings.smoothing)
+        since = 0 if progress.best < best else since + 1
+        if report is not None:
+            report(progress.epoch / settings.iterations)
+        if since >= settings.patience:
+            break
     progress.weights = progress.best_weights
     return progress
+
+
+def lbfgs(
+    objective: Callable[[list[Tensor]], tuple[float, list[Tensor]]],
+    weights: list[Tensor],
+    memory: int,
+    most: int,
+) -> Iterator[float]:
+    """Iterations of L-BFGS with a strong Wolfe line search, in place; the value after each.
+
+    Ends by itself where the gradient or the step is nothing.
+    """
+    parameters = [torch.nn.Parameter(w) for w in weights]  # they share memory with the weights
+    optimiser = torch.optim.LBFGS(
+        parameters, max_iter=1, max_eval=25, history_size=memory, line_search_fn="strong_wolfe",
+        tolerance_grad=0.0, tolerance_change=0.0,
+    )  # fmt: skip
+    # The optimiser asks again for the point at which it arrived: what it has asked lately is kept.
+    known: list[tuple[list[Tensor], float, list[Tensor]]] = []
+
+    def closure() -> float:
+        found = next((one for one in known if _same(one[0], weights)), None)
+        if found is None:
+            value, slopes = objective(weights)
+            if not math.isfinite(value) or not all(bool(g.isfinite().all()) for g in slopes):
+                value, slopes = OUT_OF_REACH, [torch.zeros_like(w) for w in weights]
+            found = ([w.clone() for w in weights], value, slopes)
+            known.append(found)
+            del known[:-KEPT_POINTS]
+        _, value, slopes = found
+        for parameter, slope in zip(parameters, slopes, strict=True):
+            parameter.grad = slope.clone()
+        return value
+
+    value = closure()
+    for _ in range(most):
+        before = [w.clone() for w in weights]
+        optimiser.step(closure)
+        if _same(before, weights):
+            return
+        value = closure()
+        yield value
+
+
+def _same(left: list[Tensor], right: list[Tensor]) -> bool:
+    return all(torch.equal(a, b) for a, b in zip(left, right, strict=True))
 
 
 def _warm_start(

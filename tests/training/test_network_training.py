@@ -6,10 +6,11 @@ import pytest
 import torch
 from small_networks import by_autograd, network, windows
 
-from shiplog import seeds, train
+from shiplog import seeds
 from shiplog.config import Config, Fast, Paper, Split
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient
+from shiplog.training.network_training import fast, paper, shortened
 
 SHAPE = Shape(3, width=12, depth=2)
 
@@ -39,7 +40,7 @@ def plainly(model, learnt, epochs, settings, seed):
 def test_the_papers_recipe_is_adam_on_loss_plus_l2_in_three_subsets():
     learnt, _, model, batches = setting()
     settings = Paper(learning_rate=1e-3, regularisation=0.5, most_epochs=6)
-    progress = train.paper(model, *batches, settings, seed=4)
+    progress = paper(model, *batches, settings, seed=4)
     expected = plainly(model, learnt, 6, settings, seed=4)
     for mine, theirs in zip(progress.weights, expected.weights, strict=True):
         assert torch.allclose(mine, theirs, rtol=1e-7, atol=1e-10)
@@ -47,7 +48,7 @@ def test_the_papers_recipe_is_adam_on_loss_plus_l2_in_three_subsets():
 
 def test_the_history_is_smoothed_and_the_best_weights_are_those_of_the_smallest_validation():
     _, held, model, batches = setting()
-    progress = train.paper(model, *batches, Paper(learning_rate=3e-3, most_epochs=40), seed=0)
+    progress = paper(model, *batches, Paper(learning_rate=3e-3, most_epochs=40), seed=0)
     epochs, _, validation, smoothed = zip(*progress.history, strict=True)
     assert epochs == tuple(range(41))
     assert validation[0] == pytest.approx(by_autograd(model, held).item())
@@ -63,7 +64,7 @@ def test_training_stops_once_the_validation_loss_has_risen_and_not_before():
     _, _, model, batches = setting()
     settings = Paper(learning_rate=3e-2, regularisation=0.0, least_epochs=30, rise=0.02,
                      most_epochs=600)  # fmt: skip
-    progress = train.paper(model, *batches, settings, seed=0)
+    progress = paper(model, *batches, settings, seed=0)
     losses = [row[2] for row in progress.history]
 
     def risen(epoch):
@@ -79,7 +80,7 @@ def test_training_stops_once_the_validation_loss_has_risen_and_not_before():
 def test_training_goes_on_while_the_least_epochs_are_not_exceeded():
     _, _, model, batches = setting()
     settings = Paper(learning_rate=3e-2, regularisation=0.0, least_epochs=200, rise=0.02)
-    progress = train.paper(model, *batches, settings, seed=0)
+    progress = paper(model, *batches, settings, seed=0)
     assert progress.epoch == 201  # risen long before, as the test above shows
 
 
@@ -95,7 +96,7 @@ def test_a_resumed_training_is_the_uninterrupted_one_to_the_last_bit():
     model = model.float()
     settings = Paper(learning_rate=1e-3, most_epochs=12)
     kept = []
-    whole = train.paper(
+    whole = paper(
         model,
         *batches,
         settings,
@@ -104,7 +105,7 @@ def test_a_resumed_training_is_the_uninterrupted_one_to_the_last_bit():
         checkpoint=lambda p: kept.append(copy.deepcopy(p)),
     )
     assert [p.epoch for p in kept] == [5, 10]
-    resumed = train.paper(model, *batches, settings, seed=99, resume=kept[0])
+    resumed = paper(model, *batches, settings, seed=99, resume=kept[0])
     assert resumed.history == whole.history
     for a, b in zip(whole.weights + whole.best_weights, resumed.weights + resumed.best_weights,
                     strict=True):  # fmt: skip
@@ -115,9 +116,9 @@ def test_the_fast_recipe_learns_repeats_itself_and_depends_on_its_seed():
     *_, model, batches = setting(torch.float32)
     model = model.float()
     settings = Fast(iterations=25, warm_epochs=5)
-    first = train.fast(model, *batches, settings, seed=0)
-    again = train.fast(model, *batches, settings, seed=0)
-    other = train.fast(model, *batches, settings, seed=1)
+    first = fast(model, *batches, settings, seed=0)
+    again = fast(model, *batches, settings, seed=0)
+    other = fast(model, *batches, settings, seed=1)
     losses = [row[2] for row in first.history]
     assert first.best == min(losses) < losses[0]
     assert first.history[1:] == again.history[1:]
@@ -134,7 +135,7 @@ def test_shortened_windows_are_the_same_rows_cut_up():
     data = network_gradient.Batch(
         torch.arange(11 * 2 * 3.0).view(11, 2, 3), torch.zeros(11, 2, 1), torch.ones(10, 2)
     )
-    pieces = train.shortened(data, 5)
+    pieces = shortened(data, 5)
     assert pieces.velocity.shape == (6, 4, 3)
     assert torch.equal(pieces.velocity[:, :2], data.velocity[:6])
     assert torch.equal(pieces.velocity[:, 2:], data.velocity[5:11])

@@ -1,0 +1,199 @@
+"""A work queue on this machine: so many processes, a task each at a time.
+
+A process that dies costs the task that it was at and no other. Whatever ends the process that
+asked ends the workers.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import connection, get_context, parent_process
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from shiplog.exceptions import ShiplogError
+from shiplog.unexpected import unexpected
+
+SILENT_S = 0.5  # between two reports of a worker
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+Report = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A call in another process: function(*arguments, report=...)."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Event:
+    """What became known of a task.
+
+    share    of it that is done, 0 to 1
+    ended    whether it is over, with `result`, or with `failure`: why there is none
+    """
+
+    task: Task
+    share: float
+    ended: bool = False
+    result: Any = None
+    failure: str = ""
+
+
+@dataclass
+class _Worker:
+    process: BaseProcess
+    pipe: Connection
+    task: Task | None = None
+
+
+def cores() -> int:
+    """Those that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def work(tasks: Sequence[Task], workers: int | None = None) -> Iterator[Event]:
+    """Do all tasks, in their order; one a core unless `workers` says otherwise.
+
+    A task that fails, or whose process is ended from outside, is an event with `failure`; the
+    others go on. Closing the iterator, as any exception does, ends the workers.
+    """
+    waiting = list(reversed(tasks))
+    busy: dict[Connection, _Worker] = {}
+    try:
+        for _ in range(min(workers or cores(), len(tasks))):
+            one = _hire()
+            busy[one.pipe] = one
+            yield _give(one, waiting.pop())
+        while busy:
+            for pipe in connection.wait(list(busy)):
+                assert isinstance(pipe, Connection)
+                one = busy[pipe]
+                assert one.task is not None
+                try:
+                    kind, value = pipe.recv()
+                except (EOFError, OSError):
+                    kind, value = "died", None
+                if kind == "share":
+                    yield Event(one.task, value)
+                    continue
+                if kind == "died":
+                    one.process.join()
+                    yield Event(one.task, 0.0, True, failure=_ended(one.process.exitcode))
+                elif kind == "failed":
+                    yield Event(one.task, 0.0, True, failure=value)
+                else:
+                    yield Event(one.task, 1.0, True, value)
+                if waiting and kind == "died":
+                    del busy[pipe]
+                    one = _hire()
+                    busy[one.pipe] = one
+                if waiting:
+                    yield _give(one, waiting.pop())
+                elif kind == "died":
+                    del busy[pipe]
+                else:
+                    one.pipe.send(None)
+                    one.process.join()
+                    del busy[pipe]
+    finally:
+        for one in busy.values():
+            one.process.terminate()
+        for one in busy.values():
+            one.process.join()
+
+
+def _hire() -> _Worker:
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs,), daemon=True)
+    with _one_thread():
+        process.start()
+    theirs.close()  # so that a worker's death is the end of the pipe
+    return _Worker(process, ours)
+
+
+def _give(one: _Worker, task: Task) -> Event:
+    one.task = task
+    one.pipe.send((task.function, task.arguments))
+    return Event(task, 0.0)
+
+
+def _serve(pipe: Connection) -> None:
+    """In a worker: tasks until there are none."""
+    _end_with_parent()
+    while (given := pipe.recv()) is not None:
+        function, arguments = given
+        latest = [0.0]
+
+        def report(share: float, latest: list[float] = latest) -> None:
+            now = time.monotonic()
+            if now - latest[0] > SILENT_S:
+                latest[0] = now
+                pipe.send(("share", share))
+
+        try:
+            answer = ("done", function(*arguments, report=report))
+        except ShiplogError as error:
+            answer = ("failed", str(error))
+        except MemoryError:
+            answer = ("failed", "too little memory")
+        except OSError as error:  # a disk that is full
+            answer = ("failed", f"{error.filename}: {error.strerror}")
+        except Exception as error:
+            answer = ("failed", str(unexpected(error)))
+        pipe.send(answer)
+
+
+def _ended(code: int | None) -> str:
+    """Why a process is no more."""
+    if code is not None and code < 0:
+        name = signal.Signals(-code).name
+        why = ", perhaps for want of memory" if name == "SIGKILL" else ""
+        return f"its process was ended from outside ({name}{why})"
+    return f"its process ended by itself (exit code {code})"
+
+
+def _end_with_parent() -> None:
+    """Whatever ends the command ends this too, and Ctrl-C is the command's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One core, one task: numerical libraries of child processes read this at import.
+
+    Two threads on products this small wait for each other more than they work, and on a busy
+    machine for each other alone.
+    """
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,68 @@
+"""The work queue: every task once, and a process that dies costs its own task only."""
+
+import os
+import signal
+import sys
+import time
+from contextlib import closing
+
+import pytest
+
+from shiplog.exceptions import RunError
+from shiplog.training.queue import Task, work
+
+
+def square(number, report):
+    report(0.5)
+    return number**2
+
+
+def fails(number, report):
+    raise RunError(f"no {number}", hint="never")
+
+
+def dies(number, report):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fills_the_disk(number, report):
+    raise OSError(28, "No space left on device", "/full/model.safetensors")
+
+
+def sleeps(path, report):
+    path.write_text(str(os.getpid()), encoding="utf-8")
+    time.sleep(600)
+
+
+def outcomes(tasks, workers):
+    return {e.task.name: e for e in work(tasks, workers) if e.ended}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_task_that_fails_costs_itself_and_no_other(workers):
+    kinds = [square, fails, square, dies, square, fills_the_disk, square]
+    tasks = [Task(str(i), kind, (i,)) for i, kind in enumerate(kinds)]
+    found = outcomes(tasks, workers)
+    assert sorted(found) == sorted(task.name for task in tasks)
+    assert {name: e.result for name, e in found.items() if not e.failure} == {
+        "0": 0, "2": 4, "4": 16, "6": 36,
+    }  # fmt: skip
+    assert "no 1" in found["1"].failure
+    assert "SIGKILL" in found["3"].failure
+    assert found["5"].failure == "/full/model.safetensors: No space left on device"
+
+
+def test_a_task_says_how_far_it_is():
+    shares = [e.share for e in work([Task("a", square, (3,))], 1)]
+    assert shares == [0.0, 0.5, 1.0]
+
+
+def test_closing_the_queue_ends_its_processes(tmp_path):
+    path = tmp_path / "pid"
+    with closing(work([Task("a", sleeps, (path,))], 1)) as events:
+        next(events)
+        while not path.exists() or not path.read_text(encoding="utf-8"):
+            time.sleep(0.05)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(path.read_text(encoding="utf-8")), 0)
