@@ -70,6 +70,30 @@ Causes = Annotated[
 STORE = Path("store")
 
 
+def _version(asked: bool) -> None:
+    """What runs: versions, and what computes the gradient of a training."""
+    if not asked:
+        return
+    from importlib.metadata import version
+
+    from shiplog.training import kernel
+
+    level = kernel.level()
+    what = f"compiled kernel, {level}" if level else "torch (no compiled kernel)"
+    typer.echo(f"shiplog {version('shiplog')}, torch {version('torch')}, training by: {what}")
+    raise typer.Exit
+
+
+@app.callback()
+def _every(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Versions, and exit."),
+    ] = False,
+) -> None:
+    """Learn a ship's dynamic model from its logs, and see where it fails."""
+
+
 def main() -> None:
     """Entry point: settings of this process, then `run`."""
     # What JAX compiled for one ship serves every later command: some ten seconds each.
@@ -451,6 +475,68 @@ def train(
         epochs=epochs,
     )
     _answer(answer.text, answer.content, json_to)
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option(help="Where runs, tables and figures go.")] = Path("paper"),
+    data: Annotated[
+        list[str] | None,
+        typer.Option("--data", help="Window sets, all eight unless given; several times."),
+    ] = None,
+    voyages: Voyages = None,
+    validation: Annotated[
+        list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 10,
+    recipe: Annotated[
+        str, typer.Option(help="fast (a quarter of an hour in all) or paper (a day).")
+    ] = "fast",
+    window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
+    width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
+    epochs: Annotated[
+        int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Trainings at a time; one a core unless given.")
+    ] = None,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Train on this Ray cluster instead.")
+    ] = None,
+    store: StoreOption = STORE,
+    json_to: JsonOption = None,
+) -> None:
+    """The published experiment: eight window sets, ten seeds each, tables and figures.
+
+    Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
+    """
+    from shiplog.arguments import check_training, check_writable
+    from shiplog.config import AUGMENTATIONS
+
+    chosen = list(dict.fromkeys(data or AUGMENTATIONS))
+    for name in chosen:
+        check_training("feedforward", name, recipe, None, {})
+    check_writable(out, "--out")
+    _check_voyages(store, voyages, validation)
+    from pipelines.paper import paper_command
+
+    answer = paper_command(
+        store,
+        out,
+        data=chosen,
+        voyages=voyages or [],
+        validation=validation or [],
+        seeds=seeds,
+        recipe=recipe,
+        window=window,
+        width=width,
+        epochs=epochs,
+        jobs=jobs,
+        ray=ray,
+    )
+    _answer(answer.text, answer.content, json_to)
+    if answer.content["failures"]:
+        raise typer.Exit(LOST)
 
 
 @app.command()

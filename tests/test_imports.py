@@ -40,7 +40,7 @@ ROWS = (  # each may import its own row (a package its own modules) and the rows
     {"decision"},
     {"diagnosis", "diagnose"},
     {"advise", "earlier_runs", "remembered"},
-    {"runs", "report", "viewer", "verdict", "page"},
+    {"runs", "report", "viewer", "verdict", "page", "paper"},
     {"cli"},
 )
 LEVEL = {name: level for level, row in enumerate(ROWS) for name in row}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from shiplog.comparison import Actuator, Comparison
@@ -9,7 +10,8 @@ from shiplog.exhibit import Exhibit
 from shiplog.viewer.native import Served, open_viewer, serve
 
 __all__ = [
-    "Actuator", "Comparison", "Exhibit", "Served", "open_viewer", "save", "save_diagnosis", "serve",
+    "Actuator", "Comparison", "Exhibit", "Served", "open_viewer", "save", "save_album",
+    "save_diagnosis", "serve",
 ]  # fmt: skip
 
 
@@ -18,6 +20,13 @@ def save(comparison: Comparison, path: str | Path) -> None:
     from shiplog.viewer import recording  # half a second of imports that most commands never need
 
     recording.write(comparison, Path(path))
+
+
+def save_album(title: str, text: str, pictures: Mapping[str, Path], path: str | Path) -> None:
+    """Write a text and pictures, name → PNG file, as an .rrd with a tab each."""
+    from shiplog.viewer import album
+
+    album.write(title, text, pictures, Path(path))
 
 
 def save_diagnosis(exhibit: Exhibit, path: str | Path) -> None:

@@ -11,9 +11,10 @@ import os
 from collections.abc import Sequence
 from functools import cache
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
-import torch
-from torch import Tensor
+if TYPE_CHECKING:
+    from torch import Tensor
 
 LEVELS = ("portable", "avx2", "avx512")
 SWITCH = "SHIPLOG_KERNEL"  # environment: one of LEVELS, or "off"
@@ -95,7 +96,7 @@ def loss_and_gradient(
     assert library is not None
     kept = [t.contiguous() for t in (velocity, driven, dt, *scales)]
     own = [w.contiguous() for w in weights]
-    slopes = [torch.empty_like(w) for w in own] if gradient else []
+    slopes = [w.new_empty(w.shape) for w in own] if gradient else []
     pointers = (_POINTER * len(own))(*(w.data_ptr() for w in own))
     into = (_POINTER * len(own))(*(g.data_ptr() for g in slopes)) if gradient else None
     at_ = [t.data_ptr() for t in kept]
@@ -103,9 +104,8 @@ def loss_and_gradient(
         len(own) // 2 - 1, own[0].shape[0], own[0].shape[1], int(input_tanh), pointers, *at_[3:]
     )
     windows = _Windows(dt.shape[0], dt.shape[1], *at_[:3])
-    call = library.shiplog_rollouts_f32
-    if velocity.dtype == torch.float64:
-        call = library.shiplog_rollouts_f64
+    single = velocity.dtype.itemsize == 4
+    call = library.shiplog_rollouts_f32 if single else library.shiplog_rollouts_f64
     loss = call(LEVELS.index(at), network, windows, into, threads)
     if loss == -1.0:
         raise MemoryError
@@ -129,7 +129,7 @@ def adam(
     """
     library = _library()
     assert library is not None
-    single = weights[0].dtype == torch.float32
+    single = weights[0].dtype.itemsize == 4
     call = library.shiplog_adam_f32 if single else library.shiplog_adam_f64
     for of in zip(weights, means, squares, gradients, strict=True):
         pointers = [t.data_ptr() for t in of]

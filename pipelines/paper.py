@@ -1,0 +1,351 @@
+"""The published experiment: eight window sets, many seeds, tables and figures of what came out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from pipelines import train
+from pipelines.evaluate import Evaluation, evaluate_runs
+from pipelines.prepare import seconds
+from pipelines.provenance import Answer
+from pipelines.split import choose_split, say
+from shiplog import parts, report, runs, viewer
+from shiplog.channels import VELOCITY
+from shiplog.config import Config, Split
+from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
+from shiplog.findings import CONTRACT
+from shiplog.paper import figures, sets, statements
+from shiplog.paper.style import named
+from shiplog.profile import Profile
+from shiplog.runs import Run
+from shiplog.store import Store
+from shiplog.training.queue import Task
+
+log = logging.getLogger(__name__)
+
+FLOORS = {"hold": "holds the velocity", "least_squares": "quadratic least squares"}
+HALF = 0.5  # of the training seconds that the reference set has at most, d-ref having all
+
+
+@dataclass(frozen=True)
+class Voyages:
+    """Which voyages the sets are cut from: `d_ref` has about twice the data of `reference`."""
+
+    reference: tuple[str, ...]
+    d_ref: tuple[str, ...]
+    validation: tuple[str, ...]
+    test: tuple[str, ...]
+    chosen_by: str
+
+    def of(self, data: str) -> Split:
+        return Split(
+            training=self.d_ref if data == "d-ref" else self.reference,
+            validation=self.validation,
+            test=self.test,
+            chosen_by=self.chosen_by,
+        )
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the trainings came to.
+
+    runs        of each set that is finished
+    failures    training → why it did not end
+    losses      set, seed, loss: L over the test windows
+    histories   set, seed, epoch, training, validation, smoothed
+    compared    see `statements.differences`
+    """
+
+    runs: dict[str, Run]
+    failures: dict[str, str]
+    losses: pl.DataFrame
+    histories: pl.DataFrame
+    compared: pl.DataFrame
+    evaluation: Evaluation
+
+
+def paper_command(
+    store_path: Path,
+    out: Path,
+    *,
+    data: Sequence[str],
+    voyages: Sequence[str],
+    validation: Sequence[str],
+    seeds: int,
+    recipe: str,
+    window: int,
+    width: int,
+    epochs: int | None,
+    jobs: int | None,
+    ray: str | None,
+) -> Answer:
+    """`shiplog paper`: every set, every seed, then tables and figures. Interrupted, the same
+    command goes on. Raises ShiplogError."""
+    store = Store(store_path)
+    chosen = choose_voyages(store, voyages, validation, window)
+    say(chosen.of("d-ref"))
+    log.info("reference set: %s", listed(chosen.reference))
+    settings = {
+        "recipe": recipe,
+        "window": window,
+        "seeds": tuple(range(seeds)),
+        "standard": chosen.reference,
+        "network": {"width": width},
+        "paper": {"most_epochs": epochs} if epochs else {},
+        "fast": {"iterations": epochs} if epochs else {},
+    }
+    configs = {
+        name: Config.model_validate({**settings, "data": name, "split": chosen.of(name)})
+        for name in data
+    }
+    finished, failures = train_sets(configs, store, out / "runs", jobs, ray)
+    if not finished:
+        said = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        raise RunError(
+            f"No set could be trained: {said}.", hint="mend that and give the same command again."
+        )
+    results = collect(finished, failures, store)
+    text = write(results, chosen, store, out)
+    content = {
+        "contract": CONTRACT,
+        "folder": str(out),
+        "recording": str(out / "paper.rrd"),
+        "recipe": recipe,
+        "split": chosen.of("d-ref").model_dump(mode="json"),
+        "reference": list(chosen.reference),
+        "sets": _summary(results).to_dicts(),
+        "statements": results.compared.to_dicts(),
+        "floors": results.evaluation.means,
+        "failures": failures,
+    }
+    return Answer(text, content)
+
+
+def choose_voyages(
+    store: Store, voyages: Sequence[str], validation: Sequence[str], size: int
+) -> Voyages:
+    """As in the paper's Table 4 where there are six voyages; else the training voyages are halved
+    in time, and the reference set has the first half. Raises StoreError without a test voyage."""
+    whole = choose_split(store, voyages, validation, "d-ref", size)
+    if not whole.test:
+        raise StoreError(
+            f"There is no voyage left to test on: training {listed(whole.training)}, validation "
+            f"{listed(whole.validation)}.",
+            hint="ingest another voyage, or leave --validation out.",
+        )
+    first = choose_split(store, voyages, validation, "ref", size)
+    reference, chosen_by = first.training, whole.chosen_by
+    if reference == whole.training:
+        reference = _first_half(store, whole.training)
+        chosen_by += "; the reference set has the first half of the training voyages"
+    return Voyages(reference, whole.training, whole.validation, whole.test, chosen_by)
+
+
+def _first_half(store: Store, names: Sequence[str]) -> tuple[str, ...]:
+    """Whole voyages with about half of the seconds; of a single one its first half."""
+    rows = seconds(store, names, store.profile(names))
+    lengths = {str(n): c for n, c in rows.group_by("voyage").len().iter_rows()}
+    begins = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())
+    order = sorted(names, key=lambda n: (begins[n], n))
+    if len(order) == 1:
+        return (_halved(order[0], lengths[order[0]]),)
+    taken: list[str] = []
+    for name in order[:-1]:
+        if taken and sum(lengths[n] for n in [*taken, name]) > HALF * sum(lengths.values()):
+            break
+        taken.append(name)
+    return tuple(taken)
+
+
+def _halved(name: str, length: int) -> str:
+    """The first half of a voyage, or of a part of one, of `length` seconds."""
+    part = parts.parse(name) or parts.Part(name, 0, length)
+    return str(parts.Part(part.whole, part.begin, (part.begin + part.end) // 2))
+
+
+def train_sets(
+    configs: Mapping[str, Config], store: Store, out: Path, jobs: int | None, ray: str | None
+) -> tuple[dict[str, Run], dict[str, str]]:
+    """Every training of every set in one queue. Finished sets, and trainings that failed."""
+    finished: dict[str, Run] = {}
+    begun: dict[str, train.Begun] = {}
+    failures: dict[str, str] = {}
+    tasks: list[Task] = []
+    for name, config in configs.items():
+        path = out / name
+        if path.is_dir():
+            finished[name] = _same(runs.load(path), config)
+            continue
+        try:
+            begun[name] = train.begin(config, store, path)
+        except ShiplogError as error:  # such as a folder that is of other settings
+            failures[name] = str(error)
+            continue
+        tasks += train.tasks_of(begun[name].run)
+    if ray is not None:
+        from pipelines import cluster
+
+        failures |= cluster.do(tasks, ray)
+    elif tasks:
+        failures |= train.do(tasks, jobs)
+    for name, one in begun.items():
+        if all(one.run.finished(seed) for seed in one.run.config.seeds):
+            finished[name] = train.finish(one)
+    return {name: finished[name] for name in configs if name in finished}, failures
+
+
+def _same(run: Run, config: Config) -> Run:
+    """A finished run of these very settings. Raises RunError for any other."""
+    if run.config != config:
+        raise RunError(
+            f"{run.path} is a finished run of other settings.",
+            hint="choose another --out, or remove that folder.",
+        )
+    return run
+
+
+def collect(finished: dict[str, Run], failures: dict[str, str], store: Store) -> Results:
+    """Test losses, validation losses and comparisons of the sets that are finished."""
+    test = next(iter(finished.values())).config.split.test
+    evaluation = evaluate_runs([run.path for run in finished.values()], store, test)
+    losses = (
+        evaluation.errors.group_by("run", "seed", maintain_order=True)
+        .agg(loss=pl.col("loss").mean())
+        .rename({"run": "set"})
+    )
+    histories = pl.concat(
+        run.history(seed).select(set=pl.lit(name), seed=pl.lit(seed), epoch="epoch",
+                                 training="training", validation="validation", smoothed="smoothed")
+        for name, run in finished.items()
+        for seed in run.config.seeds
+    )  # fmt: skip
+    return Results(
+        finished, failures, losses, histories, statements.differences(losses), evaluation
+    )
+
+
+def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
+    """Tables as Parquet, figures as SVG and PNG, report.md and paper.rrd in `out`. Returns the
+    report."""
+    tables, drawn = out / "tables", out / "figures"
+    for folder in (tables, drawn):
+        folder.mkdir(parents=True, exist_ok=True)
+    first = next(iter(results.runs.values()))
+    profile, size = first.profile, first.config.window
+    plans = {name: run.windows() for name, run in results.runs.items()}
+    sizes = sets.sizes(plans, {n: r.config.split.training for n, r in results.runs.items()}, size)
+    rows = {
+        name: seconds(store, names, profile)
+        for name, names in (("ref", chosen.reference), ("d-ref", chosen.d_ref),
+                            ("validation", chosen.validation), ("test", chosen.test))
+    }  # fmt: skip
+    columns = [*(c.name for c in VELOCITY), *profile.actuator_names]
+    histograms = sets.histograms(rows, columns, _angles(profile))
+    rollouts = results.evaluation.rollouts.rename({"run": "set"})
+    frames = {
+        "sizes": sizes, "histograms": histograms, "test_losses": results.losses,
+        "validation_losses": results.histories, "statements": results.compared,
+        "rollouts": rollouts,
+    }  # fmt: skip
+    pictures: dict[str, Path] = {}
+
+    def path(name: str) -> Path:
+        pictures[name] = drawn / f"{name.replace(' ', '_')}.png"
+        return pictures[name].with_suffix("")
+
+    figures.histograms(histograms, _units(profile), path("histograms"))
+    if profile.has_wind:
+        frames["wind"] = sets.wind(rows)
+        figures.wind(frames["wind"], path("wind"))
+    figures.validation(results.histories, path("validation loss"))
+    floors = {FLOORS.get(name, name): loss for name, loss in results.evaluation.means.items()}
+    figures.test(results.losses, floors, path("test loss"))
+    voyage = results.evaluation.errors["voyage"][0]
+    measured = results.evaluation.rows.filter(pl.col("voyage") == voyage)
+    figures.inputs(measured, _units(profile), path("inputs"))
+    own = rollouts.filter(pl.col("voyage") == voyage)
+    for name in results.runs:
+        if name != "ref" and "ref" in results.runs:
+            figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
+    for name, frame in frames.items():
+        partial = tables / f"{name}.partial"
+        frame.write_parquet(partial)
+        partial.replace(tables / f"{name}.parquet")
+    text = report_of(results, chosen, sizes)
+    partial = out / "report.partial"
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(out / "report.md")
+    title = f"{profile.ship.name}: {len(results.runs)} window sets"
+    viewer.save_album(title, text, pictures, out / "paper.rrd")
+    return text
+
+
+def _angles(profile: Profile) -> frozenset[str]:
+    """Actuators that are angles."""
+    return frozenset(a.name for a in profile.actuators if a.si_unit == "rad")
+
+
+def _units(profile: Profile) -> dict[str, str]:
+    """Of actuators and wind as figures show them."""
+    shown = {"rad": "deg", "rev/s": "rev/s", "1": "1"}
+    units = {a.name: shown.get(a.si_unit, a.si_unit) for a in profile.actuators}
+    return units | ({"wind_speed": "m/s", "wind_angle": "deg"} if profile.has_wind else {})
+
+
+def _summary(results: Results) -> pl.DataFrame:
+    """set, seeds, and mean, least and greatest test L, best validation L (median)."""
+    best = results.histories.group_by("set", "seed").agg(pl.col("validation").min())
+    best = best.group_by("set").agg(validation=pl.col("validation").median())
+    loss = pl.col("loss")
+    return (
+        results.losses.group_by("set", maintain_order=True)
+        .agg(seeds=pl.len(), mean=loss.mean(), least=loss.min(), most=loss.max())
+        .join(best, on="set", how="left", maintain_order="left")
+    )
+
+
+def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
+    """Markdown: sets, losses, what the paper states and what these data say."""
+    run = next(iter(results.runs.values()))
+    floors = results.evaluation.means
+    count = results.evaluation.errors.filter(
+        pl.col("run") == run.name, pl.col("seed") == run.config.seeds[0]
+    ).height
+    shown = ("validation", "mean", "least", "most")
+    told = [
+        (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in shown))
+        for row in _summary(results).iter_rows(named=True)
+    ]
+    lines = [
+        f"# {run.profile.ship.name}: {len(results.runs)} window sets",
+        "",
+        f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
+        f"{listed(results.evaluation.voyages)}, {count} windows. Split by {chosen.chosen_by}.",
+        "",
+        report.table(tuple(sizes.columns), [tuple(row) for row in sizes.iter_rows()]),
+        "",
+        "L of the test windows; a baseline that holds the velocity has "
+        f"{floors['hold']:.0f}, quadratic least squares on the reference set "
+        f"{floors['least_squares']:.0f}.",
+        "",
+        report.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
+                     told),
+        "",
+        "## What the paper states, on these data",
+        "",
+        "Ratios are geometric means over pairs of one seed, with intervals that hold together at "
+        "95 % (eight comparisons).",
+        "",
+        *[f"- {row['statement']} {statements.sentence(row)}"
+          for row in results.compared.iter_rows(named=True)],
+    ]  # fmt: skip
+    if results.failures:
+        lines += ["", "## What could not be trained", ""]
+        lines += [f"- {name}: {why}" for name, why in results.failures.items()]
+    return "\n".join(lines)

@@ -1,0 +1,53 @@
+"""How figures look: one size, one font, and for each window set the same colour everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH = 7.1  # inches: two columns of a journal's page
+COLOURS = {  # Okabe and Ito (2008), told apart by colour-blind eyes; their yellow darkened
+    "ref": "#000000", "sli2": "#E69F00", "sli10": "#D55E00", "jit2": "#56B4E9",
+    "jit10": "#0072B2", "sli2xjit2": "#CC79A7", "sli10xjit10": "#009E73", "d-ref": "#A89A00",
+    "validation": "#8C8C8C", "test": "#5E3C99",
+}  # fmt: skip
+NAMES = {"sli2xjit2": "sli2 × jit2", "sli10xjit10": "sli10 × jit10"}
+MEASURED = "#9A9A9A"
+RULES = {
+    "font.size": 8.0, "font.family": "sans-serif", "axes.linewidth": 0.6, "axes.titlesize": 8.0,
+    "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 0.9,
+    "legend.frameon": False, "legend.fontsize": 7.0, "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0, "savefig.dpi": 200.0, "svg.fonttype": "none",
+    "svg.hashsalt": "shiplog",  # the same file from the same data
+}  # fmt: skip
+
+
+def named(of: str) -> str:
+    """A set's name as it is printed."""
+    return NAMES.get(of, of)
+
+
+@contextmanager
+def figure(height: float, path: Path) -> Iterator[Figure]:
+    """A figure of a page's width, `height` inches, written as PATH.svg and PATH.png."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    with matplotlib.rc_context(RULES):
+        drawn = pyplot.figure(figsize=(WIDTH, height), layout="constrained")
+        try:
+            yield drawn
+            for kind in ("svg", "png"):
+                partial = path.with_suffix(f".{kind}.partial")
+                said = {"Date": None} if kind == "svg" else {}
+                drawn.savefig(partial, format=kind, metadata=said)
+                partial.replace(path.with_suffix(f".{kind}"))
+        finally:
+            pyplot.close(drawn)
