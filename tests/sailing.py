@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from shiplog import profile as profiles
+from shiplog.ingest import ingest
 from shiplog.logs.write import Series, write_log
+from shiplog.store import Store
 
 START = 1_700_000_000_000_000_000
 RADIUS, SPEED = 20.0, 0.8  # m, m/s: a steady starboard turn
@@ -112,3 +114,17 @@ def series(seconds: float = 60.0) -> dict[str, Series]:
 def write(path, parts: dict[str, Series] | None = None):
     write_log(path, list((parts or series()).values()), ship="circle")
     return path
+
+
+def store_of(tmp_path, names, seconds=130.0, same=()):
+    """Voyages with noise of their own; those in `same` hold the very data of the first."""
+    store = Store(tmp_path / "store")
+    for number, name in enumerate(names):
+        rng = np.random.default_rng(0 if name in same else number)
+        parts = series(seconds)
+        for one in parts.values():
+            for column, values in one.columns.items():
+                one.columns[column] = values + rng.normal(0, 1e-3, len(values))
+        path = write(tmp_path / f"{name}.mcap", parts)
+        store.add(ingest(path, profile()))
+    return store

@@ -1,6 +1,5 @@
 """Whole voyages apart: the user's split, the paper's, or a sensible one that is said."""
 
-import numpy as np
 import pytest
 import sailing
 
@@ -9,28 +8,13 @@ from pipelines.split import choose_split
 from pipelines.train import train_run
 from shiplog.config import Config, Split
 from shiplog.exceptions import StoreError
-from shiplog.ingest import ingest
 from shiplog.parts import overlap, parse
 from shiplog.store import Store
 
 
-def store_of(tmp_path, names, seconds=130.0, same=()):
-    """Voyages with noise of their own; those in `same` hold the very data of the first."""
-    store = Store(tmp_path / "store")
-    for number, name in enumerate(names):
-        rng = np.random.default_rng(0 if name in same else number)
-        parts = sailing.series(seconds)
-        for one in parts.values():
-            for column, values in one.columns.items():
-                one.columns[column] = values + rng.normal(0, 1e-3, len(values))
-        path = sailing.write(tmp_path / f"{name}.mcap", parts)
-        store.add(ingest(path, sailing.profile()))
-    return store
-
-
 def test_six_voyages_in_order_are_the_papers(tmp_path):
     names = ["f", "e", "d", "c", "b", "a"]
-    store = store_of(tmp_path, names, seconds=30.0)
+    store = sailing.store_of(tmp_path, names, seconds=30.0)
     reference = choose_split(store, names, (), "ref", 20)
     assert reference.training == ("f", "e")
     assert (reference.validation, reference.test) == (("b",), ("a",))
@@ -38,7 +22,7 @@ def test_six_voyages_in_order_are_the_papers(tmp_path):
 
 
 def test_the_users_validation_is_taken_and_never_trained_on(tmp_path):
-    store = store_of(tmp_path, ["a", "b", "c"], seconds=30.0)
+    store = sailing.store_of(tmp_path, ["a", "b", "c"], seconds=30.0)
     split = choose_split(store, (), ("b",), "ref", 20)
     assert split.training == ("a", "c") and split.validation == ("b",)
     with pytest.raises(StoreError, match="also a validation"):
@@ -48,7 +32,7 @@ def test_the_users_validation_is_taken_and_never_trained_on(tmp_path):
 @pytest.mark.parametrize("count", [2, 3, 5, 9])
 def test_with_no_split_in_mind_every_voyage_is_on_one_side(tmp_path, count):
     names = [f"t{i}" for i in range(count)]
-    split = choose_split(store_of(tmp_path, names), (), (), "ref", 40)
+    split = choose_split(sailing.store_of(tmp_path, names), (), (), "ref", 40)
     sides = (*split.training, *split.validation, *split.test)
     assert sorted(sides) == names
     assert split.training and split.validation
@@ -59,14 +43,14 @@ def test_with_no_split_in_mind_every_voyage_is_on_one_side(tmp_path, count):
 
 def test_the_same_data_under_two_names_stays_on_one_side(tmp_path):
     names = [f"t{i}" for i in range(6)]
-    store = store_of(tmp_path, [*names, "copy_of_t0"], same=("t0", "copy_of_t0"))
+    store = sailing.store_of(tmp_path, [*names, "copy_of_t0"], same=("t0", "copy_of_t0"))
     split = choose_split(store, (), (), "ref", 40)
     (side,) = [s for s in (split.training, split.validation, split.test) if "t0" in s]
     assert "copy_of_t0" in side
 
 
 def test_the_same_data_on_both_sides_is_refused(tmp_path):
-    store = store_of(tmp_path, ["t0", "t1"], same=("t0", "t1"))
+    store = sailing.store_of(tmp_path, ["t0", "t1"], same=("t0", "t1"))
     split = Split(training=("t0",), validation=("t1",))
     with pytest.raises(StoreError, match=r"t0 and t1 hold 13\d identical seconds"):
         train_run(Config(window=40, split=split), store, tmp_path / "run")
@@ -75,7 +59,7 @@ def test_the_same_data_on_both_sides_is_refused(tmp_path):
 
 def test_one_voyage_is_split_in_time(tmp_path):
     """130 s: the first 70 % train, the last 15 % test, and no second is on two sides."""
-    store = store_of(tmp_path, ["only"])
+    store = sailing.store_of(tmp_path, ["only"])
     split = choose_split(store, (), (), "ref", 10)
     sides = [*split.training, *split.validation, *split.test]
     found = [parse(name) for name in sides]
@@ -93,7 +77,7 @@ def test_one_voyage_is_split_in_time(tmp_path):
 @pytest.mark.parametrize(("size", "left"), ((40, 19), (100, 19)))
 def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, left):
     with pytest.raises(StoreError, match="the only voyage") as caught:
-        choose_split(store_of(tmp_path, ["only"]), (), (), "ref", size)
+        choose_split(sailing.store_of(tmp_path, ["only"]), (), (), "ref", size)
     window = int(caught.value.hint.split("--window ")[1].split(" ")[0])
     assert window == pytest.approx(left, abs=1)
     split = choose_split(Store(tmp_path / "store"), (), (), "ref", window - 2)
@@ -101,8 +85,8 @@ def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, lef
 
 
 def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_path, caplog):
-    store = store_of(tmp_path, ["a", "b", "c"])
-    short = store_of(tmp_path, ["d"], seconds=35.0)
+    store = sailing.store_of(tmp_path, ["a", "b", "c"])
+    short = sailing.store_of(tmp_path, ["d"], seconds=35.0)
     assert short.path == store.path
     caplog.set_level("INFO")
     split = choose_split(store, (), (), "ref", 40)
@@ -112,7 +96,7 @@ def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_pa
 
 
 def test_no_voyage_long_enough_is_said_with_what_would_do(tmp_path):
-    store = store_of(tmp_path, ["a", "b"], seconds=35.0)
+    store = sailing.store_of(tmp_path, ["a", "b"], seconds=35.0)
     with pytest.raises(StoreError, match="No voyage has a window of 100 s") as caught:
         choose_split(store, (), (), "ref", 100)
     assert "`--window 30` uses all" in caught.value.hint
@@ -131,7 +115,7 @@ def test_parts_share_seconds_where_they_meet(one, other, shared):
 
 
 def test_a_name_that_looks_like_a_part_is_itself_where_it_is_stored(tmp_path):
-    store = store_of(tmp_path, ["trip", "trip[0:50]"])
+    store = sailing.store_of(tmp_path, ["trip", "trip[0:50]"])
     assert set(store.select(["trip[[]0:50]"])) == {"trip[0:50]"}
     (frame,) = store.tables(["trip[0:50]"])
     assert frame.collect().height > 1000  # 130 s of it, not 50

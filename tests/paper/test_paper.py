@@ -1,0 +1,120 @@
+"""The whole experiment, short: five voyages of a minute, four sets, two seeds, two iterations."""
+
+import json
+
+import polars as pl
+import pytest
+import sailing
+from test_cli import call
+
+from pipelines.paper import choose_voyages
+from shiplog.exceptions import StoreError
+from shiplog.paper import sets
+
+FEW = ("--window", 20, "--width", 8, "--seeds", 2, "--epochs", 2)
+DATA = ("ref", "sli2", "jit2", "d-ref")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sea")
+    return sailing.store_of(folder, [f"v{i}" for i in range(5)], seconds=62.0)
+
+
+@pytest.fixture(scope="module")
+def experiment(store, tmp_path_factory):
+    out = tmp_path_factory.mktemp("paper") / "out"
+    said = [word for name in DATA for word in ("--data", name)]
+    code, text, _ = call("paper", "--store", store.path, "--out", out, *FEW, *said,
+                         "--json", out.parent / "answer.json")  # fmt: skip
+    assert code == 0
+    return out, text, json.loads((out.parent / "answer.json").read_text(encoding="utf-8"))
+
+
+def test_every_table_and_figure_is_there(experiment):
+    out, _, answer = experiment
+    losses = pl.read_parquet(out / "tables" / "test_losses.parquet")
+    assert losses.select("set", "seed").rows() == [(n, s) for n in DATA for s in (0, 1)]
+    assert (losses["loss"] > 0.0).all()
+    drawn = {path.name for path in (out / "figures").iterdir()}
+    names = ["histograms", "wind", "validation_loss", "test_loss", "inputs", "ref_and_sli2",
+             "ref_and_jit2", "ref_and_d-ref"]  # fmt: skip
+    assert drawn == {f"{name}.{kind}" for name in names for kind in ("svg", "png")}
+    assert all((out / "figures" / name).stat().st_size > 3000 for name in drawn)
+    assert (out / "paper.rrd").read_bytes()[:4] == b"RRF2"
+    assert [s["left"] for s in answer["statements"]] == ["sli2", "jit2", "d-ref"]
+    assert answer["failures"] == {}
+
+
+def test_sizes_are_of_slicing_and_jittering(experiment):
+    """61 s in a row have 3 windows of 20 s; 5 when they begin every 10 s (Eq. 14)."""
+    out, _, answer = experiment
+    table = pl.read_parquet(out / "tables" / "sizes.parquet")
+    voyages = len(answer["reference"])
+    windows = dict(table.select("set", "windows").iter_rows())
+    assert windows["ref"] == 3 * voyages
+    assert windows["sli2"] == 5 * voyages
+    assert windows["jit2"] == 2 * windows["ref"]
+    assert windows["d-ref"] == 3 * len(answer["split"]["training"])
+    assert set(answer["reference"]) < set(answer["split"]["training"])
+
+
+def test_seeds_begin_alike_in_every_set_and_are_scaled_by_the_reference_set(experiment):
+    out, _, _ = experiment
+    first = pl.read_parquet(out / "tables" / "validation_losses.parquet").filter(
+        pl.col("epoch") == 0
+    )
+    for _, own in first.group_by("seed"):
+        assert own["validation"].n_unique() == 1  # the same weights and scales, before any update
+
+
+def test_given_again_it_trains_nothing_and_says_the_same(experiment, store):
+    out, text, _ = experiment
+    weights = out / "runs" / "ref" / "seed0" / "model.safetensors"
+    before = weights.stat().st_mtime_ns
+    said = [word for name in DATA for word in ("--data", name)]
+    code, again, _ = call("paper", "--store", store.path, "--out", out, *FEW, *said)
+    assert (code, again) == (0, text)
+    assert weights.stat().st_mtime_ns == before
+
+
+def test_a_folder_of_other_settings_is_said_and_not_touched(experiment, store):
+    out, _, _ = experiment
+    code, _, said = call("paper", "--store", store.path, "--out", out, "--window", 20, "--width", 9,
+                         "--seeds", 2, "--epochs", 2, "--data", "ref")  # fmt: skip
+    assert code == 1
+    assert "is a finished run of other settings" in said
+
+
+def test_without_a_test_voyage_there_is_no_experiment(tmp_path):
+    store = sailing.store_of(tmp_path, ["a", "b"], seconds=62.0)
+    with pytest.raises(StoreError, match="no voyage left to test on"):
+        choose_voyages(store, (), (), 20)
+
+
+def test_one_long_voyage_is_halved_for_the_reference_set(tmp_path):
+    store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
+    chosen = choose_voyages(store, (), (), 20)
+    (whole,), (half,) = chosen.d_ref, chosen.reference
+    assert whole == "a[0:209]"
+    assert half == "a[0:104]"
+
+
+def test_histograms_count_every_second_once_in_bins_that_all_sets_share():
+    rows = {"ref": pl.DataFrame({"surge": [0.0, 0.5, 1.0], "rudder": [0.0, 0.1, -0.1]}),
+            "test": pl.DataFrame({"surge": [2.0, 2.0], "rudder": [0.0, 0.0]})}  # fmt: skip
+    table = sets.histograms(rows, ["surge", "rudder"], {"rudder"})
+    counts = table.group_by("set", "channel").agg(pl.col("seconds").sum())
+    assert sorted(counts.rows()) == [
+        ("ref", "rudder", 3), ("ref", "surge", 3), ("test", "rudder", 2), ("test", "surge", 2),
+    ]  # fmt: skip
+    rudder = table.filter(pl.col("channel") == "rudder")
+    assert rudder["high"].max() == pytest.approx(5.7296, abs=1e-3)  # 0.1 rad in degrees
+
+
+def test_wind_bins_are_the_papers():
+    """0.25 m/s by 20 deg; 359 deg from the bow is the last bin, as -1 deg is."""
+    rows = {"ref": pl.DataFrame({"wind_speed": [1.1, 1.1, 1.3], "wind_angle": [-0.01, 6.27, 0.0]})}
+    assert sets.wind(rows).rows() == [
+        ("ref", 1.0, 340.0, 2, 0.25), ("ref", 1.25, 0.0, 1, 0.25),
+    ]  # fmt: skip
