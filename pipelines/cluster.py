@@ -1,18 +1,48 @@
-"""Trainings of begun runs on a Ray cluster; what comes back is kept in the run folders here."""
+"""On a Ray cluster: trainings of begun runs, and the 1 Hz rows of many voyages."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
 from contextlib import closing
+from pathlib import Path
+
+import polars as pl
 
 from pipelines.bars import Bars
 from pipelines.train import training_of
-from shiplog import runs
+from shiplog import runs, table
 from shiplog.training import cluster
 from shiplog.training.queue import Task
 
 log = logging.getLogger(__name__)
+
+
+def resample(
+    paths: Sequence[Path], columns: Sequence[str], circular: Sequence[str], out: Path, address: str
+) -> list[Path]:
+    """10 Hz rows to 1 Hz rows, a task a voyage: a folder of Parquet in `out` for each of `paths`.
+
+    paths   a Parquet file of 10 Hz rows for each voyage; both they and `out` on a disk that all
+            nodes share
+
+    Raises ShiplogError without Ray or a cluster.
+    """
+    ray = cluster.connected(address)
+    one = ray.remote(num_cpus=1, max_retries=-1)(_resample_one)
+    try:
+        tasks = [one.remote(path, tuple(columns), tuple(circular), out / path.stem)
+                 for path in paths]  # fmt: skip
+        return ray.get(tasks)
+    finally:
+        ray.shutdown()
+
+
+def _resample_one(
+    path: Path, columns: tuple[str, ...], circular: tuple[str, ...], out: Path
+) -> Path:
+    table.sink_averages([pl.scan_parquet(path)], columns, circular, out)
+    return out
 
 
 def do(tasks: Sequence[Task], address: str) -> dict[str, str]:

@@ -1,13 +1,14 @@
 """10 Hz to 1 Hz: rows a second and peak memory, beside polars' `group_by_dynamic` as the peer.
 
-    python -m pipelines.benchmarks.resample [--rows 1e7 1e8]
+    python -m pipelines.benchmarks.resample [--rows 1e7 1e8] [--ray ADDRESS]
 
-Each measurement runs in a process of its own, so that its peak memory is its own.
+With --ray also as one task a voyage on that cluster. Each measurement runs in a process of its own, so that its peak memory is its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import multiprocessing
 import resource
 import tempfile
@@ -61,6 +62,13 @@ def peer(paths: list[Path], out: Path) -> None:
     )
 
 
+def on_ray(paths: list[Path], out: Path, address: str) -> None:
+    """A task a voyage; the seconds hold the time to join the cluster."""
+    from pipelines import cluster
+
+    cluster.resample(paths, COLUMNS, CIRCULAR, out, address)
+
+
 def measure(job: Callable[[list[Path], Path], None], paths: list[Path], out: Path) -> tuple:
     """Seconds and peak memory [MB] of a job in a process of its own."""
     context = multiprocessing.get_context("spawn")
@@ -82,12 +90,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=float, nargs="+", default=[1e6, 1e7])
     parser.add_argument("--no-peer", action="store_true")
+    parser.add_argument("--ray", metavar="ADDRESS", help="a cluster that sees this disk")
     arguments = parser.parse_args()
     print(f"{'rows':>12} {'route':<18} {'rows/s':>10} {'peak MB':>8}")
     for rows in map(int, arguments.rows):
         with tempfile.TemporaryDirectory() as scratch:
             paths = write_table(Path(scratch), rows)
             jobs = [("shiplog", ours)] + ([] if arguments.no_peer else [("group_by_dynamic", peer)])
+            if arguments.ray:
+                jobs.append(("shiplog on Ray", functools.partial(on_ray, address=arguments.ray)))
             for name, job in jobs:
                 took, peak = measure(job, paths, Path(scratch) / f"out_{name}")
                 print(f"{rows:>12} {name:<18} {rows / took:>10.3g} {peak:>8.0f}", flush=True)

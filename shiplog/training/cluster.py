@@ -42,7 +42,7 @@ def work(
 
     address   of the cluster's head, as `ray start` prints it
     """
-    ray = _connected(address)
+    ray = connected(address)
     # A node that is gone is no fault of the training: it is done again until it ends.
     piece = ray.remote(num_cpus=1, max_retries=-1)(_piece)
     try:
@@ -68,7 +68,7 @@ def work(
         ray.shutdown()
 
 
-def _connected(address: str) -> Any:
+def connected(address: str) -> Any:
     """Ray, joined to the cluster."""
     try:
         import ray
