@@ -2,7 +2,8 @@
 
     python -m pipelines.benchmarks.resample [--rows 1e7 1e8] [--ray ADDRESS]
 
-With --ray also as one task a voyage on that cluster. Each measurement runs in a process of its own, so that its peak memory is its own.
+With --ray also as one task a voyage on that cluster. Each measurement runs in a process of its own,
+so that its peak memory is its own.
 """
 
 from __future__ import annotations
