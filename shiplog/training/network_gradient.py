@@ -51,7 +51,7 @@ def batch(windows: Windows, scaling: Scaling, shape: Shape, dtype: torch.dtype) 
 
 def trapezoid(dt: Tensor) -> Tensor:
     """Weights [I, N] of d_i in the trapezoidal time integral of Eq. 8, from dt [I - 1, N]."""
-    weights = dt.new_zeros(dt.shape[0] + 1, dt.shape[1])
+    weights = dt.new_zeros(dt.shape[0] + 1, *dt.shape[1:])
     weights[:-1] += 0.5 * dt
     weights[1:] += 0.5 * dt
     return weights
@@ -89,78 +89,95 @@ def loss_only(weights: Sequence[Tensor], data: Batch, scaling: Scaling, shape: S
 def by_torch(
     weights: Sequence[Tensor], data: Batch, scaling: Scaling, shape: Shape, gradient: bool = True
 ) -> tuple[float, list[Tensor]]:
-    """As `loss_and_gradient`, in torch, back-propagated by hand through time.
+    """As `loss_and_gradient`, in torch, back-propagated by hand through time."""
+    loss, gradients = together(weights, data, scaling, shape, gradient)
+    return float(loss), gradients
+
+
+@torch.no_grad()
+def together(
+    weights: Sequence[Tensor], data: Batch, scaling: Scaling, shape: Shape, gradient: bool = True
+) -> tuple[Tensor, list[Tensor]]:
+    """Loss and gradient in torch, of one network or of S networks at once.
+
+    weights   as in `loss_and_gradient`, or each with a first dimension S; the batch then has
+              windows of each network: velocity [I, S, N, 3] and so on
+    returns   the loss, [] or [S], float64, and gradients of the weights' shapes
 
     What the actuators and the wind add to the first layer is known beforehand and is one matrix
     product; the weights' gradients are one product a layer, after the backward sweep. The scales
     are folded into the first and the last layer, so that a step of time is ten operations.
     """
-    like = data.velocity
-    steps, count = data.dt.shape
+    like, several = data.velocity, weights[0].dim() == 3
+    steps, count = data.dt.shape[0], data.dt.shape[-1]
     scale = scaling.to(like.dtype)
     mean, std = scale.input_mean[:3], scale.input_std[:3]
     matrices, biases = list(weights[0::2]), list(weights[1::2])
-    depth, width = len(matrices) - 1, matrices[0].shape[0]
-    from_velocity, from_driven = matrices[0][:, :3], matrices[0][:, 3:]
+    if several:
+        biases = [b.unsqueeze(1) for b in biases]
+    add, multiply = (torch.baddbmm, torch.bmm) if several else (torch.addmm, torch.mm)
+    depth, width = len(matrices) - 1, matrices[0].shape[-2]
+    from_velocity, from_driven = matrices[0][..., :3], matrices[0][..., 3:]
     entry = from_velocity if shape.input_tanh else from_velocity / std
-    first = torch.addmm(biases[0], data.driven[:-1].flatten(0, 1), from_driven.T)
+    first = data.driven[:-1] @ from_driven.mT + biases[0]
     if not shape.input_tanh:
-        first -= entry @ mean
-    first = first.view(steps, count, width)
+        first -= (entry @ mean).unsqueeze(-2)
     out = matrices[depth] * scale.output_std[:, None]
     out_bias = biases[depth] * scale.output_std + scale.output_mean
 
-    hidden = like.new_empty(steps if gradient else 1, depth, count, width)
+    hidden = like.new_empty(steps if gradient else 1, depth, *like.shape[1:-1], width)
     path = torch.empty_like(like)
     path[0] = like[0]
     z = velocity = like[0]
-    entry_t, out_t = entry.T, out.T
-    transposed = [m.T for m in matrices]
+    entry_t, out_t = entry.mT, out.mT
+    transposed = [m.mT for m in matrices]
     for k in range(steps):
         layers = hidden[k if gradient else 0]
         if shape.input_tanh:
             z = torch.tanh((velocity - mean) / std)
-        h = torch.addmm(first[k], z, entry_t, out=layers[0]).tanh_()
+        h = add(first[k], z, entry_t, out=layers[0]).tanh_()
         for layer in range(1, depth):
-            h = torch.addmm(biases[layer], h, transposed[layer], out=layers[layer]).tanh_()
-        y = torch.addmm(out_bias, h, out_t)
-        z = velocity = torch.addcmul(velocity, data.dt[k, :, None], y, out=path[k + 1])
+            h = add(biases[layer], h, transposed[layer], out=layers[layer]).tanh_()
+        y = add(out_bias, h, out_t)
+        z = velocity = torch.addcmul(velocity, data.dt[k].unsqueeze(-1), y, out=path[k + 1])
 
     error = path - like
     weighted = error * _error_weights(like) * trapezoid(data.dt)[..., None]
-    loss = float((weighted * error).sum(dtype=torch.float64)) / count
+    loss = (weighted * error).sum((0, -2, -1), dtype=torch.float64) / count
     if not gradient:
         return loss, []
 
     slope = weighted * (2.0 / count)  # dL/dν at each step
     bend = torch.addcmul(torch.ones_like(hidden), hidden, hidden, value=-1.0)  # 1 - h²
     entered = (path[:-1] - mean) / std
+    through = None
     if shape.input_tanh:
         entered = torch.tanh(entered)
         through = (1.0 - entered**2) / std
-    else:
-        through = None
     delta = torch.empty_like(hidden)
-    output = like.new_empty(steps, count, 3)
+    output = torch.empty_like(path[1:])
     back = slope[steps]
     for k in range(steps - 1, -1, -1):
-        d = torch.mul(back, data.dt[k, :, None], out=output[k])
+        d = torch.mul(back, data.dt[k].unsqueeze(-1), out=output[k])
         for layer in range(depth - 1, -1, -1):
             above = out if layer == depth - 1 else matrices[layer + 1]
-            d = torch.mm(d, above, out=delta[k, layer]).mul_(bend[k, layer])
+            d = multiply(d, above, out=delta[k, layer]).mul_(bend[k, layer])
         if through is None:
-            back = torch.addmm(back, d, entry).add_(slope[k])
+            back = add(back, d, entry).add_(slope[k])
         else:
             back = torch.addcmul(back, d @ entry, through[k]).add_(slope[k])
 
-    flat = [delta[:, layer].flatten(0, 1) for layer in range(depth)]
-    flat.append(output.flatten(0, 1) * scale.output_std)
-    inputs = torch.cat((entered, data.driven[:-1]), -1).flatten(0, 1)
-    below = [inputs] + [hidden[:, layer].flatten(0, 1) for layer in range(depth)]
+    deltas = [*(delta[:, layer] for layer in range(depth)), output * scale.output_std]
+    below = [torch.cat((entered, data.driven[:-1]), -1), *(hidden[:, i] for i in range(depth))]
     gradients: list[Tensor] = []
-    for d, h in zip(flat, below, strict=True):
-        gradients += [d.T @ h, d.sum(0)]
+    for d, h in zip(map(_rows, deltas), map(_rows, below), strict=True):
+        gradients += [d.mT @ h, d.sum(-2)]
     return loss, gradients
+
+
+def _rows(values: Tensor) -> Tensor:
+    """[..., steps · N, H] from [steps, ..., N, H]."""
+    return values.movedim(0, -3).flatten(-3, -2)
 
 
 def _error_weights(like: Tensor) -> Tensor:

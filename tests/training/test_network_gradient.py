@@ -93,6 +93,26 @@ def test_the_papers_network_on_the_papers_windows():
             assert relative(found, [p.grad for p in model.weights]) <= close
 
 
+@pytest.mark.parametrize("shape", [Shape(3, width=7, depth=2), Shape(3, width=5, input_tanh=True)])
+def test_several_networks_at_once_are_each_by_itself(shape):
+    """As a GPU wants them: weights and windows of each network along a further dimension."""
+    sets = [windows(6, 12, seed=seed) for seed in (1, 2, 3)]
+    models = [network(shape, sets[0], seed) for seed in (4, 5, 6)]
+    scale = models[0].scaling
+    batches = [network_gradient.batch(one, scale, shape, torch.float64) for one in sets]
+    lists = [[p.detach() for p in model.weights] for model in models]
+    all_windows = network_gradient.Batch(
+        *(torch.stack([getattr(b, name) for b in batches], 1)
+          for name in ("velocity", "driven", "dt"))
+    )  # fmt: skip
+    weights = [torch.stack(of) for of in zip(*lists, strict=True)]
+    losses, gradients = network_gradient.together(weights, all_windows, scale, shape)
+    for number, (own, batch) in enumerate(zip(lists, batches, strict=True)):
+        loss, expected = network_gradient.by_torch(own, batch, scale, shape)
+        assert float(losses[number]) == pytest.approx(loss, rel=1e-12)
+        assert relative([g[number] for g in gradients], expected) <= 1e-12
+
+
 needs_kernel = pytest.mark.skipif(kernel.level() is None, reason="the kernel was not built")
 
 
