@@ -389,7 +389,9 @@ def train(
         list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 1,
-    recipe: Annotated[str, typer.Option(help="fast (seconds to a minute a seed) or paper (an hour).")] = "fast",
+    recipe: Annotated[
+        str, typer.Option(help="fast (seconds to a minute a seed) or paper (an hour and more).")
+    ] = "fast",
     window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
     width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
     wind_input: Annotated[
