@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import torch
 
-try:
-    import diffrax
-except ImportError:
-    diffrax = None
+diffrax: Any = None
+if find_spec("diffrax"):  # of the extra `bench`
+    diffrax = import_module("diffrax")
 
 WEIGHTS = np.array([100.0, 100.0, 10.0 * 180.0 / math.pi])  # of the velocities' errors
 UNROLLED = (1, 4)  # steps of JAX's scan that are compiled as one

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,7 +18,7 @@ COLOURS = {  # Okabe and Ito (2008), told apart by colour-blind eyes; their yell
 }  # fmt: skip
 NAMES = {"sli2xjit2": "sli2 × jit2", "sli10xjit10": "sli10 × jit10"}
 MEASURED = "#9A9A9A"
-RULES = {
+RULES: dict[Any, Any] = {
     "font.size": 8.0, "font.family": "sans-serif", "axes.linewidth": 0.6, "axes.titlesize": 8.0,
     "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 0.9,
     "legend.frameon": False, "legend.fontsize": 7.0, "xtick.labelsize": 7.0,

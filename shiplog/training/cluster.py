@@ -6,8 +6,10 @@ costs a piece, which another node does again to the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from shiplog.exceptions import ShiplogError
@@ -37,7 +39,7 @@ def _piece(training: Training, resume: Progress | None) -> Progress:
 
 def work(
     trainings: Mapping[str, tuple[Training, Progress | None]], address: str
-) -> Iterator[Result]:
+) -> Generator[Result, None, None]:
     """Do all trainings, each from where it stands. Raises ShiplogError without Ray or a cluster.
 
     address   of the cluster's head, as `ray start` prints it
@@ -70,12 +72,11 @@ def work(
 
 def connected(address: str) -> Any:
     """Ray, joined to the cluster."""
-    try:
-        import ray
-    except ImportError as error:
+    if find_spec("ray") is None:
         raise ShiplogError(
             "--ray needs Ray, which is not installed.", hint="pip install 'shiplog[ray]'."
-        ) from error
+        )
+    ray: Any = import_module("ray")
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except Exception as error:  # ConnectionError, RuntimeError, ValueError, as the case may be

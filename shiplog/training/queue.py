@@ -10,8 +10,8 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.connection import Connection
@@ -65,7 +65,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def work(tasks: Sequence[Task], workers: int | None = None) -> Iterator[Event]:
+def work(tasks: Sequence[Task], workers: int | None = None) -> Generator[Event, None, None]:
     """Do all tasks, in their order; one a core unless `workers` says otherwise.
 
     A task that fails, or whose process is ended from outside, is an event with `failure`; the
@@ -83,10 +83,10 @@ def work(tasks: Sequence[Task], workers: int | None = None) -> Iterator[Event]:
                 assert isinstance(pipe, Connection)
                 one = busy[pipe]
                 assert one.task is not None
-                try:
+                kind: str = "died"
+                value: Any = None
+                with suppress(EOFError, OSError):
                     kind, value = pipe.recv()
-                except (EOFError, OSError):
-                    kind, value = "died", None
                 if kind == "share":
                     yield Event(one.task, value)
                     continue
