@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -16,23 +16,23 @@ LINE_S = 30.0  # between two lines where there is no terminal
 
 
 class Bars:
-    """A bar for all tasks, weighed by `costs`, and one for each that is being done."""
+    """A bar for all tasks, weighed by what they cost, and one for each that is being done."""
 
-    def __init__(self, names: Sequence[str], costs: Sequence[float] | None = None) -> None:
-        self._cost = dict(zip(names, costs or [1.0] * len(names), strict=True))
-        self._whole = sum(self._cost.values()) or 1.0
-        self._share = dict.fromkeys(names, 0.0)
+    def __init__(self, costs: Mapping[str, float]) -> None:
+        self._cost = dict(costs)
+        self._whole = sum(costs.values()) or 1.0
+        self._share = dict.fromkeys(costs, 0.0)
         self._ended = 0
         self._began = self._latest = time.monotonic()
         self._own: dict[str, TaskID] = {}
         self._progress: Progress | None = None
-        if len(names) and sys.stderr.isatty():
+        if costs and sys.stderr.isatty():
             self._progress = Progress(
                 TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:.0f}%"),
                 TimeRemainingColumn(), console=Console(stderr=True), transient=True,
                 refresh_per_second=2, speed_estimate_period=600.0,
             )  # fmt: skip
-            self._all = self._progress.add_task(f"{len(names)} trainings", total=1.0)
+            self._all = self._progress.add_task(f"{len(costs)} trainings", total=1.0)
 
     def __enter__(self) -> Bars:
         if self._progress is not None:

@@ -13,6 +13,7 @@ from pipelines.bars import Bars
 from pipelines.train import training_of
 from shiplog import runs, table
 from shiplog.training import cluster
+from shiplog.training.network_training import share_done
 from shiplog.training.queue import Task
 
 log = logging.getLogger(__name__)
@@ -53,7 +54,8 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
         for name, (run, seed) in places.items()
     }
     failures: dict[str, str] = {}
-    with Bars(list(places)) as bars, closing(cluster.work(trainings, address)) as results:
+    costs = {task.name: task.cost for task in tasks}
+    with Bars(costs) as bars, closing(cluster.work(trainings, address)) as results:
         for one in results:
             run, seed = places[one.name]
             if one.progress is None:
@@ -65,7 +67,6 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
                 log.info("%s: best validation L %.0f after %d epochs", *said)
             else:
                 run.save_checkpoint(seed, one.progress)
-            least = max(run.config.paper.least_epochs, 1)
             reached = one.progress.epoch if one.progress else 0
-            bars.show(one.name, min(0.99, reached / least), one.ended)
+            bars.show(one.name, share_done(reached, run.config.paper), one.ended)
     return failures

@@ -91,15 +91,8 @@ def paper_command(
     chosen = choose_voyages(store, voyages, validation, window)
     say(chosen.of("d-ref"))
     log.info("reference set: %s", listed(chosen.reference))
-    settings = {
-        "recipe": recipe,
-        "window": window,
-        "seeds": tuple(range(seeds)),
-        "standard": chosen.reference,
-        "network": {"width": width},
-        "paper": {"most_epochs": epochs} if epochs else {},
-        "fast": {"iterations": epochs} if epochs else {},
-    }
+    settings = train.settings_of(recipe, window, seeds, width, epochs)
+    settings["standard"] = chosen.reference
     configs = {
         name: Config.model_validate({**settings, "data": name, "split": chosen.of(name)})
         for name in data
@@ -179,16 +172,16 @@ def train_sets(
     tasks: list[Task] = []
     for name, config in configs.items():
         path = out / name
-        if path.is_dir():
-            finished[name] = _same(runs.load(path), config)
-            continue
         try:
+            if path.is_dir():
+                finished[name] = _same(runs.load(path), config)
+                continue
             begun[name] = train.begin(config, store, path)
         except ShiplogError as error:  # such as a folder that is of other settings
             failures[name] = str(error)
             continue
         tasks += train.tasks_of(begun[name].run)
-    if ray is not None:
+    if tasks and ray is not None:
         from pipelines import cluster
 
         failures |= cluster.do(tasks, ray)
@@ -318,7 +311,7 @@ def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
         pl.col("run") == run.name, pl.col("seed") == run.config.seeds[0]
     ).height
     shown = ("validation", "mean", "least", "most")
-    told = [
+    losses = [
         (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in shown))
         for row in _summary(results).iter_rows(named=True)
     ]
@@ -335,7 +328,7 @@ def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
         f"{floors['least_squares']:.0f}.",
         "",
         report.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
-                     told),
+                     losses),
         "",
         "## What the paper states, on these data",
         "",

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -71,7 +72,8 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
 
     names = (profile.actuator_names, profile.wind_names)
     size = config.window
-    standard = learnt.filter(pl.col("voyage").is_in(config.standard)) if config.standard else learnt
+    # it may be a part of a training voyage, which stands there under another name
+    standard = seconds(store, config.standard, profile) if config.standard else learnt
     reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
     chosen = plan(learnt, config.data, size)
     windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
@@ -90,9 +92,12 @@ def finish(begun: Begun) -> Run:
 
 
 def tasks_of(run: Run) -> list[Task]:
-    """The trainings of a run that are not finished."""
+    """The trainings of a run that are not finished; windows of an epoch are what they cost."""
+    cost = float(run.windows().height)
+    if run.config.recipe == "fast":
+        cost = min(cost, run.config.fast.most_windows)
     return [
-        Task(f"{run.name}, seed {seed}", train_seed, (run.path, seed))
+        Task(f"{run.name}, seed {seed}", train_seed, (run.path, seed), cost)
         for seed in run.config.seeds
         if not run.finished(seed)
     ]
@@ -101,7 +106,8 @@ def tasks_of(run: Run) -> list[Task]:
 def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
     """Do all trainings, with progress on stderr. Returns those that failed, and why."""
     failures: dict[str, str] = {}
-    with Bars([task.name for task in tasks]) as bars, closing(work(tasks, workers)) as events:
+    costs = {task.name: task.cost for task in tasks}
+    with Bars(costs) as bars, closing(work(tasks, workers)) as events:
         for event in events:
             bars.show(event.task.name, event.share, event.ended)
             if not event.ended:
@@ -158,6 +164,20 @@ def _cut(run: Run, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
     return windows.cut(rows, planned, run.config.window, *names)
 
 
+def settings_of(
+    recipe: str, window: int, seeds: int, width: int, epochs: int | None
+) -> dict[str, Any]:
+    """A configuration as the options of the command line have it, without its voyages."""
+    return {
+        "recipe": recipe,
+        "window": window,
+        "seeds": tuple(range(seeds)),
+        "network": {"width": width},
+        "paper": {"most_epochs": epochs} if epochs else {},
+        "fast": {"iterations": epochs} if epochs else {},
+    }
+
+
 def train_command(
     store_path: Path,
     out: Path,
@@ -178,19 +198,10 @@ def train_command(
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
     say(split)
-    config = Config.model_validate(
-        {
-            "model": model,
-            "data": data,
-            "recipe": recipe,
-            "window": window,
-            "split": split,
-            "seeds": tuple(range(seeds)),
-            "network": {"width": width} | ({"wind_input": wind_input} if wind_input else {}),
-            "paper": {"most_epochs": epochs} if epochs else {},
-            "fast": {"iterations": epochs} if epochs else {},
-        }
-    )
+    settings = settings_of(recipe, window, seeds, width, epochs)
+    if wind_input:
+        settings["network"]["wind_input"] = wind_input
+    config = Config.model_validate({**settings, "model": model, "data": data, "split": split})
     run = train_run(config, store, out)
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     said = ", ".join(f"{loss:.0f}" for loss in best.values())

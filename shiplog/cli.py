@@ -67,6 +67,14 @@ Causes = Annotated[
     list[Path] | None,
     typer.Option("--cause", help="A Python file with causes of your own; several times."),
 ]
+Window = Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")]
+Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
+Epochs = Annotated[
+    int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
+]
+Validation = Annotated[
+    list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
+]
 STORE = Path("store")
 
 
@@ -385,22 +393,16 @@ def train(
         str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")
     ] = "ref",
     voyages: Voyages = None,
-    validation: Annotated[
-        list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
-    ] = None,
+    validation: Validation = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 1,
-    recipe: Annotated[
-        str, typer.Option(help="fast (seconds to a minute a seed) or paper (an hour and more).")
-    ] = "fast",
-    window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
-    width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
+    recipe: Annotated[str, typer.Option(help="fast, or paper: the published one, hours.")] = "fast",
+    window: Window = 100,
+    width: Width = 256,
     wind_input: Annotated[
         str | None,
         typer.Option(help="angle (default of the paper's recipe) or components (of the fast one)."),
     ] = None,
-    epochs: Annotated[
-        int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
-    ] = None,
+    epochs: Epochs = None,
     fit: Annotated[
         bool,
         typer.Option("--fit/--no-fit", help="Physical models: identify, or as published."),
@@ -487,18 +489,12 @@ def paper(
         typer.Option("--data", help="Window sets, all eight unless given; several times."),
     ] = None,
     voyages: Voyages = None,
-    validation: Annotated[
-        list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
-    ] = None,
+    validation: Validation = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 10,
-    recipe: Annotated[
-        str, typer.Option(help="fast (a quarter of an hour in all) or paper (a day).")
-    ] = "fast",
-    window: Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")] = 100,
-    width: Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")] = 256,
-    epochs: Annotated[
-        int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
-    ] = None,
+    recipe: Annotated[str, typer.Option(help="fast, or paper: the published one, days.")] = "fast",
+    window: Window = 100,
+    width: Width = 256,
+    epochs: Epochs = None,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Trainings at a time; one a core unless given.")
     ] = None,

@@ -16,11 +16,11 @@ import polars as pl
 from scipy.spatial import KDTree
 
 from shiplog.channels import VELOCITY
+from shiplog.wind_histogram import ANGLE_BIN, SPEED_BIN
 
 QUANTILE = 0.95  # of the distances that training seconds have from other voyages' or blocks'
 BLOCK = 100  # rows; neighbours within one block are one manoeuvre, not independent data
-WIND_SPEED_BIN = 0.25  # m/s, as the paper's Fig. 4
-WIND_ANGLE_BIN = math.radians(20.0)
+WIND_ANGLE_BIN = math.radians(ANGLE_BIN)
 BINS_PER_STD = 4.0
 NEVER_SEEN = 0.25  # share of a window outside the histogram above which a channel is named
 
@@ -141,6 +141,6 @@ def _bins(values: np.ndarray, std: float) -> np.ndarray:
 
 
 def _wind_bins(seconds: pl.DataFrame) -> tuple[list[int], list[int]]:
-    speed = np.floor(seconds["wind_speed"].to_numpy() / WIND_SPEED_BIN).astype(int)
+    speed = np.floor(seconds["wind_speed"].to_numpy() / SPEED_BIN).astype(int)
     angle = np.floor((seconds["wind_angle"].to_numpy() % (2 * np.pi)) / WIND_ANGLE_BIN).astype(int)
     return speed.tolist(), angle.tolist()

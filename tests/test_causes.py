@@ -680,7 +680,7 @@ MISSING = {
 @EVERY
 def test_what_a_ferry_cannot_be_asked(cause):
     """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested.
-    What turns its thrusters may be late or aslant as a rudder may."""
+    What turns its thrusters may be late or misaligned as a rudder may."""
     said = cause.missing(setting(FERRY))
     if cause.label not in MISSING:
         assert said is None

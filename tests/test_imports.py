@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROWS = (  # each may import its own row (a package its own modules) and the rows above
     {"exceptions", "channels", "seeds", "cache", "timescale", "parts"},
-    {"units", "findings", "traced", "unexpected"},
+    {"units", "findings", "traced", "unexpected", "wind_histogram"},
     {"profile", "config", "logs", "comparison", "exhibit"},
     {"align", "midship", "quality", "conversion"},
     {"draft"},

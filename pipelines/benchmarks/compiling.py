@@ -14,11 +14,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pipelines.benchmarks.rollouts import SHIP, Job, clock, cores, interleaved, processor, report
+from pipelines.benchmarks.rollouts import SHIP, Job, clock, interleaved, processor, report
 from shiplog import linearise, profile, traced
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import beside, load
+from shiplog.training.queue import cores
 
 SEGMENTS, NODES = 64, 151  # of one call, as a diagnosis makes them
 WITH: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": True}

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from pipelines.benchmarks.machine import cores, processor
+from pipelines.benchmarks.machine import processor
 from shiplog import profile
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.identify import Identified, identify
@@ -27,6 +27,7 @@ from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, beside, load
 from shiplog.sensitivity import Series, linearised, normal, padded, rollout
+from shiplog.training.queue import cores
 
 try:
     from pipelines.benchmarks.casadi_mmg import Peer

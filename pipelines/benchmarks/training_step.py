@@ -19,19 +19,19 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ONE_THREAD = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
-for _name in THREADS:  # before anything numerical is imported
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"
 os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {ONE_THREAD}".strip()
 
-import numpy as np  # noqa: E402
+import numpy as np  # noqa: E402 (after the environment is set, as all below)
 import torch  # noqa: E402
 
-from pipelines.benchmarks.machine import cores, processor  # noqa: E402
+from pipelines.benchmarks.machine import processor  # noqa: E402
 from shiplog.models.feedforward import Scaling, Shape  # noqa: E402
 from shiplog.training import kernel, network_gradient  # noqa: E402
 from shiplog.training.network_gradient import Batch  # noqa: E402
+from shiplog.training.queue import cores  # noqa: E402
 
 SAMPLES = 100  # of a window
 SHAPE = Shape(3)

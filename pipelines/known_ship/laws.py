@@ -108,7 +108,7 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Laws:
-    """What a ship obeys beside its own coefficients. As they are: those of the sample logs."""
+    """What a ship obeys in addition to its own coefficients; the defaults made the sample logs."""
 
     shallow: Shallow = field(default_factory=Shallow)
     bank: Bank = field(default_factory=Bank)

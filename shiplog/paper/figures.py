@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from shiplog.channels import VELOCITY
+from shiplog import channels
 from shiplog.paper.style import COLOURS, MEASURED, figure, named
+from shiplog.wind_histogram import ANGLE_BIN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DEGREE = 180.0 / math.pi
 COLUMNS = 3  # of histograms side by side
 LEAST_ERROR = 0.1  # of d, where its axis begins: a window begins with none
-LABELS = {
-    "surge": "surge u [m/s]", "sway": "sway $v_m$ [m/s]", "yaw_rate": "yaw rate r [deg/s]",
-    "loss": "error d", "wind_speed": "wind speed [m/s]", "wind_angle": "wind angle [deg]",
-}  # fmt: skip
+LABELS = {c.name: c.label for c in channels.VELOCITY} | {"d": "error d"}
 
 
 def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
@@ -31,11 +28,11 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
     table   as sets.histograms gives it
     units   of the channels
     """
-    channels = table["channel"].unique(maintain_order=True).to_list()
-    rows = math.ceil(len(channels) / COLUMNS)
+    shown = table["channel"].unique(maintain_order=True).to_list()
+    rows = math.ceil(len(shown) / COLUMNS)
     with figure(0.4 + 1.5 * rows, path) as drawn:
         axes = drawn.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for axis, channel in zip(axes, channels, strict=False):
+        for axis, channel in zip(axes, shown, strict=False):
             for (name,), own in table.filter(pl.col("channel") == channel).group_by(
                 "set", maintain_order=True
             ):
@@ -44,12 +41,10 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
                             label=named(str(name)), linewidth=1.0)  # fmt: skip
             axis.set_yscale("log")
             axis.set_ylim(bottom=0.7)
-            unit = units.get(channel, "")
-            said = f"{channel} [{unit}]" if unit else channel
-            axis.set_xlabel(LABELS.get(channel, said))
-        for axis in axes[len(channels) :]:
+            axis.set_xlabel(LABELS.get(channel, f"{channel} [{units.get(channel, '1')}]"))
+        for axis in axes[len(shown) :]:
             axis.set_axis_off()
-        for axis in axes[: len(channels) : COLUMNS]:
+        for axis in axes[: len(shown) : COLUMNS]:
             axis.set_ylabel("seconds")
         drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
 
@@ -60,15 +55,15 @@ def wind(table: pl.DataFrame, path: Path) -> None:
 
     sets = table["set"].unique(maintain_order=True).to_list()
     width = float(table["speed_bin"][0])
-    speeds = np.arange(0.0, float(table["speed"].max()) + 1.5 * width, width)  # type: ignore[arg-type] # a column of floats
-    angles = np.arange(0.0, 361.0, 20.0)
-    most = max(2, int(table["seconds"].max()))  # type: ignore[arg-type] # likewise
+    speeds = np.arange(0.0, table["speed"].to_numpy().max() + 1.5 * width, width)
+    angles = np.arange(0.0, 360.0 + ANGLE_BIN, ANGLE_BIN)
+    most = max(2, int(table["seconds"].to_numpy().max()))
     with figure(2.6, path) as drawn:
         axes = drawn.subplots(1, len(sets), sharey=True, squeeze=False)[0]
         for axis, name in zip(axes, sets, strict=True):
             counts = np.zeros((len(speeds) - 1, len(angles) - 1))
             for row in table.filter(pl.col("set") == name).iter_rows(named=True):
-                counts[round(row["speed"] / width), int(row["angle"] // 20.0)] = row["seconds"]
+                counts[round(row["speed"] / width), int(row["angle"] // ANGLE_BIN)] = row["seconds"]
             shown = axis.pcolormesh(
                 angles, speeds, np.ma.masked_equal(counts, 0.0), norm=LogNorm(1, most),
                 cmap="viridis", rasterized=True,
@@ -130,13 +125,13 @@ def inputs(rows: pl.DataFrame, units: dict[str, str], path: Path) -> None:
 
     rows    elapsed [s], the channels of `units`, angles in rad
     """
-    channels = [name for name in units if name in rows.columns]
-    with figure(0.4 + 1.0 * len(channels), path) as drawn:
-        axes = drawn.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, name in zip(axes, channels, strict=True):
+    shown = [name for name in units if name in rows.columns]
+    with figure(0.4 + 1.0 * len(shown), path) as drawn:
+        axes = drawn.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, name in zip(axes, shown, strict=True):
             values = rows[name].to_numpy()
             if units[name] == "deg":
-                values = values * DEGREE
+                values = values / channels.DEGREE
                 if name == "wind_angle":
                     values = _broken(values % 360.0)
             axis.plot(rows["elapsed"], values, color=COLOURS["test"], linewidth=0.8)
@@ -152,17 +147,17 @@ def states(rollouts: pl.DataFrame, measured: pl.DataFrame, pair: Sequence[str], 
 
     A line is the median of the seeds, a band their range. Each window begins at what was measured.
     """
-    rows = [c.name for c in VELOCITY] + ["d"]
+    rows = [c.name for c in channels.VELOCITY] + ["d"]
     with figure(5.6, path) as drawn:
         axes = drawn.subplots(len(rows), 1, sharex=True)
         for axis, name in zip(axes, rows, strict=True):
-            factor = DEGREE if name == "yaw_rate" else 1.0
+            factor = channels.YAW_RATE.to_display if name == channels.YAW_RATE.name else 1.0
             if name != "d":
                 axis.plot(measured["elapsed"], measured[name] * factor, color=MEASURED,
                           linewidth=1.6, label="measured")  # fmt: skip
             for of in pair:
                 _band(axis, rollouts.filter(pl.col("set") == of), name, factor, of)
-            axis.set_ylabel(LABELS.get(name, LABELS["loss"]))
+            axis.set_ylabel(LABELS[name])
         axes[-1].set_yscale("log")
         axes[-1].set_ylim(bottom=LEAST_ERROR)
         starts = rollouts.group_by("window").agg(pl.col("time").min())["time"].to_list()

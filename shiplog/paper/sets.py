@@ -8,18 +8,16 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 import polars as pl
 
-from shiplog.channels import VELOCITY
+from shiplog import channels
 from shiplog.config import AUGMENTATIONS
+from shiplog.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
-SETS = tuple(AUGMENTATIONS)
 BINS = 30  # of a histogram of one channel
-WIND_SPEED_BIN = 0.25  # m/s, the paper's
-WIND_ANGLE_BIN = 20.0  # deg, the paper's
-MOST_SPEED_BINS = 40  # in stronger winds bins are wider
-DEGREE = 180.0 / math.pi
 
 
-def sizes(plans: Mapping[str, pl.DataFrame], voyages: Mapping[str, Sequence[str]], size: int):
+def sizes(
+    plans: Mapping[str, pl.DataFrame], voyages: Mapping[str, Sequence[str]], size: int
+) -> pl.DataFrame:
     """set, voyages, step and copies of Table 4, windows, samples: one row a set.
 
     plans    the planned windows of each set, a row a window
@@ -46,10 +44,10 @@ def histograms(
     columns  of them; all sets share a channel's bins
     angles   those in rad, which become degrees as the yaw rate does
     """
-    turning = {*angles, *(c.name for c in VELOCITY if c.unit == "rad/s")}
+    turning = {*angles, channels.YAW_RATE.name}
     found = []
     for column in columns:
-        factor = DEGREE if column in turning else 1.0
+        factor = 1.0 / channels.DEGREE if column in turning else 1.0
         values = {name: frame[column].drop_nulls().to_numpy() * factor
                   for name, frame in rows.items()}  # fmt: skip
         every = np.concatenate(list(values.values()))
@@ -64,22 +62,22 @@ def histograms(
 
 
 def wind(rows: Mapping[str, pl.DataFrame]) -> pl.DataFrame:
-    """set, speed [m/s] and angle [deg, 0 to 360 from the bow] of a bin's lower corner, speed_bin,
-    seconds: the apparent wind; bins without a second are left out."""
-    fastest = max(float(np.nanmax(f["wind_speed"].to_numpy(), initial=0.0)) for f in rows.values())
-    width = WIND_SPEED_BIN * max(1, math.ceil(fastest / WIND_SPEED_BIN / MOST_SPEED_BINS))
+    """set, speed [m/s] and angle [deg, 0 to 360 from the bow] of a bin's lower corner, seconds, and
+    speed_bin [m/s]: the apparent wind; bins without a second are left out.
+
+    rows     the 1 Hz rows of each set, wind_angle in rad
+    """
+    shown = {name: frame.with_columns(pl.col("wind_angle") / channels.DEGREE)
+             for name, frame in rows.items()}  # fmt: skip
+    speeds = np.concatenate([f["wind_speed"].drop_nulls().to_numpy() for f in shown.values()])
+    fastest = SPEED_BIN * (math.floor(float(speeds.max(initial=0.0)) / SPEED_BIN) + 1)
+    fastest = min(fastest, FASTEST)
     found = []
-    for name, frame in rows.items():
-        own = frame.select("wind_speed", "wind_angle").drop_nulls()
-        angle = (pl.col("wind_angle") * DEGREE) % 360.0
-        found.append(
-            own.select(
-                set=pl.lit(name),
-                speed=(pl.col("wind_speed") / width).floor() * width,
-                angle=(angle / WIND_ANGLE_BIN).floor() * WIND_ANGLE_BIN,
-            )
-            .group_by("set", "speed", "angle")
-            .agg(seconds=pl.len().cast(pl.Int64))
-            .sort("speed", "angle")
-        )
-    return pl.concat(found).with_columns(speed_bin=pl.lit(width))
+    for name, frame in shown.items():
+        counts = wind_counts(frame, fastest).T
+        speed, angle = np.nonzero(counts)
+        found.append(pl.DataFrame({
+            "set": [name] * len(speed), "speed": speed * SPEED_BIN, "angle": angle * ANGLE_BIN,
+            "seconds": counts[speed, angle],
+        }, schema_overrides={"set": pl.String}))  # fmt: skip
+    return pl.concat(found).with_columns(speed_bin=pl.lit(SPEED_BIN))

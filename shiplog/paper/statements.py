@@ -8,8 +8,9 @@ an interval of 1 - 0.05/8 (Bonferroni).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -112,14 +113,14 @@ def _finding(said: Statement, low: float, high: float, sure: bool) -> str:
 def _best(by_set: Mapping[str, Mapping[int, float]]) -> str:
     """The augmented set of the smallest mean loss."""
     there = [name for name in AUGMENTED if name in by_set]
-    mean: Callable[[str], float] = lambda name: float(np.mean(list(by_set[name].values())))  # noqa: E731
-    return min(there, key=mean) if there else ""
+    means = {name: float(np.mean(list(by_set[name].values()))) for name in there}
+    return min(means, key=means.__getitem__, default="")
 
 
-def sentence(row: Mapping[str, object]) -> str:
-    """One comparison in words, with its number."""
-    left, right, ratio = row["left"], row["right"], float(str(row["ratio"]))
+def sentence(row: Mapping[str, Any]) -> str:
+    """One comparison in words, with its number; `row` of the table of `differences`."""
+    left, right, ratio = row["left"], row["right"], row["ratio"]
     if row["low"] is None:
         return f"L of {left} is {ratio:.2f} times that of {right}: one seed, so no interval."
-    between = f"{float(str(row['low'])):.2f} to {float(str(row['high'])):.2f}"
+    between = f"{row['low']:.2f} to {row['high']:.2f}"
     return f"L of {left} is {ratio:.2f} ({between}) times that of {right}: {row['finding']}."

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.1  # inches: two columns of a journal's page
-COLOURS = {  # Okabe and Ito (2008), told apart by colour-blind eyes; their yellow darkened
+COLOURS = {  # Okabe and Ito (2008), safe for colour-blind eyes; their yellow darkened
     "ref": "#000000", "sli2": "#E69F00", "sli10": "#D55E00", "jit2": "#56B4E9",
     "jit10": "#0072B2", "sli2xjit2": "#CC79A7", "sli10xjit10": "#009E73", "d-ref": "#A89A00",
     "validation": "#8C8C8C", "test": "#5E3C99",

@@ -35,15 +35,6 @@ class Training:
     def scaling(self) -> Scaling:
         return self.model.scaling
 
-    @property
-    def cost(self) -> float:
-        """Euler steps of an epoch: how trainings of one recipe compare in time."""
-        count = self.training.dt.numel()
-        if self.config.recipe == "fast":
-            most = self.config.fast.most_windows
-            count *= min(1.0, most / max(self.training.dt.shape[1], 1))
-        return float(count + 0.4 * self.validation.dt.numel())
-
     def run(
         self,
         resume: Progress | None = None,

@@ -68,7 +68,7 @@ def loss_and_gradient(
     Explicit Euler as in Eq. 9. Loss and gradient are of the velocities only, yaw rate in deg/s.
     """
     level = kernel.level() if data.velocity.device.type == "cpu" else None
-    if level is None:
+    if level is None or data.velocity.dtype not in (torch.float32, torch.float64):
         return by_torch(weights, data, scaling, shape, gradient)
     scale = scaling.to(data.velocity.dtype)
     scales = (

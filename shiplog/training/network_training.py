@@ -19,7 +19,7 @@ from shiplog.training import network_gradient
 from shiplog.training.network_gradient import Batch
 
 HISTORY = ("epoch", "training", "validation", "smoothed")
-OUT_OF_REACH = 1e30  # the value of a rollout that runs away: the line search shortens its step
+OUT_OF_REACH = 1e30  # the value of a rollout that diverges: the line search shortens its step
 KEPT_POINTS = 6  # of a line search; it seldom asks more
 
 
@@ -59,6 +59,10 @@ def paper(
     Stops once more than `least_epochs` are done and L > rise · (L_init - L_min) + L_min on the
     validation windows (Eq. 24). The weights to keep are `best_weights` (smallest L, not smoothed).
     The regulariser λ‖θ‖² of Eq. 7 has the gradient 2λθ, which is Adam's `weight_decay`.
+
+    checkpoint  is called every so many epochs with where it stands, `resume` of a later call
+    pause       return after so many epochs, finished or not
+    report      is called with the share that is done
     """
     weights = [p.detach().clone() for p in model.weights]
     moments = [torch.zeros_like(w) for w in [*weights, *weights]]
@@ -100,11 +104,14 @@ def paper(
             snapshot()
             checkpoint(progress)
         if report is not None:
-            report(
-                min(0.99, progress.epoch / max(settings.most_epochs or settings.least_epochs, 1))
-            )
+            report(share_done(progress.epoch, settings))
     snapshot()
     return progress
+
+
+def share_done(epoch: int, settings: Paper) -> float:
+    """Of a training, 0 to 0.99: how long it takes beyond the least epochs nobody knows."""
+    return min(0.99, epoch / max(settings.most_epochs or settings.least_epochs, 1))
 
 
 def paper_done(progress: Progress, settings: Paper) -> bool:
@@ -186,6 +193,10 @@ def lbfgs(
     most: int,
 ) -> Iterator[float]:
     """Iterations of L-BFGS with a strong Wolfe line search, in place; the value after each.
+
+    objective   weights → value and gradient, of the weights' shapes
+    memory      how many steps its approximation of the Hessian keeps
+    most        iterations
 
     Ends by itself where the gradient or the step is nothing.
     """

@@ -29,11 +29,15 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Task:
-    """A call in another process: function(*arguments, report=...)."""
+    """A call in another process: function(*arguments, report=...).
+
+    cost   how long it takes, in any unit; the time left is reckoned by it
+    """
 
     name: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
+    cost: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ def work(tasks: Sequence[Task], workers: int | None = None) -> Generator[Event, 
                 elif kind == "died":
                     del busy[pipe]
                 else:
-                    one.pipe.send(None)
+                    _send(one, None)
                     one.process.join()
                     del busy[pipe]
     finally:
@@ -128,8 +132,14 @@ def _hire() -> _Worker:
 
 def _give(one: _Worker, task: Task) -> Event:
     one.task = task
-    one.pipe.send((task.function, task.arguments))
+    _send(one, (task.function, task.arguments))
     return Event(task, 0.0)
+
+
+def _send(one: _Worker, what: tuple[Callable[..., Any], tuple[Any, ...]] | None) -> None:
+    """To a worker; one that has died meanwhile is found out where its answer is waited for."""
+    with suppress(OSError):
+        one.pipe.send(what)
 
 
 def _serve(pipe: Connection) -> None:

@@ -18,11 +18,9 @@ from shiplog.channels import Channel
 from shiplog.viewer import display, style
 from shiplog.viewer.display import Drawn
 from shiplog.viewer.style import entity
+from shiplog.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
 MOST_BINS = 40
-SPEED_BIN = 0.25  # m/s, the paper's
-ANGLE_BIN = 20.0  # deg, the paper's
-FASTEST = 100.0  # m/s: beyond is an instrument's fault, and would make the picture all empty
 SETS = ("training", "test")
 
 
@@ -94,18 +92,6 @@ def bins(values: NDArray[np.float64]) -> NDArray[np.float64]:
     )
     first, last = math.floor(low / width), math.floor(high / width) + 1
     return width * np.arange(first, last + 1, dtype=np.float64)
-
-
-def wind_counts(table: pl.DataFrame, fastest: float) -> NDArray[np.int64]:
-    """[direction, speed] rows in each bin of the paper's Fig.: 20 deg and 0.25 m/s."""
-    wind = table.select("wind_speed", "wind_angle").drop_nulls().drop_nans()
-    direction = wind["wind_angle"].to_numpy() % 360.0
-    directions = np.arange(0.0, 360.0 + ANGLE_BIN, ANGLE_BIN)
-    speeds = np.arange(0.0, fastest + SPEED_BIN / 2.0, SPEED_BIN)
-    count, _, _ = np.histogram2d(
-        direction, wind["wind_speed"].to_numpy(), bins=(directions, speeds)
-    )
-    return count.astype(np.int64)
 
 
 CELL = 10  # picture units a direction bin is wide

@@ -100,6 +100,19 @@ def test_one_long_voyage_is_halved_for_the_reference_set(tmp_path):
     assert half == "a[0:104]"
 
 
+def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path):
+    """Its parts train, validate and test; the reference set is half of the training part."""
+    store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
+    code, _, said = call("paper", "--store", store.path, "--out", tmp_path / "out", *FEW,
+                         "--data", "ref", "--data", "d-ref")  # fmt: skip
+    assert code == 0, said
+    losses = pl.read_parquet(tmp_path / "out" / "tables" / "test_losses.parquet")
+    assert losses.select("set", "seed").rows() == [
+        ("ref", 0), ("ref", 1), ("d-ref", 0), ("d-ref", 1),
+    ]  # fmt: skip
+    assert losses["loss"].is_finite().all()
+
+
 def test_histograms_count_every_second_once_in_bins_that_all_sets_share():
     rows = {"ref": pl.DataFrame({"surge": [0.0, 0.5, 1.0], "rudder": [0.0, 0.1, -0.1]}),
             "test": pl.DataFrame({"surge": [2.0, 2.0], "rudder": [0.0, 0.0]})}  # fmt: skip

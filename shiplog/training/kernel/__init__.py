@@ -24,7 +24,7 @@ _LONG = ctypes.c_int64
 
 
 class _Network(ctypes.Structure):
-    _fields_ = [  # noqa: RUF012: ctypes reads it once
+    _fields_ = [
         ("depth", _LONG), ("width", _LONG), ("inputs", _LONG), ("input_tanh", _LONG),
         ("weights", ctypes.POINTER(_POINTER)), ("input_mean", _POINTER), ("input_std", _POINTER),
         ("output_mean", _POINTER), ("output_std", _POINTER), ("error_weights", _POINTER),
@@ -90,10 +90,12 @@ def loss_and_gradient(
     at        the level to run on
 
     All tensors have one type, float32 or float64. The result's bits do not depend on `threads`.
-    Raises MemoryError.
+    Without a window the loss is not a number. Raises MemoryError, and TypeError for mixed types.
     """
     library = _library()
     assert library is not None
+    if {t.dtype for t in (*weights, velocity, driven, dt, *scales)} != {velocity.dtype}:
+        raise TypeError("the kernel takes tensors of one type")
     kept = [t.contiguous() for t in (velocity, driven, dt, *scales)]
     own = [w.contiguous() for w in weights]
     slopes = [w.new_empty(w.shape) for w in own] if gradient else []

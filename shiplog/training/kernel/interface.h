@@ -29,7 +29,8 @@ template <class T> struct Windows {
   const T* dt;        // [steps, count]
 };
 
-// The loss, a mean over windows. `gradients` has the layout of `weights`, or is null. Windows are
+// The loss, a mean over windows; not a number where there is no window or no step, and then
+// `gradients` are not set. `gradients` has the layout of `weights`, or is null. Windows are
 // dealt to at most `threads` threads; the bits of the result do not depend on how many there are.
 template <class T>
 using Rollouts = double (*)(const Network<T>&, const Windows<T>&, T* const* gradients, int threads);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <system_error>
 
 namespace shiplog {
 
@@ -24,8 +25,13 @@ void in_parallel(int64_t count, int threads, const std::function<void(int64_t)>&
       }
   };
   std::vector<std::thread> others;
-  for (int64_t t = 1; t < used; ++t) others.emplace_back(some, t);
-  some(0);
+  std::vector<int64_t> own = {0};
+  for (int64_t t = 1; t < used; ++t) try {
+      others.emplace_back(some, t);
+    } catch (const std::system_error&) {  // no thread to be had: done here
+      own.push_back(t);
+    }
+  for (const int64_t t : own) some(t);
   for (auto& other : others) other.join();
   for (const auto& one : failed)
     if (one) std::rethrow_exception(one);
@@ -43,7 +49,7 @@ const Level* level(int number) {
   }
 }
 
-template <class T, class Call> double guarded(const Call& call) {
+template <class Call> double guarded(const Call& call) {
   try {
     return call();
   } catch (const std::bad_alloc&) {
@@ -75,12 +81,12 @@ const char* shiplog_level_name(int number) { return level(number)->name; }
 // The loss; -1 where there is too little memory.
 double shiplog_rollouts_f32(int number, const Network<float>* net, const Windows<float>* data,
                             float* const* gradients, int threads) {
-  return guarded<float>(
+  return guarded(
       [&] { return level(number)->rollouts_f32(*net, *data, gradients, threads); });
 }
 double shiplog_rollouts_f64(int number, const Network<double>* net, const Windows<double>* data,
                             double* const* gradients, int threads) {
-  return guarded<double>(
+  return guarded(
       [&] { return level(number)->rollouts_f64(*net, *data, gradients, threads); });
 }
 

@@ -1,15 +1,12 @@
 // Rollouts by explicit Euler, Eq. 9 of the paper, their loss, Eq. 8, and its gradient. Included once
 // for each instruction set, after products.h.
 //
-// Windows go in chunks that fit a level-2 cache with the weights; chunks go to at most GROUPS groups
-// with a gradient of their own, which are added in order. Neither depends on the threads.
+// Windows go in chunks; chunks go to at most GROUPS groups with a gradient of their own, which are
+// added in order. Neither depends on the threads.
 
-#ifndef CHUNKSIZE
-#define CHUNKSIZE 24
-#endif
-constexpr int64_t CHUNK = CHUNKSIZE;
-constexpr int64_t GROUPS = 4;   // gradients that are summed apart
-constexpr int64_t FLUSH = 96;   // rows of deltas that become one product
+constexpr int64_t CHUNK = 24;  // windows: the weights are read once for all of them in a step
+constexpr int64_t GROUPS = 4;  // gradients that are summed apart
+constexpr int64_t FLUSH = 96;  // rows of deltas that become one product
 
 // Weights as the products want them, shared by all groups.
 template <class T> struct Packed {
@@ -224,6 +221,7 @@ template <class T> struct Space {
 
 template <class T>
 double rollouts(const Network<T>& net, const Windows<T>& data, T* const* gradients, int threads) {
+  if (data.count < 1 || data.steps < 1) return std::nan("");
   const Packed<T> packed(net);
   const int64_t chunks = (data.count + CHUNK - 1) / CHUNK;
   const int64_t groups = std::min(GROUPS, chunks), most = (data.count + chunks - 1) / chunks;
