@@ -16,15 +16,11 @@ from pipelines.diagnosis.answer import Context, Diagnosis
 from pipelines.diagnosis.held_out import HeldOut
 from pipelines.provenance import Answer, provenance
 from shiplog import decision as decisions
-from shiplog import diagnose, page, parts, runs, segments, user_causes
+from shiplog import page, parts, runs, segments, user_causes
 from shiplog.arguments import refuse_taken
 from shiplog.causes import Cause
-from shiplog.decision import Decision
 from shiplog.diagnosis import placebo, refutation, search
-from shiplog.diagnosis import trial as diagnosis_trial
 from shiplog.exceptions import RunError, listed
-from shiplog.gain import Gain
-from shiplog.hypotheses import Point, Trial
 from shiplog.profile import Profile
 from shiplog.record import Record
 from shiplog.runs import Run
@@ -32,7 +28,6 @@ from shiplog.store import Store
 
 log = logging.getLogger(__name__)
 
-REFUTED = 3  # times that the verdict is looked for again without what did not hold
 NOMINAL = 8  # segments, fewer of which do not show what is usual
 
 
@@ -45,12 +40,8 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
-    former: bool = False,
 ) -> Diagnosis:
-    """The whole way. Raises ShiplogError.
-
-    former   decide as the program did before hypotheses were weighed by one posterior
-    """
+    """The whole way. Raises ShiplogError."""
     began = time.time()
     if extend is not None:
         refuse_taken(extend, "--extend")
@@ -67,8 +58,7 @@ def diagnose_run(
     recorded = trial.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.made_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
-    if not former:
-        nominal, recorded = trial.in_ship_time(run, nominal, recorded)
+    nominal, recorded = trial.in_ship_time(run, nominal, recorded)
     if not answer.enough(recorded):
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
         _write(done)
@@ -77,7 +67,7 @@ def diagnose_run(
         nominal = None
     campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
     try:
-        done = _diagnosed(campaign, out, causes, former)
+        done = _diagnosed(campaign, out, causes)
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
         detailed = log.isEnabledFor(logging.DEBUG)
         log.info("no path of the model can be computed: %s", error, exc_info=detailed)
@@ -104,7 +94,7 @@ class Campaigns:
     before_effect: bool
 
 
-def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause], former: bool) -> Diagnosis:
+def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     run, store, names, profile = of.run, of.store, of.names, of.profile
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = []
@@ -113,13 +103,10 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause], former: bool) 
             f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
-    if former:
-        tried, untested = trial.trial_of(run, nominal, recorded, causes)
-    else:
-        lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
-        made = setup.trial_of(run, nominal, recorded, causes, lacking)
-        tried, untested = made.trial, dict(made.untested)
-        notes += [lacking] if lacking else []
+    lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
+    made = setup.trial_of(run, nominal, recorded, causes, lacking)
+    tried, untested = made.trial, dict(made.untested)
+    notes += [lacking] if lacking else []
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
         listed(names, most=4), run.name, len(tried.rows), tried.grid.seconds,
@@ -130,12 +117,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause], former: bool) 
     pushed = where.pushed(tried, point, whole)
     cut = trial.windows_of(run, store, names, profile)
     judge = None if cut is None else HeldOut(cut, trial.simulator(run, tried), tried)
-    if isinstance(tried, diagnosis_trial.Trial):
-        weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
-        weighed.run()
-        decision, _, found, dropped = refutation.judged(weighed, judge)
-    else:
-        decision, found, dropped = _decided(run, tried, point, judge)
+    weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
+    weighed.run()
+    decision, _, found, dropped = refutation.judged(weighed, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:
         notes += answer.of_physics(run, tried, found)
@@ -161,11 +145,6 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause], former: bool) 
         if decision.adapted:
             alone = held.adapted(decision).reduction
             notes.append(f"{run.name} is fitted again beside what is named.")
-    if decision.halves and decision.named:
-        notes.append(
-            "One voyage does not say enough of what is named to predict the other: held out were "
-            "their halves."
-        )
     context = Context(
         run,
         before_effect and nominal is not None,
@@ -191,29 +170,6 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     if not there:
         return None
     return trial.record_of(store, there, profile)
-
-
-def _decided(
-    run: Run, tried: Trial, point: Point, held: HeldOut | None
-) -> tuple[Decision, Gain | None, dict[str, str]]:
-    """Decision, gain, label → why held-out voyages refute it."""
-    dropped: dict[str, str] = {}
-    decision = diagnose.decide(tried, point)
-    if held is None:
-        return decision, None, dropped
-    decision, found, refuted = held.refuted(decision)
-    for _ in range(REFUTED - 1):  # what held-out voyages refute may have hidden what they do not
-        if not refuted:
-            break
-        dropped |= refuted
-        decision, found, refuted = held.refuted(diagnose.decide(tried, point, dropped))
-    dropped |= refuted
-    if run.given:
-        chosen, refused = held.chosen(decision)
-        dropped |= refused
-        if chosen is not None:
-            decision, found = chosen, held.gain(chosen)
-    return decision, found, dropped
 
 
 def _write(done: Diagnosis) -> None:

@@ -14,9 +14,7 @@ from shiplog.settling import settle
 from shiplog.unnamed import Pulses
 
 PULSES = "side_thrust"
-LEAST = 5.0  # nats that the first cause must bring
-CHANGED = 2.0 / 3.0  # before any data: whoever asks has a reason to
-SIZES = (0.1, 1.0)  # of realistic ones: what a change may be, each decade as likely
+LEAST = 5.0  # nats from which on a cause would show in these data
 
 
 @dataclass(frozen=True)
@@ -64,12 +62,8 @@ class Decision:
     louder     λ that is left
     point, base      the trial linearised with what is named, and that hypothesis
     first, nothing   the same with nothing named
-    remains    families of structure, with what they would still explain
     told       label → what these data would tell of each cause, were it there
-    apart      voyage → label → numbers from the other voyages, of causes chosen on whole windows
     adapted    whether the model's own coefficients are fitted again beside what is named
-    halves     whether halves of voyages are left out where it is judged, and not whole ones
-    least      nats that the first cause had to bring
     """
 
     verdict: str
@@ -84,29 +78,8 @@ class Decision:
     base: Found
     first: Point
     nothing: Found
-    remains: tuple[Found, ...] = field(default=())
     told: Mapping[str, Told] = field(default_factory=dict)
-    apart: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     adapted: bool = False
-    halves: bool = False
-    least: float = LEAST
-
-    @property
-    def hidden(self) -> dict[str, float]:
-        """Label → share of its plausible sizes at which these data would not show it."""
-        low, high = (math.log(size) for size in SIZES)
-        return {
-            label: min(max((math.log(told.together(self.least)) - low) / (high - low), 0.0), 1.0)
-            for label, told in self.told.items()
-        }
-
-    @property
-    def nothing_there(self) -> float:
-        """Probability that nothing changed where nothing was found: of what may have, some is too
-        small for these data."""
-        hidden = list(self.hidden.values())
-        missed = CHANGED * (sum(hidden) / len(hidden)) if hidden else CHANGED
-        return (1.0 - CHANGED) / (1.0 - CHANGED + missed)
 
 
 def without(trial: Trial, decision: Decision, one: Named) -> Decision:
@@ -142,10 +115,8 @@ def without(trial: Trial, decision: Decision, one: Named) -> Decision:
 
 
 def untold(decision: Decision) -> Decision:
-    """Of a model that simulates nothing: what is left, without a name."""
-    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
-    found = ("motion", 0.0) if strongest is None else (strongest.name, strongest.evidence)
+    """Of a model that simulates nothing: its error goes with the motion, and has no name."""
     return replace(
         decision, verdict="unknown", named=(), pulses=None, traces=(),
-        structure=Structure(*found, ()),
+        structure=Structure("motion", 0.0, ()),
     )  # fmt: skip

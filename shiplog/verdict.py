@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shiplog.advise import Advice
 from shiplog.causes import Cause, Setting, si
 from shiplog.channels import VELOCITY
-from shiplog.decision import PULSES, Decision, Named
-from shiplog.diagnose import UNKNOWN
+from shiplog.decision import LEAST, PULSES, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.findings import CONTRACT
 from shiplog.gain import Gain
@@ -195,27 +194,6 @@ def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
     }  # fmt: skip
 
 
-def ranking_json(decision: Decision, verdict: str, dropped: Collection[str]) -> tuple[dict, ...]:
-    """Causes of one name together, and what is none of them. What was refuted, or too small to be
-    named, counts for none: the probabilities go through the verdict's own gates. And of `none`,
-    something is the causes' that these data would not show."""
-    of: dict[str, float] = {}
-    gated = {*dropped, *(n.cause.label for n in decision.traces)}
-    for label, share in decision.ranking.items():
-        if label in gated or (verdict == "none" and not label.startswith("unknown:")):
-            label = "none"
-        name = label if label.startswith("unknown:") else label.split(":")[0]
-        of[name] = of.get(name, 0.0) + share
-    if verdict == "none" and "none" in of:
-        missed = (1.0 - decision.nothing_there) * of["none"]
-        of["none"] -= missed
-        for label, share in decision.hidden.items():
-            name = label.split(":")[0]
-            of[name] = of.get(name, 0.0) + missed * share / sum(decision.hidden.values())
-    kept = [(n, p) for n, p in of.items() if p >= SHARE_SAID]
-    return tuple({"name": n, "probability": p} for n, p in sorted(kept, key=lambda pair: -pair[1]))
-
-
 def probabilities_json(ranking: Mapping[str, float]) -> tuple[dict, ...]:
     """Every answer that has a share worth stating, likeliest first."""
     kept = [(n, p) for n, p in ranking.items() if p >= SHARE_SAID]
@@ -230,7 +208,7 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     by = {c.label: c for c in causes}
     found = []
     for label, told in decision.told.items():
-        cause, least = by[label], told.least(decision.least)
+        cause, least = by[label], told.least(LEAST)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
@@ -238,9 +216,7 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
         else:  # as many as the ship has rudders, or the map places
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
-        found.append(
-            {"name": cause.name, "share": told.together(decision.least), "parameters": numbers}
-        )
+        found.append({"name": cause.name, "share": told.together(LEAST), "parameters": numbers})
         if label != cause.name:
             key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
             found[-1][key] = label.partition(":")[2]
@@ -351,17 +327,6 @@ def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
         name, _, channel = label.partition(":")
         found.append({"name": name, "reason": f"{channel}: {why}" if channel else why})
     return tuple(found)
-
-
-def remains(decision: Decision, verdict: str) -> list[str]:
-    """What is left where something was named."""
-    strongest = max(decision.remains, key=lambda f: f.evidence, default=None)
-    if verdict != "named" or strongest is None or strongest.evidence < UNKNOWN:
-        return []
-    return [
-        f"Something else remains: it depends on {strongest.name} "
-        f"({strongest.evidence:.0f} nats beyond what is named) and has no name here."
-    ]
 
 
 def _likely(cause: dict) -> str:

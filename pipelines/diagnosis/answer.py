@@ -8,10 +8,9 @@ from pathlib import Path
 
 from pipelines.diagnosis import where
 from pipelines.diagnosis.held_out import HeldOut
-from shiplog import advise, diagnose, segments, timescale
+from shiplog import advise, segments, timescale
 from shiplog import verdict as verdicts
 from shiplog.decision import Decision
-from shiplog.diagnosis.trial import Trial as DiagnosisTrial
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain
 from shiplog.hypotheses import Trial
@@ -85,32 +84,23 @@ def verdict(
     found   the gain of what is named; None where nothing is, or there are no windows
     held    the windows it was measured on
     """
-    weighed = isinstance(trial, DiagnosisTrial)
     rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
-    if context.lost and decision.structure is not None:
+    if context.lost:
         notes.insert(
-            0,
-            f"{context.lost}. It does not simulate this ship, or its profile reads it wrongly: "
-            f"what is left depends most on {decision.structure.family}.",
+            0, f"{context.lost}. It does not simulate this ship, or its profile reads it wrongly."
         )
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
     unavailable = verdicts.rejected_json(context.untested)
-    if not weighed:
-        rejected |= {k: f"not testable: {why}" for k, why in context.untested.items()}
     advised = advise.advice(trial, decision.named, decision.first.numbers)
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.pulses is not None:
         times = where.pulses(trial, decision, decision.pulses)
-        sure = diagnose.odds(decision.pulses.gain, diagnose.PULSED)
-        if weighed:
-            sure = decision.ranking.get("unknown:intermittent", 0.0)
+        sure = decision.ranking.get("unknown:intermittent", 0.0)
         causes.append(verdicts.pulses_json(decision, times, sure))
     said = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
-    ranking = verdicts.probabilities_json(decision.ranking) if weighed else (
-        verdicts.ranking_json(decision, said, context.dropped)
-    )  # fmt: skip
+    ranking = verdicts.probabilities_json(decision.ranking)
     sentence = f"{context.lost}: no cause can be told."
     if not context.lost:
         sentence = verdicts.sentence(
@@ -130,14 +120,12 @@ def verdict(
         structure=structure if said == "unknown" else None,
         intervals=(*context.pushed, *context.uncovered),
         gain=found if causes else None,
-        without="" if held is None else held.left_out(decision),
+        without="" if held is None else held.left_out,
         wrong=tuple(context.wrong),
         unseen=tuple(context.unseen),
-        limits=verdicts.limits_json(decision, catalogue, setting)
-        if weighed or said in ("none", "unknown")
-        else (),
+        limits=verdicts.limits_json(decision, catalogue, setting),
         unavailable=unavailable,
-        notes=(*notes, *verdicts.remains(decision, said)),
+        notes=tuple(notes),
     )
 
 

@@ -10,22 +10,17 @@ import numpy as np
 import torch
 
 from pipelines.diagnosis.own import Own
-from shiplog import conventions, diagnose, direct
-from shiplog import decision as decisions
+from shiplog import conventions
 from shiplog.causes import constants_of
-from shiplog.decision import Decision, Named
+from shiplog.decision import Decision
 from shiplog.extend import ExtendedSimulator
 from shiplog.gain import Gain, gain, parts
 from shiplog.hypotheses import Trial
 from shiplog.sensitivity import series
 from shiplog.windows import Windows
 
-WORTH = 0.02  # of the error, that each of several causes must take off held-out windows
 LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
 TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
-HARM = 1.2  # times the error, from which on even an instrument's fault is refuted
-BESIDE = 2.0  # times the evidence that is beyond doubt, of a cause beside others
-VOYAGES = 3  # fewer cannot choose causes by voyages left out
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
 
@@ -76,7 +71,7 @@ class HeldOut(Rollouts):
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
         states = np.empty(tuple(self.cut.state.shape))
         needed = self._constants(decision)
-        for voyage, half, rows in self._folds(self._halved(decision)):
+        for voyage, half, rows in self._folds():
             numbers, coefficients = self._without(decision, voyage, half)
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
@@ -90,9 +85,7 @@ class HeldOut(Rollouts):
 
     def adapted(self, decision: Decision) -> Gain:
         """What the model's own coefficients take off alone, fitted again with nothing named."""
-        return self.gain(
-            replace(decision, named=(), point=decision.first, base=decision.nothing, apart={})
-        )
+        return self.gain(replace(decision, named=(), point=decision.first, base=decision.nothing))
 
     def extended(self, decision: Decision) -> ExtendedSimulator:
         """The model with what is named in it, with numbers from all voyages."""
@@ -108,58 +101,6 @@ class HeldOut(Rollouts):
     def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
         """The model that is simulated on the trial's segments, with what is named in it."""
         return (self.trial, decision) if self.own is None else self.own.beside(decision)
-
-    def refuted(self, decision: Decision) -> tuple[Decision, Gain | None, dict[str, str]]:
-        """What is left of a decision, its gain, and label → why not of what is not.
-
-        A cause of the error makes it less, and surely so where little evidence speaks for it: what
-        is outside the catalogue looks a little like something in it. An instrument's fault is a
-        fault though it is worth nothing, but not where it makes the error more; so is what differs
-        from its nominal campaign beyond doubt, where held-out voyages cannot tell gain from loss:
-        steps of a second hide a lag of a third of one. A model that has learned of it, and gains
-        by being fitted again beside it, is so without each cause, too. Of two voyages the other
-        need not know what one shows: what is there beyond doubt is asked again by their halves.
-        """
-        dropped: dict[str, str] = {}
-        few = len(set(self.voyages)) < VOYAGES
-        if not decision.named:
-            return decision, None, dropped
-        found = self.gain(decision)
-        if self.trial.reference.adapts:
-            decision, found = self.better(decision, found)
-        while decision.named:
-            harm = found.after > HARM * found.before
-            asked = [n for n in decision.named if harm or not n.cause.only_read]
-            alone = len(decision.named) == 1
-            if not asked or (found.low > 0.0 and alone and not decision.adapted):
-                break
-            tried = []
-            for one in asked:
-                rest = decisions.without(self.trial, decision, one)
-                tried.append((self.worth(rest, decision), rest, one))
-            worth, rest, one = min(tried, key=lambda t: t[0].before)
-            gains = worth.reduction >= (0.0 if alone else WORTH)
-            if gains and (worth.low > 0.0 or not alone or one.evidence >= diagnose.MORE):
-                break
-            undecided = worth.high > (0.0 if alone else WORTH)
-            if not harm and undecided and self._sure(one, alone):
-                break
-            if few and not self._halved(decision) and self._sure(one, alone):
-                decision = replace(decision, halves=True)
-                found = self.gain(decision)
-                continue
-            why = f"{worth.reduction:+.1%}"
-            if gains:
-                why = f"{why}, {worth.low:+.1%} to {worth.high:+.1%}: none that is sure"
-            dropped[one.cause.label] = f"no gain on held-out voyages ({why})"
-            left = {n.cause.label for n in rest.named}
-            dropped |= {
-                other: f"{one.cause.label} explains {nats:.0f} nats more, and gains nothing"
-                for other, nats in one.beaten.items() if nats > diagnose.MORE and other not in left
-            }  # fmt: skip
-            decision = replace(rest, halves=False)
-            found = self.gain(decision)
-        return decision, found if decision.named else None, dropped
 
     def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
         """The same with the model's own coefficients fitted again beside what is named, where that
@@ -183,46 +124,6 @@ class HeldOut(Rollouts):
             self.voyages,
         )  # fmt: skip
 
-    def _sure(self, one: Named, alone: bool) -> bool:
-        """Whether it differs from its nominal campaign beyond doubt, or from all that a smooth
-        function of a network's inputs says."""
-        ref = self.trial.reference
-        wanted = diagnose.SURE * (1.0 if alone else BESIDE)
-        return (ref.nominal is not None or ref.learned) and one.evidence > wanted
-
-    def chosen(self, decision: Decision) -> tuple[Decision | None, dict[str, str]]:
-        """Beside a model that nobody fitted: instruments by evidence, and of the causes of the
-        error those that take most off voyages left out. None where there are too few voyages, or
-        no such cause."""
-        if len(set(self.voyages)) < VOYAGES:
-            return None, {}
-        ref = self.trial.reference
-        read = tuple(n for n in decision.named if n.cause.only_read)
-        others = [
-            c for c in ref.model.causes if not c.only_read and c.label not in self.trial.fixed
-        ]
-        needed = constants_of(others, ref.setting)
-        search = direct.search_of(self.before, others, ref.setting, self.cut, needed)
-        selected = direct.select(search)
-        refused = dict(selected.refused)
-        if not selected.numbers:
-            return None, refused
-        by = {c.label: c for c in others}
-        named = tuple(
-            Named(
-                by[label], float("nan"), selected.probability[label], numbers,
-                selected.covariance[label], freedom=ref.freedom,
-            )
-            for label, numbers in selected.numbers.items()
-        )  # fmt: skip
-        for one in decision.named:
-            if not one.cause.only_read and one.cause.label not in by:
-                refused[one.cause.label] = f"{' and '.join(selected.numbers)} take more off"
-        chosen = replace(
-            decision, verdict="named", named=(*named, *read), structure=None, apart=selected.without
-        )
-        return chosen, refused
-
     def lost(self, found: Gain | None) -> str:
         """Why no name would be believed: a sign turned round does far more for the rollouts than
         all that was named, or they are worse than a ship that keeps its velocities, with what was
@@ -243,20 +144,22 @@ class HeldOut(Rollouts):
     def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
         return constants_of((n.cause for n in decision.named), self.trial.reference.setting)
 
-    def left_out(self, decision: Decision) -> str:
+    @property
+    def left_out(self) -> str:
         """What of each window the numbers have not seen."""
-        return "its half of the voyage" if self._halved(decision) else "its voyage"
+        return "its half of the voyage" if self._halved else "its voyage"
 
-    def _halved(self, decision: Decision) -> bool:
-        """Whether halves of voyages are left out: where it says so, and of one alone."""
-        return decision.halves or len(set(self.voyages)) == 1
+    @property
+    def _halved(self) -> bool:
+        """Whether halves of voyages are left out: of one alone."""
+        return len(set(self.voyages)) == 1
 
-    def _folds(self, halves: bool) -> Iterator[tuple[str, Half, torch.Tensor]]:
-        """(voyage, half of it, window rows) that are left out: whole voyages, or `halves`."""
+    def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
+        """(voyage, half of it, window rows) that are left out: whole voyages, or halves of one."""
         elapsed = self.cut.plan["elapsed"].to_numpy()
         for name in dict.fromkeys(self.voyages):
             own = np.array([n == name for n in self.voyages])
-            if not halves:
+            if not self._halved:
                 yield name, None, torch.tensor(np.flatnonzero(own))
                 continue
             first, last = elapsed[own].min(), elapsed[own].max()
@@ -278,10 +181,9 @@ class HeldOut(Rollouts):
             middle, late = half
             out &= (recorded.time[segment.rows] >= middle) == late
         included = tuple(decision.base.numbers)
-        numbers, coefficients = dict(decision.apart.get(voyage, {})), None
+        numbers, coefficients = {}, None
         if included or decision.adapted:
-            fitted, beside = self.trial.without(decision.point, included, decision.louder, out)
-            numbers = {**fitted, **numbers}
+            numbers, beside = self.trial.without(decision.point, included, decision.louder, out)
             if self.own is not None and decision.adapted:
                 trial, seen = self.own.beside(decision)
                 _, beside = trial.without(seen.point, tuple(seen.base.numbers), seen.louder, out)

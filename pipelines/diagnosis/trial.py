@@ -9,8 +9,7 @@ import numpy as np
 
 from pipelines.prepare import seconds
 from pipelines.split import plan
-from shiplog import causes as catalogue
-from shiplog import parts, record, reference, remembered, table, timescale, windows
+from shiplog import parts, record, table, timescale, windows
 from shiplog.causes import Cause, Setting, constants_of
 from shiplog.exceptions import StoreError
 from shiplog.extend import ExtendedSimulator, campaign
@@ -71,43 +70,6 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
     if planned.height == 0:
         return None
     return windows.cut(rows, planned, run.config.window, profile.actuator_names, profile.wind_names)
-
-
-def trial_of(
-    run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause]
-) -> tuple[Trial, dict[str, str]]:
-    """Reference and trial; which causes cannot be tested, and why. Of a network the ship's MMG is
-    asked, fitted to the voyages that the network was made on."""
-    setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
-    extension = run.extension
-    held = {} if extension is None else {c.label: c for c in extension.causes}
-    untested: dict[str, str] = {}
-    chosen = list(held.values())  # they are in the model, testable here or not
-    for one in (*catalogue.CATALOGUE, *own):
-        if one.label in held:
-            continue
-        missing = one.missing(setting)
-        cause = one if missing else one.on(setting)
-        if missing is None and nominal is None and not run.given:
-            if cause.absorbed:
-                missing = "a model fitted to these voyages absorbs it"
-            elif cause.renames and not run.config.physical:
-                missing = "a network fitted to these voyages takes it in"
-        if missing is None:
-            chosen.append(cause)
-        else:
-            untested[cause.label] = missing
-    model, start = model_of(run, chosen, setting)
-    if nominal is None:
-        inputs = None if run.config.physical else run.base()[0]
-        known = reference.assume(model, setting, start, recorded, run.given, inputs)
-        return Trial(known, recorded, tuple(held)), untested
-    # where the nominal voyages settle depends on them alone, so that it can be kept
-    before = setting_of(run, nominal, nominal)
-    testable = [c.on(before) for c in catalogue.CATALOGUE if c.missing(before) is None]
-    at = remembered.settled(model_of(run, testable, before)[0], before, start, nominal)
-    known = reference.learn(model, setting, start, nominal, at)
-    return Trial(known, recorded, tuple(held)), untested
 
 
 def simulator(run: Run, trial: Trial) -> ExtendedSimulator:

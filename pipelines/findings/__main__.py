@@ -2,7 +2,6 @@
 
     python -m pipelines.findings sensors     FRT-DS-ESSO --out findings
     python -m pipelines.findings published   FRT-DS-ESSO --out findings
-    python -m pipelines.findings direct      FRT-DS-ESSO --out findings
     python -m pipelines.findings refitted    FRT-DS-ESSO --out findings
     python -m pipelines.findings wind        FRT-DS-ESSO --out findings
     python -m pipelines.findings faults      FRT-DS-ESSO --out findings
@@ -21,10 +20,10 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
-from pipelines.findings import direct, esso_osaka, faults, kvlcc2, milliampere
+from pipelines.findings import esso_osaka, faults, kvlcc2, milliampere
 
 FINDINGS: dict[str, Callable[[Path, Path], str]] = {
-    "sensors": esso_osaka.sensors, "published": esso_osaka.published, "direct": direct.direct,
+    "sensors": esso_osaka.sensors, "published": esso_osaka.published, 
     "refitted": esso_osaka.refitted, "wind": esso_osaka.wind,
     "faults": faults.esso_osaka, "faults-other": faults.other_ship,
     "milliampere": milliampere.milliampere, "kvlcc2": kvlcc2.kvlcc2,

@@ -26,9 +26,10 @@ import jax
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
-from pipelines.diagnosis.trial import trial_of
-from shiplog import diagnose, evidence, reading, record, runs, segments
+from pipelines.diagnosis.setup import trial_of
+from shiplog import evidence, reading, record, runs, segments
 from shiplog.columns import Columns
+from shiplog.decision import LEAST
 from shiplog.evidence import Unrest
 from shiplog.exceptions import RunError, ShiplogError
 from shiplog.hypotheses import Point, Trial
@@ -80,7 +81,7 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, S
         record.read([frame.collect() for frame in store.tables(some)], some, profile)
         for some in (trained, names)
     )
-    trial, _ = trial_of(run, usual, recorded, ())
+    trial = trial_of(run, usual, recorded, ()).trial
     point = trial.begin(run.extension_numbers())
     fitted = run.base()[1].values
     return {
@@ -97,7 +98,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Said:
     """Coefficients stay as they were fitted; noise is as large as it was on the usual voyages."""
     ref = trial.reference
     columns, model = ref.columns, ref.model
-    theta = np.concatenate((fitted, np.zeros(len(columns.unit) - columns.base)))
+    theta = np.concatenate((fitted, np.zeros(columns.linearised - columns.base)))
     before = segments.cut(usual, segments.begins(usual))
     rest = beyond(model, theta, before.y, of_bins(before.driven, before.y.shape[1]))
     sd = np.sqrt((rest[_used(before)] ** 2).mean(0))
@@ -265,7 +266,7 @@ def ratios(
 def linear(trial: Trial, point: Point) -> Said:
     causes = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
     _, found = trial.scan(point, causes, trial.fixed)
-    return said({one.name: one.evidence for one in found}, diagnose.LEAST)
+    return said({one.name: one.evidence for one in found}, LEAST)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

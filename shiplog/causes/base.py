@@ -130,8 +130,6 @@ class Cause:
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
-    rough: ClassVar[bool] = False  # no two waters have its form: what it leaves is not another's
-    answers: ClassVar[bool] = False  # it is how it answers to forces: to unknown ones nobody knows
 
     @property
     def label(self) -> str:
@@ -158,12 +156,6 @@ class Cause:
         """Whether a ship may have some of it always: false where coefficients, or another cause,
         already stand for that."""
         return not self.absorbed
-
-    @property
-    def only_read(self) -> bool:
-        """Whether an instrument of the motion is at fault: a fault whatever knowing it is worth.
-        What the wind's instrument says drives the ship in the simulation."""
-        return self.kind == "sensor" and "wind" not in self.label
 
     @property
     def reads(self) -> bool:

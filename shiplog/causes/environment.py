@@ -128,7 +128,6 @@ class ShallowWater(Cause):
     story = "The bottom is near in places."
     equation = "X₀, Y_v, N_r, C_D, m_y and J grow with a map of depth; at most {strength:.2f}"
     parameters = ()
-    rough = True
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
 
     @property
@@ -190,7 +189,6 @@ class Bank(Cause):
     story = "A bank draws the ship in."
     equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/L/3)³), N bow out"
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
-    rough = True
     separated_by = {"shallow_water": "the same run farther from the bank"}
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:

@@ -216,7 +216,6 @@ class Payload(Cause):
         "thrust_loss": "step of the screw from rest (inertia) against steady speed",
         "cross_flow_drag": "step of the screw from rest (inertia) against a pure decay of sway",
     }
-    answers = True
 
     @property
     def absorbed(self) -> bool:

@@ -53,7 +53,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     return Decision(
         verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
         found.ranking(), shown.found.louder, search.point(shown), shown.found, search.first,
-        search.nothing.found, (), search.told,
+        search.nothing.found, search.told,
     ), found  # fmt: skip
 
 

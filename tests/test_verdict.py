@@ -1,0 +1,48 @@
+"""Sentences of a verdict."""
+
+from shiplog.gain import Gain
+from shiplog.verdict import sentence
+
+
+def test_what_it_may_be_instead_is_in_the_sentence():
+    """A name alone would say more than is known; and a gain below nothing is a loss."""
+    lag = {
+        "sentence": "The rudders lag.", "indistinguishable_from": ["rudder_delay"],
+        "probability": 0.9,
+    }  # fmt: skip
+    said = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
+    assert said == (
+        "No part of the error on 18 held-out windows is surely explained: it is 2.0% more (5.0% "
+        "more to 1.0% less). The rudders lag; or it is rudder_delay: these data cannot tell."
+    )
+    sure = lag | {"indistinguishable_from": []}
+    gained = Gain(500.0, 400.0, 0.1, 0.3, 18, {})
+    assert sentence("named", [sure], None, gained, 1.0) == (
+        "20% of the error on 18 held-out windows is explained (10% to 30%). The rudders lag."
+    )
+    for probability, begins in ((0.53, "Likely, and not surely (53%): "), (0.4, "Perhaps, and ")):
+        said = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
+        assert f"(10% to 30%). {begins}" in said and said.endswith("The rudders lag.")
+
+
+def test_the_largest_part_that_is_not_explained_is_in_the_sentence():
+    """Of shares 0.6 and 0.3 before: nine tenths of the first are taken off, a third of the second,
+    so that 0.06 and 0.2 are left."""
+    sure = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 1.0}
+    gained = Gain(500.0, 200.0, 0.5, 0.7, 18, {"sway": 0.9, "yaw_rate": 1.0 / 3.0})
+    wrong = [
+        {"channel": "sway", "share_of_error": 0.6}, {"channel": "yaw_rate", "share_of_error": 0.3},
+    ]  # fmt: skip
+    assert sentence("named", [sure], None, gained, 1.0, wrong=wrong).endswith(
+        "The rudders lag. The largest part that is not is in yaw rate: 20% of the error."
+    )
+
+
+def test_what_another_fit_brings_alone_is_in_the_sentence():
+    sure = {"sentence": "The wind is late.", "indistinguishable_from": [], "probability": 1.0}
+    gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
+    assert sentence("named", [sure], None, gained, 1.0, 0.32).endswith(
+        "(30% to 50%). The wind is late. Fitted again with nothing named, the model has an error "
+        "32.0% less."
+    )
+    assert sentence("named", [sure], None, gained, 1.0, -0.1).endswith("has an error 10.0% more.")
