@@ -43,7 +43,7 @@ from shiplog.exceptions import ShiplogError
 
 SIMULATED = SimpleNamespace(
     OUTSIDE={"tether": 0, "tow": 0, "rudder_limit": 0},
-    offered=lambda family: (
+    offered=lambda family, seed=0: (
         ("current", "fouling", "thrust_loss", "thrust_loss:unit", "tether", "tow")
         if family == "catamaran" else ("current", "fouling", "bank", "payload")
     ),
@@ -54,6 +54,19 @@ SIMULATED = SimpleNamespace(
 def simulator(monkeypatch):
     monkeypatch.setitem(sys.modules, "pipelines.experiments", SimpleNamespace(__path__=[]))
     monkeypatch.setitem(sys.modules, "pipelines.experiments.other_families", SIMULATED)
+
+
+def test_what_a_ship_lacks_is_not_hidden_in_it(simulator, monkeypatch):
+    """Every other ship of each family here has no load to shift; the next cause takes its turn."""
+    every = SIMULATED.offered
+
+    def offered(family, seed=0):
+        return tuple(n for n in every(family) if n != "payload" or seed % 2 == 0)
+
+    monkeypatch.setattr(SIMULATED, "offered", offered)
+    cases = suites.plan("abroad", 70000, 100).cases
+    assert any("payload" in case.cause for case in cases)
+    assert not [case for case in cases if case.seed % 2 and "payload" in case.cause]
 
 
 def test_every_family_meets_every_row_in_its_share(simulator):

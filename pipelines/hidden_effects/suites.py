@@ -96,7 +96,10 @@ def abroad(seeds: Sequence[int]) -> tuple[Planned, ...]:
         rule, size = rows[order[(turn + which * step) % len(rows)]]
         count = met[family, rule, size] = met.get((family, rule, size), -1) + 1
         causes = _in_turn(seeds[0], family, rule, size, offered(family), outside)
-        cause = "none" if rule == "none" else causes[count % len(causes)]
+        turned = [causes[(count + i) % len(causes)] for i in range(len(causes))]
+        own = set(offered(family, seed))  # this ship may lack what another one has
+        fitting = (one for one in turned if own.issuperset(one.split("+")))
+        cause = "none" if rule == "none" else next(fitting, turned[0])
         cases.append(Planned(str(seed), seed, cause, size, 7000, family=family))
     return tuple(cases)
 
@@ -119,8 +122,8 @@ def _in_turn(
     return [names[i] for i in drawn.permutation(len(names))]
 
 
-def _simulator() -> tuple[Callable[[str], tuple[str, ...]], tuple[str, ...]]:
-    """Family → causes that it can hide, and what it can hide that is in no catalogue."""
+def _simulator() -> tuple[Callable[..., tuple[str, ...]], tuple[str, ...]]:
+    """(Family, seed) → causes that this ship can hide, and what of them is in no catalogue."""
     try:
         simulator = import_module("pipelines.experiments.other_families")
         return simulator.offered, tuple(simulator.OUTSIDE)

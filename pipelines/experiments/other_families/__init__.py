@@ -21,6 +21,7 @@ from pipelines.experiments.other_families.effects import OUTSIDE
 __all__ = ["FAMILIES", "OUTSIDE", "offered"]
 
 
-def offered(family: str) -> tuple[str, ...]:
-    """What can be hidden in a ship of this family, of the catalogue and outside it."""
-    return effects.offered(FAMILIES[family](0))
+def offered(family: str, seed: int = 0) -> tuple[str, ...]:
+    """What can be hidden in this ship of a family, of the catalogue and outside it. Not every ship
+    of a family has the same sensors and rudders."""
+    return effects.offered(FAMILIES[family](seed))
