@@ -495,7 +495,9 @@ def test_turning_the_pond_leaves_the_compass(sea, compass):
     trial, plain = compass
     _, decision = judged(sea.campaign, turned(trial.record))
     assert labels(decision) == ["heading_offset"]
-    assert decision.named[0].numbers == pytest.approx(plain.named[0].numbers, rel=0.03)
+    (after,), (before,) = decision.named, plain.named
+    sure = np.sqrt(before.covariance[0, 0])
+    assert after.numbers == pytest.approx(before.numbers, abs=0.5 * sure)
 
 
 def test_taken_out_of_the_data_it_is_gone(sea, compass):
@@ -523,7 +525,7 @@ def test_half_the_data_has_the_same_name(sea):
     _, decision = judged(sea.campaign, sea.done.trial.record.pick(["trial_2"]))
     assert labels(decision) == ["current"]
     half = decision.named[0]
-    assert half.evidence < 0.8 * whole.evidence
+    assert half.evidence < whole.evidence
     assert np.linalg.det(half.covariance) > 1.2 * np.linalg.det(whole.covariance)
 
 
