@@ -1,4 +1,4 @@
-"""What the blind test runs: other families, today's decision beside, replays, one commit a table;
+"""What the blind test runs: other families, rivals beside, replays, one commit a table;
 with a simulator and a program that do nothing."""
 
 import hashlib
@@ -14,7 +14,6 @@ import pytest
 
 from pipelines.diagnosis import baseline, trial
 from pipelines.hidden_effects import (
-    former,
     methods,
     plan,
     program,
@@ -22,12 +21,10 @@ from pipelines.hidden_effects import (
     run,
     score,
     suites,
-    tables,
     without,
 )
 from pipelines.hidden_effects.__main__ import main
 from pipelines.hidden_effects.plan import Plan, Planned
-from pipelines.hidden_effects.score import Sealed
 from shiplog import remembered
 from shiplog.diagnosis import (
     discrepancy,
@@ -130,16 +127,15 @@ else:
     assert pathlib.Path(first).is_dir() and pathlib.Path(given["--store"]).is_dir()
     pathlib.Path(given["--json"]).write_text(json.dumps({"verdict": os.environ["SAYS"]}))
 """
-BEFORE = """
-import json, os, pathlib, sys
+RIVALS = """
+import json, pathlib, sys
 base, *options = sys.argv[1:]
 given = {k: v for k, v in zip(options, options[1:])}
 json_ = pathlib.Path(given["--json"])
 assert "keys" not in " ".join(sys.argv) and given["--voyages"] == "trial_*"
 assert pathlib.Path(base).is_dir() and pathlib.Path(given["--store"]).is_dir()
 assert (json_.parent / "verdict.sha256").exists()  # it comes last
-json_.write_text(json.dumps({"verdict": "none", "causes": [], "decision": "only"}))
-sys.exit(os.environ["SAYS"] == "undecided")
+json_.write_text(json.dumps({"methods": {"glr": {"answer": None, "ranking": []}}}))
 """
 
 
@@ -147,7 +143,7 @@ sys.exit(os.environ["SAYS"] == "undecided")
 def stubs(tmp_path, monkeypatch):
     monkeypatch.setenv("SAYS", "none")
     commands = {}
-    for name, source in (("case", SIMULATOR), ("shiplog", SHIPLOG), ("before", BEFORE)):
+    for name, source in (("case", SIMULATOR), ("shiplog", SHIPLOG), ("rival", RIVALS)):
         (tmp_path / f"{name}.py").write_text(source)
         commands[name] = (sys.executable, str(tmp_path / f"{name}.py"))
     return lambda **more: run.Settings(**commands, abroad=commands["case"], **more)
@@ -157,40 +153,23 @@ def names_in(out, label="5"):
     return {p.name for p in (out / "cases" / label).iterdir()}
 
 
-def test_todays_decision_answers_once_the_verdict_is_sealed(tmp_path, stubs, monkeypatch):
+def test_rivals_answer_once_the_verdict_is_sealed(tmp_path, stubs, monkeypatch):
     out = tmp_path / "out"
     planned = plan.save(out, suites.plan("nightly", 5, 1))
     run.run(out, planned, stubs(keep=True))
-    run.run(out, planned, stubs(former=True))  # a kept case can be asked later
-    assert {"former.json", "former.sha256", "store"} <= names_in(out)
+    run.run(out, planned, stubs(rivals=True))  # a kept case can be asked later
+    assert {"rivals.json", "rivals.sha256", "store"} <= names_in(out)
     steps = json.loads((out / "cases" / "5" / "steps.json").read_text())
-    assert [s["step"] for s in steps] == ["logs", "ingest", "train", "diagnose", "former"]
-    assert {s.get("commit") for s in steps if s["step"] == "former"} == {
+    assert [s["step"] for s in steps] == ["logs", "ingest", "train", "diagnose", "rivals"]
+    assert {s.get("commit") for s in steps if s["step"] == "rivals"} == {
         program.identity()["commit"]
     }
     assert program.name(steps[3]).startswith(sys.executable)  # not this source's shiplog
     (one,) = score.read(out).answers
-    assert one.former is not None and one.former["decision"] == "only"
-    assert methods.answers([one])[methods.FORMER][0].right
-    # a traceback of it is its answer, as it is the diagnosis' own
-    monkeypatch.setenv("SAYS", "undecided")
-    other = tmp_path / "other"
-    run.run(other, plan.save(other, planned), stubs(former=True))
-    (one,) = score.read(other).answers
-    assert one.word == "undecided" and one.former is not None and one.former["verdict"] == "failed"
-    assert "undecided" in tables.text(score.read(other))
-
-
-def test_todays_decision_counts_only_as_it_was_sealed(tmp_path, stubs):
-    out = tmp_path / "out"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(former=True))
-    folder = out / "cases" / "5"
-    (folder / "former.json").write_text(json.dumps({"verdict": "named"}))
-    (out / "keys" / "5.json").unlink()  # whoever tried to open it would raise something else
-    with pytest.raises(Sealed, match=r"former\.json is not what was sealed: the key .* not opened"):
-        score.read(out)
-    (folder / "former.sha256").unlink()
-    assert score.open_former(folder, out / "keys" / "5.json") is None
+    assert one.rivals == {"glr": {"answer": None, "ranking": []}}
+    assert methods.answers([one])["likelihood ratio"][0].right
+    run.run(out, planned, stubs(rivals=True))  # nothing is left to ask
+    assert len(json.loads((out / "cases" / "5" / "steps.json").read_text())) == 5
 
 
 def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeypatch):
@@ -201,18 +180,18 @@ def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeyp
         (out / "cases" / "6" / name).rmdir()
     before = hashlib.sha256((out / "cases" / "5" / "verdict.json").read_bytes()).hexdigest()
     monkeypatch.setenv("SAYS", "coverage")
-    again = replay.replay(out, new, stubs(former=True))
+    again = replay.replay(out, new, stubs(rivals=True))
     assert [p.label for p in again.cases] == ["5"]
     assert names_in(new) == {
-        "verdict.json", "verdict.sha256", "steps.json", "former.json", "former.sha256"
+        "verdict.json", "verdict.sha256", "steps.json", "rivals.json", "rivals.sha256"
     }  # fmt: skip
     (one,) = score.read(new).answers
     assert one.word == "coverage" and [s["step"] for s in one.steps] == [
-        "logs", "ingest", "train", "diagnose", "former",
+        "logs", "ingest", "train", "diagnose", "rivals",
     ]  # fmt: skip
     assert hashlib.sha256((out / "cases" / "5" / "verdict.json").read_bytes()).hexdigest() == before
     monkeypatch.setenv("SAYS", "none")
-    replay.replay(out, new, stubs(former=True))  # nothing is left to do
+    replay.replay(out, new, stubs(rivals=True))  # nothing is left to do
     assert score.read(new).answers[0].word == "coverage"
     with pytest.raises(ShiplogError, match="cannot hold its own replay"):
         replay.replay(out, out, stubs())
@@ -282,23 +261,6 @@ def test_the_page_is_written_with_its_picture_or_refused(tmp_path, stubs, capsys
     steps.write_text(json.dumps(content))
     assert main(["scores", str(out)]) == 2
     assert "several programs" in capsys.readouterr().err
-
-
-def test_the_former_decision_is_asked_for_where_there_are_two(tmp_path):
-    verdict = SimpleNamespace(as_json=lambda: {"verdict": "none"})
-    asked = {}
-
-    def two(base, store, voyages, out, *, extend=None, former=False):
-        asked["former"] = former
-        return SimpleNamespace(verdict=verdict)
-
-    def one(base, store, voyages, out, *, extend=None):
-        return SimpleNamespace(verdict=verdict)
-
-    store: object = None
-    assert former.answer(tmp_path, store, ["trial_*"], two)["decision"] == "former"  # type: ignore[arg-type]
-    assert asked == {"former": True}
-    assert former.answer(tmp_path, store, ["trial_*"], one)["decision"] == "only"  # type: ignore[arg-type]
 
 
 # --- the commit

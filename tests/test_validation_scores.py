@@ -278,13 +278,12 @@ def test_a_method_answers_the_cases_that_it_was_asked():
     broke = {"step": "rivals", "rc": 1, "commit": "a" * 40, "dirty": False}
     said = {"regression": {"answer": None, "ranking": []}, "glr": {"answer": "current"}}
     given = [
-        answer(CURRENT, none(), rivals=said, former=named("current")),
+        answer(CURRENT, none(), rivals=said),
         replace(answer(CURRENT, none()), steps=[COMMIT, broke]),
         answer(CURRENT, none()),
     ]
     found = methods.answers(given)
     assert [a.word for a in found["likelihood ratio"]] == ["named", "failed"]
-    assert [a.right for a in found[methods.FORMER]] == [True]
     assert len(found[methods.PROGRAM]) == 3
 
 
@@ -304,7 +303,7 @@ def test_the_page_begins_with_what_went_wrong_the_worst_first():
     ]  # fmt: skip
     assert "| wrong name, the truth in its group " in lines[0] and "| 0.95 " in lines[0]
     assert "Program: `aaaaaaaaaaaa`" in text and "+changes" not in text
-    assert "Null" in text and "Random" in text and "today's decision" not in text
+    assert "Null" in text and "Random" in text
 
 
 def test_two_programs_are_not_put_into_one_table():
@@ -314,7 +313,7 @@ def test_two_programs_are_not_put_into_one_table():
     dirty = replace(ANSWERS[0], steps=[COMMIT | {"dirty": True}])
     with pytest.raises(validation.Mixed, match=r"aaaaaaaaaaaa\+changes"):
         validation.page(scored(*ANSWERS, dirty))
-    asked_later = COMMIT | {"step": "former", "commit": "b" * 40}
+    asked_later = COMMIT | {"step": "rivals", "commit": "b" * 40}
     with pytest.raises(validation.Mixed):
         validation.page(scored(replace(ANSWERS[0], steps=[COMMIT, asked_later])))
     with pytest.raises(validation.Mixed, match="there twice"):

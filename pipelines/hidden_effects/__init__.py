@@ -2,7 +2,6 @@
 
     suites → plan → run (one process a step) → verdict.json and its SHA-256 → score → tables
                     ├ rivals: what simpler methods say of the same trial, sealed likewise
-                    ├ former: what today's decision says of it, sealed likewise
                     └ replay: kept cases, diagnosed again by the program as it is now
     score → goals, scores, reliability, ranks → validation: one page of one program
 

@@ -13,9 +13,9 @@ python -m pipelines.hidden_effects goals --out DIR [--count 20] [--first-seed 20
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
 python -m pipelines.hidden_effects abroad --out DIR [--count 100] [--first-seed 70000]
     ships whose equations are not the home ship's, from pipelines.experiments.other_families
-    each with --rivals: what simpler methods say of the same trials, too; with --former: what
-    today's decision says; of cases that were run with --keep before, give the command again
-python -m pipelines.hidden_effects replay DIR [--out NEW] [--former] [--rivals]
+    each with --rivals: what simpler methods say of the same trials, too; of cases that were run
+    with --keep before, give the command again
+python -m pipelines.hidden_effects replay DIR [--out NEW] [--rivals] [--shiplog COMMAND]
     the kept cases of DIR diagnosed again by the program as it is now, into another folder
 python -m pipelines.hidden_effects score DIR
     the tables again, of what is there by now
@@ -89,7 +89,7 @@ def _run(given: argparse.Namespace) -> None:
     command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
     settings = Settings(
         jobs=given.jobs, keep=given.keep, share=given.share, rivals=given.rivals,
-        former=given.former, oracle=given.oracle, limit=given.limit, shiplog=command,
+        oracle=given.oracle, limit=given.limit, shiplog=command,
     )  # fmt: skip
     if given.what == "replay":
         given.out = given.out or replay.folder_of(given.source)
@@ -142,7 +142,6 @@ def _how(command: argparse.ArgumentParser) -> None:
     command.add_argument("--jobs", type=_positive, default=1, help="ships at a time")
     command.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
     command.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
-    command.add_argument("--former", action="store_true", help="ask today's decision, too")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
     command.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
 

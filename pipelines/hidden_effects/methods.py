@@ -1,5 +1,4 @@
-"""Who answers the same cases: this program, today's decision, simpler methods, and two answers that
-need no run."""
+"""Who answers the same cases: this program, simpler methods, and two answers that need no run."""
 
 from __future__ import annotations
 
@@ -11,10 +10,9 @@ from pipelines.hidden_effects.parameters import NAMES
 from pipelines.hidden_effects.score import FAILED, Answer
 
 PROGRAM = "this program"
-FORMER = "today's decision"
 RIVALS = {"regression": "regression + BIC", "glr": "likelihood ratio"}
 NULL, RANDOM = "Null", "Random"
-METHODS = (PROGRAM, FORMER, *RIVALS.values(), NULL, RANDOM)
+METHODS = (PROGRAM, *RIVALS.values(), NULL, RANDOM)
 
 
 def answers(given: Sequence[Answer]) -> dict[str, list[Answer]]:
@@ -23,8 +21,6 @@ def answers(given: Sequence[Answer]) -> dict[str, list[Answer]]:
     found: dict[str, list[Answer]] = {method: [] for method in METHODS}
     for one in given:
         found[PROGRAM].append(one)
-        if one.former is not None:
-            found[FORMER].append(one.answered(one.former))
         for rival, title in RIVALS.items():
             if (said := _rival(one, rival)) is not None:
                 found[title].append(said)

@@ -5,7 +5,6 @@ OUT/keys/LABEL.json   a key, opened by `score` alone and only after the verdict 
 OUT/cases/LABEL/      logs, store, base, d (until the case is done); verdict.json,
                       verdict.sha256, steps.json (times, memory, last words; they stay);
                       with --rivals, rivals.json and rivals.sha256: what simpler methods say;
-                      with --former, former.json and former.sha256: what today's decision says;
                       with --oracle, oracle.json: what the truth would gain
 OUT/bases/SEED/       with --share, the model of a ship's nominal campaign
 """

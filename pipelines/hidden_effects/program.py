@@ -15,7 +15,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]  # `python -m pipelines...` finds this source and no other
 SOURCE = ("shiplog", "pipelines", "pyproject.toml")  # changes elsewhere change no answer
-ANSWERING = ("diagnose", "rivals", "former")  # steps whose program a figure belongs to
+ANSWERING = ("diagnose", "rivals")  # steps whose program a figure belongs to
 SHORT = 12  # characters of a commit that a page shows
 UNRECORDED = "no commit recorded"
 

@@ -53,9 +53,8 @@ def replay(source: Path, out: Path, settings: Settings) -> Plan:
 
 def _left(out: Path, planned: Planned, settings: Settings) -> bool:
     folder = plans.case_folder(out, planned)
-    return not run.finished(folder) or any(
-        not (folder / f"{one}.sha256").exists() for one in run.wanted(settings)
-    )
+    asked = (folder / "rivals.sha256").exists() or not settings.rivals
+    return not (run.finished(folder) and asked)
 
 
 def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
@@ -73,9 +72,8 @@ def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str 
         steps = json.loads((first / "steps.json").read_text(encoding="utf-8"))
         made = [one for one in steps if one["step"] in MADE]
         said.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")
-    for one in run.wanted(settings):
-        if not (folder / f"{one}.sha256").exists():
-            said.append(run.ask(one, folder, base, store, settings))
+    if settings.rivals and not (folder / "rivals.sha256").exists():
+        said.append(run.ask_rivals(folder, base, store, settings))
     if None in said:
         return None
     if not settings.keep:

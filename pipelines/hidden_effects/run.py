@@ -52,21 +52,18 @@ class Settings:
     keep: bool = False  # logs, store, base and report of each case
     share: bool = False  # one base model for all cases of a ship: its nominal campaign is the same
     rivals: bool = False  # simpler methods too, once the verdict is sealed
-    former: bool = False  # and today's decision, once the verdict is sealed
     oracle: bool = False  # and what the truth would gain, once the verdict is sealed
     limit: float = 3600.0  # s for one step
     case: tuple[str, ...] = (sys.executable, "-m", "pipelines.known_ship", "case")
     abroad: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.other_families", "case")
     shiplog: tuple[str, ...] = OUR_SHIPLOG
     rival: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.rivals")
-    before: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.former")
     truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.hidden_effects.oracle")
 
 
 def run(out: Path, plan: Plan, settings: Settings) -> None:
     """Every case of the plan that has no sealed verdict yet; one that failed is tried again. Where
-    rivals or today's decision are wanted, finished cases whose store and base were kept are asked,
-    too."""
+    rivals are wanted, finished cases whose store and base were kept are asked, too."""
     ships: dict[int, list[Planned]] = {}
     for planned in plan.cases:
         if not finished(plans.case_folder(out, planned)) or _to_ask(out, planned, settings):
@@ -74,8 +71,11 @@ def run(out: Path, plan: Plan, settings: Settings) -> None:
     log.info("%d of %d cases to run", sum(map(len, ships.values())), len(plan.cases))
 
     def case(planned: Planned) -> str | None:
-        done = finished(plans.case_folder(out, planned))
-        return (compare_case if done else run_case)(out, planned, settings)
+        folder = plans.case_folder(out, planned)
+        if not finished(folder):
+            return run_case(out, planned, settings)
+        folder = folder.resolve()
+        return ask_rivals(folder, base_of(out, planned), folder / "store", settings)
 
     in_turn(list(ships.values()), case, settings.jobs)
 
@@ -152,8 +152,8 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
             _mark(base, logs)
     said = seal(folder, steps)
     compared = None
-    if steps[-1]["step"] == "diagnose" and wanted(settings):  # where it failed they may not
-        compared = compare_case(out, planned, settings)
+    if steps[-1]["step"] == "diagnose" and settings.rivals:  # where it failed they may not
+        compared = ask_rivals(folder, base_of(out, planned), store, settings)
         if compared is None:
             return None
     if settings.oracle and steps[-1]["step"] == "diagnose":
@@ -180,49 +180,26 @@ def _training(model: str) -> list[str]:
     return ["--model", model, "--voyages", "trial_*"]
 
 
-def wanted(settings: Settings) -> tuple[str, ...]:
-    """Whoever else is to answer beside the diagnosis, once its verdict is sealed."""
-    asked = {"rivals": settings.rivals, "former": settings.former}
-    return tuple(name for name, yes in asked.items() if yes)
+def ask_rivals(folder: Path, base: Path, store: Path, settings: Settings) -> str | None:
+    """`rivals.json`, sealed as the verdict is; None where somebody stopped it.
 
-
-def compare_case(out: Path, planned: Planned, settings: Settings) -> str | None:
-    """Ask of a case whose verdict is sealed whoever else is wanted and has not answered it yet.
-    None where somebody stopped it."""
-    folder = plans.case_folder(out, planned).resolve()
-    base = base_of(out, planned)
-    said = [
-        ask(name, folder, base, folder / "store", settings)
-        for name in _to_ask(out, planned, settings)
-    ]
-    return None if None in said else "; ".join(one for one in said if one)
-
-
-def ask(name: str, folder: Path, base: Path, store: Path, settings: Settings) -> str | None:
-    """`rivals.json` or `former.json`, sealed as the verdict is; None where somebody stopped it.
-
-    Rivals that fail leave nothing: the case stays what it is. Where today's decision fails, that is
-    its answer, as it is the diagnosis' own.
+    Rivals that fail leave nothing: the case stays what it is.
     """
-    command, must_have = {
-        "rivals": (settings.rival, "methods"), "former": (settings.before, "verdict"),
-    }[name]  # fmt: skip
-    answers = folder / f"{name}.json"
+    answers = folder / "rivals.json"
     answers.unlink(missing_ok=True)
-    done = step(name, [
-        *command, str(base), "--voyages", "trial_*", "--store", str(store), "--json", str(answers),
+    done = step("rivals", [
+        *settings.rival, str(base), "--voyages", "trial_*", "--store", str(store),
+        "--json", str(answers),
     ], folder, settings)  # fmt: skip
     if done["rc"] in STOPPED:
         return None
     steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
-    _write_steps(folder, [*(one for one in steps if one["step"] != name), done])
-    if done["rc"] not in (DONE, LOST) or _object(answers, must_have) is None:
+    _write_steps(folder, [*(one for one in steps if one["step"] != "rivals"), done])
+    if done["rc"] not in (DONE, LOST) or _object(answers, "methods") is None:
         answers.unlink(missing_ok=True)
-        if name == "rivals":
-            return f"not compared: rivals ended with {done['rc']}"
-        answers.write_text(json.dumps(_failed(done)), encoding="utf-8")
+        return f"not compared: rivals ended with {done['rc']}"
     _seal_file(answers)
-    return f"{name} after {done['wall_s']:.0f} s"
+    return f"rivals after {done['wall_s']:.0f} s"
 
 
 def _ask_oracle(folder: Path, base: Path, key: Path, settings: Settings) -> None:
@@ -249,11 +226,11 @@ def kept(out: Path, planned: Planned) -> bool:
     return store.exists() and base_of(out, planned).exists()
 
 
-def _to_ask(out: Path, planned: Planned, settings: Settings) -> list[str]:
-    if not kept(out, planned):
-        return []
-    folder = plans.case_folder(out, planned)
-    return [name for name in wanted(settings) if not (folder / f"{name}.sha256").exists()]
+def _to_ask(out: Path, planned: Planned, settings: Settings) -> bool:
+    """Rivals are wanted, and could answer, but have not."""
+    if not settings.rivals or not kept(out, planned):
+        return False
+    return not (plans.case_folder(out, planned) / "rivals.sha256").exists()
 
 
 def step(name: str, command: Sequence[str], folder: Path, settings: Settings) -> dict[str, Any]:

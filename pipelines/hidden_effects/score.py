@@ -54,15 +54,6 @@ def open_rivals(folder: Path, key: Path) -> dict[str, Any]:
     return json.loads(_as_sealed(folder / "rivals.json", key, hint))["methods"]
 
 
-def open_former(folder: Path, key: Path) -> dict[str, Any] | None:
-    """The verdict of today's decision; None where it was not asked, or nothing was sealed. Raises
-    Sealed, and is to be called before the key is opened."""
-    if not (folder / "former.sha256").exists():
-        return None
-    hint = "remove former.json and former.sha256; a case that was kept can be asked again."
-    return json.loads(_as_sealed(folder / "former.json", key, hint))
-
-
 def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
     seal = path.with_suffix(".sha256").read_text(encoding="utf-8").split() or [""]
     content = path.read_bytes() if path.exists() else b""
@@ -75,7 +66,6 @@ def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
 class Answer:
     """What was hidden in one case, and what was said of it; by simpler methods, too, if asked.
 
-    former   what today's decision says; None where it was not asked
     oracle   share of the held-out error that exactly what was hidden would take off; None where
              it was not asked, or has no term here
     """
@@ -86,7 +76,6 @@ class Answer:
     steps: list[dict[str, Any]]
     rivals: Mapping[str, Any] = field(default_factory=dict)
     oracle: float | None = None
-    former: dict[str, Any] | None = None
 
     def by(self, method: str) -> Answer:
         """The same case as that rival answers it, with the probabilities that its scores give."""
@@ -285,9 +274,8 @@ def read(out: Path) -> Score:
         if steps[0]["rc"] != 0:
             unmade.append(one)
         else:
-            rivals, former = open_rivals(folder, key), open_former(folder, key)
-            oracle = _oracle(folder / "oracle.json")
-            answers.append(Answer(one, *open_key(folder, key), steps, rivals, oracle, former))
+            rivals, oracle = open_rivals(folder, key), _oracle(folder / "oracle.json")
+            answers.append(Answer(one, *open_key(folder, key), steps, rivals, oracle))
     return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
 
 

@@ -127,9 +127,6 @@ def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
         lines.append("- which program it was is not recorded: these figures stand for no commit")
     elif of.endswith("+changes"):
         lines.append("- the source held changes that this commit does not")
-    decisions = {a.former.get("decision") for a in answers if a.former is not None}
-    if "only" in decisions:
-        lines.append("- this source holds one decision: the column of today's is the same program")
     return "\n".join(lines)
 
 
