@@ -11,10 +11,10 @@ import polars as pl
 
 from pipelines.bars import Bars
 from pipelines.train import training_of
-from shiplog import runs, table
-from shiplog.training import cluster
+from shiplog.training import cluster, run_folder
 from shiplog.training.network_training import share_done
 from shiplog.training.queue import Task
+from shiplog.voyages import one_hertz
 
 log = logging.getLogger(__name__)
 
@@ -42,13 +42,15 @@ def resample(
 def _resample_one(
     path: Path, columns: tuple[str, ...], circular: tuple[str, ...], out: Path
 ) -> Path:
-    table.sink_averages([pl.scan_parquet(path)], columns, circular, out)
+    one_hertz.sink_averages([pl.scan_parquet(path)], columns, circular, out)
     return out
 
 
 def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
     """Do all trainings (tasks of `train.tasks_of`) there. Returns those that failed, and why."""
-    places = {task.name: (runs.open_folder(task.arguments[0]), task.arguments[1]) for task in tasks}
+    places = {
+        task.name: (run_folder.open_folder(task.arguments[0]), task.arguments[1]) for task in tasks
+    }
     trainings = {
         name: (training_of(run, seed), run.load_checkpoint(seed))
         for name, (run, seed) in places.items()

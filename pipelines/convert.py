@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from shiplog.conversion import columns
-from shiplog.conversion.delimited import is_table, read_table
-from shiplog.conversion.heartbeat import saying
-from shiplog.conversion.nmea import is_nmea, read_nmea
-from shiplog.conversion.topics import folder_to_series
-from shiplog.draft import draft as draft_log
-from shiplog.draft import draft_table
 from shiplog.exceptions import ProfileError, ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
+from shiplog.logs.conversion import columns
+from shiplog.logs.conversion.delimited import is_table, read_table
+from shiplog.logs.conversion.heartbeat import saying
+from shiplog.logs.conversion.nmea import is_nmea, read_nmea
+from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.logs.write import Series, write_log
 from shiplog.profile import Profile
 from shiplog.unexpected import unexpected
+from shiplog.voyages.draft_profile import draft as draft_log
+from shiplog.voyages.draft_profile import draft_table
 
 log = logging.getLogger(__name__)
 

@@ -11,12 +11,12 @@ from pipelines.diagnose import diagnose_run
 from pipelines.evaluate import compare_runs
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
-from pipelines.split import choose_physical_split, choose_split
 from pipelines.train import train_run
 from shiplog.arguments import sample_logs
-from shiplog.config import Config, Fast, Physics
 from shiplog.exceptions import ShiplogError, listed
-from shiplog.store import Store
+from shiplog.training.run_config import Config, Fast, Physics
+from shiplog.voyages.split import choose_physical_split, choose_split
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 

@@ -11,20 +11,31 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipelines.diagnosis import answer, baseline, own, pictures, setup, trial, where
-from pipelines.diagnosis.answer import Context, Diagnosis
-from pipelines.diagnosis.held_out import HeldOut
-from pipelines.provenance import Answer, provenance
-from shiplog import decision as decisions
-from shiplog import page, parts, runs, segments, user_causes
 from shiplog.arguments import refuse_taken
-from shiplog.causes import Cause
-from shiplog.diagnosis import placebo, refutation, search
+from shiplog.diagnosis import (
+    baseline_check,
+    error_location,
+    network_base,
+    placebo,
+    refutation,
+    search,
+    segments,
+    setup,
+    trial_voyages,
+)
+from shiplog.diagnosis import result as decisions
+from shiplog.diagnosis.held_out import HeldOut
 from shiplog.exceptions import RunError, listed
+from shiplog.models.causes import Cause, user
 from shiplog.profile import Profile
-from shiplog.record import Record
-from shiplog.runs import Run
-from shiplog.store import Store
+from shiplog.report import answer, diagnosis_pictures, page
+from shiplog.report.answer import Context, Diagnosis
+from shiplog.training import run_folder
+from shiplog.training.provenance import Answer, provenance
+from shiplog.training.run_folder import Run
+from shiplog.voyages import parts
+from shiplog.voyages.recording import Record
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -45,9 +56,9 @@ def diagnose_run(
     began = time.time()
     if extend is not None:
         refuse_taken(extend, "--extend")
-    causes = user_causes.load(cause_files)
-    run = runs.load(run_path, causes)
-    names = trial.voyages_of(run, store, voyages)
+    causes = user.load(cause_files)
+    run = run_folder.load(run_path, causes)
+    names = trial_voyages.voyages_of(run, store, voyages)
     profile = store.profile(names)
     if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
         raise RunError(
@@ -55,10 +66,10 @@ def diagnose_run(
             f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
             hint="diagnose a ship with a model of its own.",
         )
-    recorded = trial.record_of(store, names, profile)
+    recorded = trial_voyages.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.made_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
-    nominal, recorded = trial.in_ship_time(run, nominal, recorded)
+    nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
     if not answer.enough(recorded):
         done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
         _write(done)
@@ -103,7 +114,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
             f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
-    lacking = baseline.lacking(run, store, profile) if nominal is not None else ""
+    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else ""
     made = setup.trial_of(run, nominal, recorded, causes, lacking)
     tried, untested = made.trial, dict(made.untested)
     notes += [lacking] if lacking else []
@@ -114,16 +125,16 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     )  # fmt: skip
     point = tried.begin(run.extension_numbers())
     whole = tried.covering(point)
-    pushed = where.pushed(tried, point, whole)
-    cut = trial.windows_of(run, store, names, profile)
-    judge = None if cut is None else HeldOut(cut, trial.simulator(run, tried), tried)
+    pushed = error_location.pushed(tried, point, whole)
+    cut = trial_voyages.windows_of(run, store, names, profile)
+    judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, tried), tried)
     weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
     weighed.run()
     decision, _, found, dropped = refutation.judged(weighed, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:
         notes += answer.of_physics(run, tried, found)
-        network = own.Own(run, tried)
+        network = network_base.Own(run, tried)
         if cut is not None:
             before = run.extended(run.config.seeds[0], recorded)
             held = HeldOut(cut, before, tried, network)
@@ -154,9 +165,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
         notes,
         pushed,
         tried.grid.seconds,
-        where.uncovered(run, store, names, profile, held.cut) if held else (),
-        where.by_channel(held) if held else (),
-        where.depends_on(*seen, whole),
+        error_location.uncovered(run, store, names, profile, held.cut) if held else (),
+        error_location.by_channel(held) if held else (),
+        error_location.depends_on(*seen, whole),
         alone,
     )
     after = held.extended(decision) if held and decision.named else None
@@ -169,21 +180,21 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     there = store.there(run.made_on)
     if not there:
         return None
-    return trial.record_of(store, there, profile)
+    return trial_voyages.record_of(store, there, profile)
 
 
 def _write(done: Diagnosis) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
     (done.folder / "report.md").write_text(page.markdown(done.verdict), encoding="utf-8")
-    runs.write_json(done.folder / "verdict.json", done.verdict.as_json())
+    run_folder.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
 def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: float) -> None:
     _write(done)
     split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
-    runs.write_json(done.folder / "provenance.json", provenance(store, split, began))
+    run_folder.write_json(done.folder / "provenance.json", provenance(store, split, began))
     if done.recording is not None:
-        pictures.save(done, done.recording)
+        diagnosis_pictures.save(done, done.recording)
 
 
 def _extend(run: Run, done: Diagnosis, out: Path, cause_files: Sequence[Path]) -> None:
@@ -191,7 +202,7 @@ def _extend(run: Run, done: Diagnosis, out: Path, cause_files: Sequence[Path]) -
     if done.after is None:
         log.info("nothing was named that a model can take in: %s is not written", out)
         return
-    runs.extend(run, out, done.after, cause_files)
+    run_folder.extend(run, out, done.after, cause_files)
     log.info("extended model in %s", out)
 
 

@@ -12,16 +12,20 @@ import polars as pl
 import torch
 
 from pipelines.prepare import seconds
-from pipelines.split import plan
-from shiplog import band, evaluate, floors, parts, report, runs, table, user_causes, windows
-from shiplog import coverage as covering
 from shiplog.channels import STATE
-from shiplog.comparison import BAND, Actuator, Comparison
 from shiplog.exceptions import RunError, StoreError, listed
-from shiplog.judgement import MEANING, Judgement, force_line, judge
-from shiplog.runs import Run
-from shiplog.store import Store
-from shiplog.windows import Windows
+from shiplog.models.causes import user
+from shiplog.report import tables
+from shiplog.report.comparison_data import BAND, Actuator, Comparison
+from shiplog.report.judgement import MEANING, Judgement, force_line, judge
+from shiplog.simulation import baselines, prediction_interval, scoring
+from shiplog.simulation import coverage as covering
+from shiplog.training import run_folder
+from shiplog.training.run_folder import Run
+from shiplog.voyages import one_hertz, parts, windows
+from shiplog.voyages.split import plan
+from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -54,14 +58,14 @@ class Evaluation:
     def answer(self, run: Run) -> dict:
         """The contract's JSON for one run, and the share of samples inside its 90 % band."""
         errors = self.errors.filter(pl.col("run") == run.name)
-        answer = report.evaluation_json(errors, self.means, self.coverage)
+        answer = tables.evaluation_json(errors, self.means, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
         said = self.judgement(run)
         return answer | {
             "sentence": said.sentence,
             "judgement": said.as_json(),
             "band_90": dict(shares.iter_rows()),
-            "winds": report.winds(errors).drop("run").to_dicts(),
+            "winds": tables.winds(errors).drop("run").to_dicts(),
         }
 
     @property
@@ -86,17 +90,17 @@ class Evaluation:
             "",
             f"{MEANING} Means over {count} windows and over seeds:",
             "",
-            report.models_table(answers, self.means, self.runs[0].name),
+            tables.models_table(answers, self.means, self.runs[0].name),
             "",
-            *report.band_lines(self.inside),
+            *tables.band_lines(self.inside),
             f"Per voyage, {self.runs[0].name}:",
             "",
-            report.voyages_table(first),
+            tables.voyages_table(first),
             "",
-            *report.wind_lines(self.errors),
+            *tables.wind_lines(self.errors),
             "Worst windows, and whether the training data had been there:",
             "",
-            report.windows_table(errors, self.coverage),
+            tables.windows_table(errors, self.coverage),
         ]
         if len(self.voyages) == 1 and self.forces is not None:
             lines += ["", force_line(self.forces, self.voyages[0])]
@@ -115,8 +119,8 @@ def evaluate_runs(
 
     cause_files   Python files of the causes of the user's own that are in these runs
     """
-    causes = user_causes.load(cause_files)
-    opened = tuple(runs.load(path, causes) for path in paths)
+    causes = user.load(cause_files)
+    opened = tuple(run_folder.load(path, causes) for path in paths)
     first = opened[0]
     for other in opened[1:]:
         if other.config.window != first.config.window:
@@ -129,7 +133,7 @@ def evaluate_runs(
     names = _test_voyages(first, store, voyages)
     profile = store.profile(names)
     _same_ship(first, profile.columns, "the chosen voyages")
-    rows = table.with_elapsed(seconds(store, names, profile))
+    rows = one_hertz.with_elapsed(seconds(store, names, profile))
     size = first.config.window
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
@@ -137,7 +141,7 @@ def evaluate_runs(
     scored, bands = [], {}
     for run in opened:
         models = run.models()
-        scores = {seed: evaluate.score(model, cut) for seed, model in models.items()}
+        scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
         scored += [(run, seed, one) for seed, one in scores.items()]
         bands[run.name] = _half_widths(run, models, scores, cut)
     return Evaluation(
@@ -213,7 +217,7 @@ def compare_runs(
 ) -> Compared:
     """Evaluate the runs on the same windows and record both sides; in the first run's folder
     unless a path is given."""
-    from shiplog import viewer
+    from shiplog.report import viewer
 
     found = evaluate_runs(paths, store, voyages, cause_files)
     save(found)
@@ -285,7 +289,7 @@ def _labelled(numbered: pl.DataFrame, run: Run, seed: int) -> pl.DataFrame:
 
 
 def _half_widths(
-    run: Run, models: dict, scores: dict[int, evaluate.Scores], cut: Windows
+    run: Run, models: dict, scores: dict[int, scoring.Scores], cut: Windows
 ) -> np.ndarray | None:
     """[N, I, 6] of the run's 90 % band: of its parameters' spread or of its seeds'."""
     learnt = run.band()
@@ -294,7 +298,9 @@ def _half_widths(
     if run.config.physical:
         spread = next(iter(models.values())).spread(cut)
     else:
-        spread = band.seeds_spread([one.simulated.numpy() for one in scores.values()])
+        spread = prediction_interval.seeds_spread(
+            [one.simulated.numpy() for one in scores.values()]
+        )
     return learnt.half_width(spread)
 
 
@@ -307,7 +313,7 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
             continue
         shares = np.mean(
             [
-                band.coverage((s.simulated - cut.state).numpy(), half)
+                prediction_interval.coverage((s.simulated - cut.state).numpy(), half)
                 for r, _, s in scored
                 if r.name == run
             ],
@@ -321,10 +327,10 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
 def _forces(opened: tuple[Run, ...], rows: pl.DataFrame) -> pl.DataFrame | None:
     for run in opened:
         if run.config.physical:
-            from shiplog import forces
+            from shiplog.simulation import force_breakdown
 
             simulator = run.simulator(run.config.seeds[0])
-            return forces.along(simulator, rows, run.profile).with_columns(
+            return force_breakdown.along(simulator, rows, run.profile).with_columns(
                 pl.lit(run.name).alias("run")
             )
     return None
@@ -335,7 +341,7 @@ def _rollout(
     cut: Windows,
     run: Run,
     seed: int,
-    scores: evaluate.Scores,
+    scores: scoring.Scores,
     half: np.ndarray | None,
 ) -> pl.DataFrame:
     count, size, _ = scores.simulated.shape
@@ -387,8 +393,8 @@ def _floors(run: Run, cut: Windows) -> dict[str, np.ndarray]:
     size = run.config.window
     names = (run.profile.actuator_names, run.profile.wind_names)
     learnt = windows.cut(run.training(), plan(run.training(), "ref", size), size, *names)
-    fitted = floors.least_squares(learnt)
+    fitted = baselines.least_squares(learnt)
     return {
-        name: evaluate.score(model, cut).errors["loss"].to_numpy()
-        for name, model in (("hold", floors.hold), ("least_squares", fitted))
+        name: scoring.score(model, cut).errors["loss"].to_numpy()
+        for name, model in (("hold", baselines.hold), ("least_squares", fitted))
     }

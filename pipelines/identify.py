@@ -11,23 +11,25 @@ import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
-from pipelines.choices import choose_network, choose_ridge, physics
-from pipelines.equations import Prepared, prepare
 from pipelines.prepare import seconds
-from pipelines.provenance import Answer, provenance
-from pipelines.split import choose_physical_split, plan, refuse_shared_rows, say
-from shiplog import band, identifiability, report, runs
 from shiplog.arguments import refuse_taken
-from shiplog.config import Config
-from shiplog.crossvalidation import CrossValidated, cross_validate
 from shiplog.exceptions import RunError, listed
-from shiplog.findings import CONTRACT
-from shiplog.identify import Identified
+from shiplog.logs.health_report import CONTRACT
 from shiplog.models import mmg
 from shiplog.models.hybrid import Hybrid
-from shiplog.runs import Run
-from shiplog.sensitivity import Series, Simulator, losses, rollout
-from shiplog.store import Store
+from shiplog.report import tables
+from shiplog.simulation import prediction_interval
+from shiplog.simulation.sensitivities import Series, Simulator, losses, rollout
+from shiplog.training import identifiability, run_folder
+from shiplog.training.cross_validation import CrossValidated, cross_validate
+from shiplog.training.model_selection import choose_network, choose_ridge, physics
+from shiplog.training.output_error import Identified
+from shiplog.training.provenance import Answer, provenance
+from shiplog.training.run_config import Config
+from shiplog.training.run_folder import Run
+from shiplog.training.setup import Prepared, prepare
+from shiplog.voyages.split import choose_physical_split, plan, refuse_shared_rows, say
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -64,7 +66,7 @@ def identify_run(
             )
         }
     )
-    run = runs.create(out, config, profile, None, planned, learnt, held)
+    run = run_folder.create(out, config, profile, None, planned, learnt, held)
     count = int(ready.free.sum()) if config.physics.fit else 0
     log.info(
         "%s: %d of %d parameters free, %d windows of %s; they start from %s",
@@ -172,7 +174,9 @@ def _keep(run: Run, ready: Prepared) -> list[str]:
         save(run, seed, ready, simulator, None)
     states = rollout(ready.model, ready.start.values, ready.data)
     error = states - ready.data.measured
-    run.save_band(band.calibrate(error, np.zeros_like(states), len(set(ready.voyages))))
+    run.save_band(
+        prediction_interval.calibrate(error, np.zeros_like(states), len(set(ready.voyages)))
+    )
     loss = losses(ready.model, ready.start.values, ready.data)
     return [f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."]
 
@@ -194,7 +198,9 @@ def _band(run: Run, ready: Prepared, validated: CrossValidated | None) -> None:
         spreads.append(simulator.spread(ready.unseen))
         groups += ready.unseen.plan["voyage"].n_unique()
     if errors:
-        run.save_band(band.calibrate(np.concatenate(errors), np.concatenate(spreads), groups))
+        run.save_band(
+            prediction_interval.calibrate(np.concatenate(errors), np.concatenate(spreads), groups)
+        )
 
 
 def _save_cross_validation(
@@ -263,7 +269,7 @@ def identify_command(
     identified = run.identified()
     lines = [f"{run.label} in {run.path}.", *said, ""]
     if fit:
-        lines += [report.parameters_table(identified), ""]
+        lines += [tables.parameters_table(identified), ""]
     lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
     content = {
         "contract": CONTRACT,

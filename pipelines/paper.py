@@ -12,19 +12,21 @@ import polars as pl
 from pipelines import train
 from pipelines.evaluate import Evaluation, evaluate_runs
 from pipelines.prepare import seconds
-from pipelines.provenance import Answer
-from pipelines.split import choose_split, say
-from shiplog import parts, report, runs, viewer
 from shiplog.channels import VELOCITY
-from shiplog.config import Config, Split
 from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
-from shiplog.findings import CONTRACT
-from shiplog.paper import figures, sets, statements
-from shiplog.paper.style import named
+from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
-from shiplog.runs import Run
-from shiplog.store import Store
+from shiplog.report import tables, viewer
+from shiplog.report.paper import figures, sets, statements
+from shiplog.report.paper.style import named
+from shiplog.training import run_folder
+from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
+from shiplog.training.run_config import Config, Split
+from shiplog.training.run_folder import Run
+from shiplog.voyages import parts
+from shiplog.voyages.split import choose_split, say
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -174,7 +176,7 @@ def train_sets(
         path = out / name
         try:
             if path.is_dir():
-                finished[name] = _same(runs.load(path), config)
+                finished[name] = _same(run_folder.load(path), config)
                 continue
             begun[name] = train.begin(config, store, path)
         except ShiplogError as error:  # such as a folder that is of other settings
@@ -226,8 +228,8 @@ def collect(finished: dict[str, Run], failures: dict[str, str], store: Store) ->
 def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
     """Tables as Parquet, figures as SVG and PNG, report.md and paper.rrd in `out`. Returns the
     report."""
-    tables, drawn = out / "tables", out / "figures"
-    for folder in (tables, drawn):
+    numbers, drawn = out / "tables", out / "figures"
+    for folder in (numbers, drawn):
         folder.mkdir(parents=True, exist_ok=True)
     first = next(iter(results.runs.values()))
     profile, size = first.profile, first.config.window
@@ -267,9 +269,9 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
         if name != "ref" and "ref" in results.runs:
             figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
     for name, frame in frames.items():
-        partial = tables / f"{name}.partial"
+        partial = numbers / f"{name}.partial"
         frame.write_parquet(partial)
-        partial.replace(tables / f"{name}.parquet")
+        partial.replace(numbers / f"{name}.parquet")
     text = report_of(results, chosen, sizes)
     partial = out / "report.partial"
     partial.write_text(text + "\n", encoding="utf-8")
@@ -321,13 +323,13 @@ def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
         f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
         f"{listed(results.evaluation.voyages)}, {count} windows. Split by {chosen.chosen_by}.",
         "",
-        report.table(tuple(sizes.columns), [tuple(row) for row in sizes.iter_rows()]),
+        tables.table(tuple(sizes.columns), [tuple(row) for row in sizes.iter_rows()]),
         "",
         "L of the test windows; a baseline that holds the velocity has "
         f"{floors['hold']:.0f}, quadratic least squares on the reference set "
         f"{floors['least_squares']:.0f}.",
         "",
-        report.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
+        tables.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
                      losses),
         "",
         "## What the paper states, on these data",

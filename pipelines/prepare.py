@@ -9,16 +9,17 @@ from pathlib import Path
 
 import polars as pl
 
-from shiplog import parity, report, table
 from shiplog import profile as profiles
 from shiplog.exceptions import ProfileError, ShiplogError, listed
-from shiplog.findings import Finding, VoyageReport
-from shiplog.ingest import ingest
 from shiplog.logs.check import check
+from shiplog.logs.health_report import Finding, VoyageReport
 from shiplog.logs.read import Contents, contents
 from shiplog.profile import Profile
-from shiplog.store import Store
+from shiplog.report import tables
 from shiplog.unexpected import unexpected
+from shiplog.voyages import one_hertz, sensor_consistency
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -58,7 +59,7 @@ def ingest_logs(
             profile_of = chosen or fitting_profile(found)
             if profile_of.source not in said:
                 said.add(profile_of.source)
-                for line in report.estimated(profile_of):
+                for line in tables.estimated(profile_of):
                     log.info(line)
             if store.holds(path.stem, found.sha256, profile_of, correct):
                 reports.append(store.report(path.stem))
@@ -66,7 +67,9 @@ def ingest_logs(
                 continue
             voyage = ingest(path, profile_of)
             if correct:
-                from shiplog.correct import corrected  # with the causes comes JAX, in a second
+                from shiplog.voyages.sensor_correction import (
+                    corrected,  # with the causes comes JAX, in a second
+                )
 
                 voyage = corrected(voyage)
             state = store.add(voyage)
@@ -107,7 +110,7 @@ def fitting_profile(found: Contents) -> Profile:
 
 def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFrame:
     """The sorted 1 Hz table of these voyages."""
-    return table.resample(store.tables(names), profile.columns, profile.circular)
+    return one_hertz.resample(store.tables(names), profile.columns, profile.circular)
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
@@ -144,4 +147,4 @@ def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
         log.info("%s: sensors not held against each other: %s", path.stem, why.message)
         return []
-    return parity.findings(voyage.estimates, voyage.table.height, voyage.profile)
+    return sensor_consistency.findings(voyage.estimates, voyage.table.height, voyage.profile)

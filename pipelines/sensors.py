@@ -8,13 +8,14 @@ from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 
-from pipelines.provenance import Answer
-from shiplog import parity_campaign, parts, report
-from shiplog.findings import CONTRACT
-from shiplog.parity import Estimate
-from shiplog.parity_campaign import Campaign
+from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
-from shiplog.store import Store
+from shiplog.report import tables
+from shiplog.training.provenance import Answer
+from shiplog.voyages import campaign_consistency, parts
+from shiplog.voyages.campaign_consistency import Campaign
+from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
@@ -29,11 +30,11 @@ def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[Campaign, Prof
         whole, later = (name, 0) if part is None else (part.whole, part.begin)
         begins[name] = starts[whole].timestamp() + later
     found = []
-    for names in parity_campaign.seasons(begins):
+    for names in campaign_consistency.seasons(begins):
         profile = store.profile(names)
         log.info("sensors against each other over %d voyages", len(names))
-        tables = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
-        found.append((parity_campaign.campaign(tables, profile), profile))
+        rows = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
+        found.append((campaign_consistency.campaign(rows, profile), profile))
     return found
 
 
@@ -51,7 +52,7 @@ def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
             for e in one.estimates
         ]  # fmt: skip
         head = ("kind", "channel", "value (90 % interval)", "unit", "said", "voyages that deviate")
-        text += [report.table(head, rows), ""]
+        text += [tables.table(head, rows), ""]
         text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
         content.append(_json(one, profile))
     return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})

@@ -16,22 +16,24 @@ import torch
 
 from pipelines.bars import Bars
 from pipelines.prepare import seconds
-from pipelines.provenance import Answer, provenance
-from pipelines.split import choose_split, plan, refuse_shared_rows, say
-from shiplog import band, runs, seeds, windows
+from shiplog import random_streams
 from shiplog.arguments import refuse_taken
-from shiplog.config import Config
 from shiplog.exceptions import RunError, listed
-from shiplog.findings import CONTRACT
+from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
-from shiplog.runs import Run
-from shiplog.simulate import simulate
-from shiplog.store import Store
-from shiplog.training import network_gradient
+from shiplog.simulation import prediction_interval
+from shiplog.simulation.rollout import simulate
+from shiplog.training import network_gradient, run_folder
 from shiplog.training.job import Training
 from shiplog.training.network_training import Progress
+from shiplog.training.provenance import Answer, provenance
 from shiplog.training.queue import Report, Task, work
-from shiplog.windows import Windows
+from shiplog.training.run_config import Config
+from shiplog.training.run_folder import Run
+from shiplog.voyages import windows
+from shiplog.voyages.split import choose_split, plan, refuse_shared_rows, say
+from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +79,7 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
     reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
     chosen = plan(learnt, config.data, size)
     windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
-    run = runs.create(
+    run = run_folder.create(
         out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
     )
     log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
@@ -122,13 +124,13 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
     return failures
 
 
-def _band(run: Run, held: pl.DataFrame) -> band.Band:
+def _band(run: Run, held: pl.DataFrame) -> prediction_interval.Band:
     """How far off its seeds were on the validation voyages, which they did not learn from."""
     unseen = _cut(run, held, plan(held, "ref", run.config.window))
     simulated = [simulate(model, unseen).numpy() for model in run.models().values()]
     error = np.concatenate([states - unseen.state.numpy() for states in simulated])
-    spread = np.concatenate([band.seeds_spread(simulated)] * len(simulated))
-    return band.calibrate(error, spread, len(run.config.split.validation))
+    spread = np.concatenate([prediction_interval.seeds_spread(simulated)] * len(simulated))
+    return prediction_interval.calibrate(error, spread, len(run.config.split.validation))
 
 
 def training_of(run: Run, seed: int) -> Training:
@@ -136,12 +138,12 @@ def training_of(run: Run, seed: int) -> Training:
     config = run.config
     scale, shape = run.scaling(), run.shape
     learnt = _cut(run, run.training(), run.windows())
-    learnt = windows.jittered(learnt, seeds.generator(seed, "jitter"))
+    learnt = windows.jittered(learnt, random_streams.generator(seed, "jitter"))
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
     training, validation = (
         network_gradient.batch(w, scale, shape, torch.float32) for w in (learnt, held)
     )
-    model = run.empty_model().initialise(seeds.generator(seed, "weights"))
+    model = run.empty_model().initialise(random_streams.generator(seed, "weights"))
     return Training(config, seed, model, training, validation)
 
 
@@ -149,7 +151,7 @@ def train_seed(path: Path, seed: int, report: Report | None = None) -> tuple[flo
     """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
     torch.set_num_threads(1)
     began = time.time()
-    run = runs.open_folder(path)
+    run = run_folder.open_folder(path)
 
     def keep(progress: Progress) -> None:
         run.save_checkpoint(seed, progress)

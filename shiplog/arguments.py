@@ -7,9 +7,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from shiplog.config import AUGMENTATIONS, RECIPES, WIND_INPUTS
 from shiplog.exceptions import RunError, ShiplogError, UsageError, listed, nearest
 from shiplog.models import MODELS
+from shiplog.training.run_config import AUGMENTATIONS, RECIPES, WIND_INPUTS
 
 
 def check_training(
@@ -123,7 +123,7 @@ def sample_logs(given: Path | None = None) -> Path:
     raise ShiplogError(
         f"There is no folder sample_logs in {here[0]}.",
         hint="run the demo from a clone of shiplog, or make the logs again with "
-        "`python -m pipelines.known_ship sample_logs` and give them with --logs.",
+        "`python -m pipelines.experiments.simulated_ship sample_logs` and give them with --logs.",
     )
 
 

@@ -20,7 +20,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from shiplog import cache
+from shiplog import disk_cache
 from shiplog.exceptions import ShiplogError
 from shiplog.unexpected import unexpected
 
@@ -105,7 +105,7 @@ def _every(
 def main() -> None:
     """Entry point: settings of this process, then `run`."""
     # What JAX compiled for one ship serves every later command: some ten seconds each.
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache.folder() / "jax"))
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(disk_cache.folder() / "jax"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
@@ -126,7 +126,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        cache.trim()
+        disk_cache.trim()
         app(arguments)
     except SystemExit as ended:  # as every command ends
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
@@ -161,17 +161,17 @@ def _stopped(number: int, _frame: object) -> NoReturn:
 
 def _answer(text: str, content: dict, json_to: str | None) -> None:
     """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
-    from shiplog import report
+    from shiplog.report import tables
 
     if json_to == "-":
         typer.echo(text, err=True)
-        typer.echo(json.dumps(report.finite(content), indent=1))
+        typer.echo(json.dumps(tables.finite(content), indent=1))
         return
     if text:
         typer.echo(text)
     if json_to:
         try:
-            Path(json_to).write_text(json.dumps(report.finite(content), indent=1), encoding="utf-8")
+            Path(json_to).write_text(json.dumps(tables.finite(content), indent=1), encoding="utf-8")
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",
@@ -188,13 +188,14 @@ def cache_command(
 
     Example: shiplog cache --clear
     """
-    removed = cache.trim(0) if clear else cache.trim()
-    kept = cache.size()
-    text = f"{cache.folder()} holds {kept / 1e6:.1f} MB (at most {cache.LIMIT / 1e6:.0f} MB)."
+    removed = disk_cache.trim(0) if clear else disk_cache.trim()
+    kept = disk_cache.size()
+    most = disk_cache.LIMIT / 1e6
+    text = f"{disk_cache.folder()} holds {kept / 1e6:.1f} MB (at most {most:.0f} MB)."
     if removed:
         text += f" {removed / 1e6:.1f} MB were removed."
-    content = {"folder": str(cache.folder()), "bytes": kept, "removed": removed}
-    _answer(text, content | {"limit": cache.LIMIT}, json_to)
+    content = {"folder": str(disk_cache.folder()), "bytes": kept, "removed": removed}
+    _answer(text, content | {"limit": disk_cache.LIMIT}, json_to)
 
 
 @app.command()
@@ -258,17 +259,17 @@ def ingest(
     check_writable(store, "--store")
     _check_logs(logs, profile)
     from pipelines.prepare import expand, ingest_logs
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     _leave(ingest_logs(expand(logs), profile, Store(store), correct), json_to)
 
 
 def _leave(done, json_to: str | None) -> None:
     """Answer; exit 1 where nothing could be taken, 3 where something was lost or refused."""
-    from shiplog import report
+    from shiplog.report import tables
 
-    text = "\n".join(line for one in done.reports for line in report.voyage_lines(one))
-    _answer(text, report.voyages_json(done.reports, done.refused), json_to)
+    text = "\n".join(line for one in done.reports for line in tables.voyage_lines(one))
+    _answer(text, tables.voyages_json(done.reports, done.refused), json_to)
     for path, error in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {error}", err=True)
     if done.refused and not done.reports:
@@ -370,8 +371,8 @@ def voyages(
         _answer(found.text, found.content, json_to)
         return
 
-    from shiplog import report
-    from shiplog.store import Store
+    from shiplog.report import tables
+    from shiplog.voyages.store import Store
 
     if not store.exists():
         raise ShiplogError(
@@ -380,7 +381,7 @@ def voyages(
         )
     entries = Store(store).entries()
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
-    _answer(report.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
+    _answer(tables.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
 
 
 @app.command()
@@ -509,7 +510,7 @@ def paper(
     Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
     """
     from shiplog.arguments import check_training, check_writable
-    from shiplog.config import AUGMENTATIONS
+    from shiplog.training.run_config import AUGMENTATIONS
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
     for name in chosen:
@@ -551,7 +552,7 @@ def evaluate(
     """
     _check_runs([run], store, voyages, cause)
     from pipelines.evaluate import evaluate_runs, save
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     save(found)
@@ -580,7 +581,7 @@ def compare(
     if save is not None:
         check_file(save, "--save")
     from pipelines.evaluate import compare_runs
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], save, cause or [])
     _answer(result.text, result.content, json_to)
@@ -641,7 +642,7 @@ def _check_logs(logs: Sequence[Path], profile: str | None) -> None:
 
 def _check_voyages(store: Path, *patterns: Sequence[str] | None) -> None:
     """Raises StoreError for a store or voyage that is not there."""
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     for chosen in patterns:
         Store(store).select(list(chosen or ()))
@@ -663,7 +664,7 @@ def _check_runs(
 
 
 def _show(recording: Path, web: bool) -> None:
-    from shiplog import viewer
+    from shiplog.report import viewer
 
     if not web:
         viewer.open_viewer(recording)

@@ -11,7 +11,7 @@ import traceback
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from shiplog import cache
+from shiplog import disk_cache
 from shiplog.exceptions import ShiplogError
 
 SHOWN = 300  # letters of an exception's own words; some libraries quote whole files
@@ -47,7 +47,7 @@ def _write(trace: str) -> Path | None:
     head = f"shiplog {release}, Python {platform.python_version()}, {platform.platform()}\n"
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S.%f")
     text = f"{head}{' '.join(sys.argv)!a}\n\n{trace}"
-    for folder in (lambda: cache.folder() / "faults", lambda: Path(tempfile.gettempdir())):
+    for folder in (lambda: disk_cache.folder() / "faults", lambda: Path(tempfile.gettempdir())):
         try:
             path = folder() / f"shiplog-{now}-{os.getpid()}.txt"
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,16 +8,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pipelines import known_ship
-from shiplog import linearise, segments, unexplained
+from pipelines.experiments import simulated_ship
 from shiplog import profile as profiles
-from shiplog.evidence import Unrest
-from shiplog.linearise import Linear, Wide
+from shiplog.diagnosis import linearisation, residual_acceleration, segments
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear, Wide
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import body
-from shiplog.record import Record
-from shiplog.sensitivity import rate
+from shiplog.simulation.sensitivities import rate
+from shiplog.voyages.recording import Record
 
 PROFILE = profiles.load("esso-vectwin")
 SHIP, PARTICULARS, _ = mmg.geometry_of(PROFILE)
@@ -38,24 +38,24 @@ UNREST = Unrest(  # as learnt on an ordinary campaign: noise of 2 s averages, an
 )
 
 
-def voyage(seconds: float, seed: int = 5) -> known_ship.Voyage:
-    return known_ship.sail(
-        seconds, seed=seed, wind=known_ship.Wind(2.0, 0.7), effects=known_ship.Effects()
+def voyage(seconds: float, seed: int = 5) -> simulated_ship.Voyage:
+    return simulated_ship.sail(
+        seconds, seed=seed, wind=simulated_ship.Wind(2.0, 0.7), effects=simulated_ship.Effects()
     )
 
 
-def true_wind(sailed: known_ship.Voyage) -> np.ndarray:
+def true_wind(sailed: simulated_ship.Voyage) -> np.ndarray:
     north = sailed.true_wind_speed * np.cos(sailed.true_wind_direction)
     east = sailed.true_wind_speed * np.sin(sailed.true_wind_direction)
     return np.stack((north, east), -1)
 
 
-def controls(sailed: known_ship.Voyage) -> np.ndarray:
+def controls(sailed: simulated_ship.Voyage) -> np.ndarray:
     return np.stack((sailed.rudder_port, sailed.rudder_starboard, sailed.propeller), -1)
 
 
 def record(
-    sailed: known_ship.Voyage, state: np.ndarray | None = None, noise: float = 1.0
+    sailed: simulated_ship.Voyage, state: np.ndarray | None = None, noise: float = 1.0
 ) -> Record:
     """A voyage at 10 Hz with instruments' noise; `state` [K, 6] instead of its own path."""
     rng = np.random.default_rng(1)
@@ -77,7 +77,7 @@ def record(
     )  # fmt: skip
 
 
-def pushed(sailed: known_ship.Voyage, push: np.ndarray) -> np.ndarray:
+def pushed(sailed: simulated_ship.Voyage, push: np.ndarray) -> np.ndarray:
     """States [K, 6] of the project's MMG, with its controls and wind, under `push` [K, 3]: forces
     in N and N m that no actuator makes. Explicit Euler at 0.1 s."""
     start = jnp.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
@@ -103,9 +103,9 @@ def linear(seen: Record) -> Linear:
     """
     model = Extended(MODEL, (), MODEL, np.zeros(0), {})
     g = segments.grid(seen)
-    cut = segments.cut(seen, unexplained.covering(seen))
-    path = linearise.pulled(model, THETA, cut, g, WIDE)
-    y, z = linearise._run(model, THETA, cut, path, g)
+    cut = segments.cut(seen, residual_acceleration.covering(seen))
+    path = linearisation.pulled(model, THETA, cut, g, WIDE)
+    y, z = linearisation._run(model, THETA, cut, path, g)
     at = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
     return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shiplog.profile import Profile
-from shiplog.record import Record
+from shiplog.voyages.recording import Record
 
 SECONDS, STEP = 120.0, 0.1
 TRUE_WIND = (-2.0, 1.1)  # m/s, where it comes from: north, east

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from shiplog import profile as profiles
-from shiplog.ingest import ingest
 from shiplog.logs.write import Series, write_log
-from shiplog.store import Store
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.store import Store
 
 START = 1_700_000_000_000_000_000
 RADIUS, SPEED = 20.0, 0.8  # m, m/s: a steady starboard turn

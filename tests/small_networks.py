@@ -6,7 +6,7 @@ import polars as pl
 import torch
 
 from shiplog.models.feedforward import FeedForward, exogenous, scaling
-from shiplog.windows import Windows
+from shiplog.voyages.windows import Windows
 
 
 def windows(count=5, size=20, actuators=3, wind=2, seed=0):

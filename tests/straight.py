@@ -11,22 +11,28 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from shiplog import evidence, linearise, reference, segments, structure
 from shiplog import profile as profiles
-from shiplog.causes import Cause, Parameter, Setting
-from shiplog.columns import Columns
-from shiplog.diagnosis import discrepancy
+from shiplog.diagnosis import (
+    discrepancy,
+    likelihood,
+    linearisation,
+    nominal_reference,
+    segment_nodes,
+    segments,
+)
 from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.evidence import Point
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear, Path
 from shiplog.diagnosis.nominal_campaign import Campaign, prior
+from shiplog.diagnosis.nominal_reference import Reference
+from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
-from shiplog.evidence import Unrest
-from shiplog.hypotheses import Point
-from shiplog.linearise import Linear, Path
-from shiplog.record import Record
-from shiplog.reference import Reference
-from shiplog.timescale import KNOT, SECONDS
-from shiplog.unnamed import Pulses
+from shiplog.models.causes import Cause, Parameter, Setting
+from shiplog.voyages.recording import Record
+from shiplog.voyages.timescale import KNOT, SECONDS
 
 PROFILE = profiles.load("esso-vectwin")
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
@@ -143,14 +149,14 @@ def campaign(
 ) -> Campaign:  # fmt: skip
     """What `nominal_campaign.learn` makes of a pass, with deviations and sizes as given."""
     g = segments.grid(nominal)
-    knots = structure.at_knots(given.cut, g)
+    knots = segment_nodes.at_knots(given.cut, g)
     first = columns.linearised
     seen = discrepancy.of(PROFILE, UNREST.push, first, names, knots) if names else \
         Discrepancy((), UNREST.push)  # fmt: skip
     columns = columns.with_misfit(seen.count)
     count = len(columns.unit)
     unseen = discrepancy.of(PROFILE, UNREST.push, count, discrepancy.UNSEEN, knots)
-    modes = evidence.modes(evidence.weighed(given, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(given, UNREST), UNREST)
     if seen.families:
         modes = modes.beside(seen.pushed(given.cut, g))
     whole = modes.beside(unseen.pushed(given.cut, g))
@@ -170,8 +176,9 @@ def campaign(
     model = SimpleNamespace(causes=columns.causes, base=None)
     made = Reference(
         model, SETTING, np.zeros(COEFFICIENTS), columns, UNREST,  # type: ignore[arg-type]
-        linearise.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor, 1.0 / share,
-        given, modes, reference.freedom(parts), misfit=seen if seen.families else None,  # type: ignore[arg-type]
+        linearisation.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor,
+        1.0 / share, given, modes, nominal_reference.freedom(parts),
+        misfit=seen if seen.families else None,  # type: ignore[arg-type]
         counts=share,
     )  # fmt: skip
     return Campaign(
@@ -191,7 +198,7 @@ class Straight(Trial):
         columns = self.reference.columns
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
         linear = replace(self.given, e=self.given.e - self.given.j @ d)
-        point = Point(dict(numbers), linear.path, linear, evidence.weighed(linear, self.unrest))
+        point = Point(dict(numbers), linear.path, linear, likelihood.weighed(linear, self.unrest))
         if self.first is None:
             self.first = point
         return point

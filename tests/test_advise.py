@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shiplog import advise
+from shiplog.diagnosis import next_manoeuvre
 
 
 def test_what_a_rival_imitates_does_not_count():
@@ -24,7 +24,7 @@ def test_what_a_rival_imitates_does_not_count():
     beside = np.eye(3) + 0.25 * np.outer(x[:, 0], x[:, 0])
     with_rival = beside + np.outer(x[:, 2], x[:, 2])
     expected = 0.5 * y @ np.linalg.inv(with_rival) @ y
-    assert advise.apart(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
+    assert next_manoeuvre.apart(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
 
 
 def test_each_manoeuvre_is_within_what_the_ship_did():
@@ -33,9 +33,9 @@ def test_each_manoeuvre_is_within_what_the_ship_did():
     rows = 200
     actuator = np.linspace(-1.0, 1.0, rows)[:, None] * np.array([0.5, 10.0, 3.0, 2.0])
     record = SimpleNamespace(profile=profile, actuator=actuator, seen=np.ones(rows, dtype=bool))
-    time = np.arange(0.0, advise.SECONDS, 0.5)
-    for manoeuvre in advise.MANOEUVRES:
-        driven = advise.driven(record, manoeuvre, time)
+    time = np.arange(0.0, next_manoeuvre.SECONDS, 0.5)
+    for manoeuvre in next_manoeuvre.MANOEUVRES:
+        driven = next_manoeuvre.driven(record, manoeuvre, time)
         assert driven.shape == (len(time), 4) and np.isfinite(driven).all()
-        assert (np.abs(driven) <= [0.5, 10.0, advise.HARD, 2.0]).all()
+        assert (np.abs(driven) <= [0.5, 10.0, next_manoeuvre.HARD, 2.0]).all()
         assert driven[:, [1, 3]].min() >= 0.0 and driven[:, 1].max() > 0.0

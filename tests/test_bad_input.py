@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog import cache, cli
+from shiplog import cli, disk_cache
 
 PROFILE = sailing.PROFILE
 TABLE = {  # what kvlcc2's [table] section reads
@@ -93,7 +93,7 @@ def judge(arguments, code, words, capsys) -> str:
     assert "Traceback" not in said and "unexpected fault" not in said, said
     missing = [word for word in words if word not in " ".join(said.split())]
     assert not missing, said
-    assert not list((cache.folder() / "faults").glob("*"))
+    assert not list((disk_cache.folder() / "faults").glob("*"))
     return said
 
 
@@ -335,7 +335,7 @@ def test_a_log_whose_name_is_no_text(desk, capsys):
 
 
 def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys, monkeypatch):
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     def broken(_store):
         raise ZeroDivisionError("division\nby zero")
@@ -355,7 +355,7 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
     """In the temporary folder."""
     import tempfile
 
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(desk.file("no-folder") / "cache"))
     monkeypatch.setattr(tempfile, "tempdir", str(desk.dir("tmp")))
@@ -369,7 +369,7 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
 def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monkeypatch, kind):
     import errno
 
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     code = {PermissionError: errno.EACCES, FileNotFoundError: errno.ENOENT}[kind]
 
@@ -381,7 +381,7 @@ def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monke
 
 
 def test_ctrl_c_is_said_and_has_its_code(desk, capsys, monkeypatch):
-    from shiplog.store import Store
+    from shiplog.voyages.store import Store
 
     def interrupted(_store):
         raise KeyboardInterrupt

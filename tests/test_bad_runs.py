@@ -14,7 +14,7 @@ from safetensors.numpy import load_file, save_file
 from test_bad_input import judge
 from test_user_causes import GOOD
 
-from pipelines import known_ship
+from pipelines.experiments import simulated_ship
 from shiplog import cli
 
 HULL = ("--model", "mmg", "--no-fit", "--without", "propeller", "--without", "rudder")
@@ -26,9 +26,9 @@ def sea(tmp_path_factory):
     sea = tmp_path_factory.mktemp("sea")
     (sea / "logs").mkdir()
     for number in (1, 2, 3):
-        voyage = known_ship.sail(60.0, seed=number, wind=known_ship.Wind(2.0, number))
+        voyage = simulated_ship.sail(60.0, seed=number, wind=simulated_ship.Wind(2.0, number))
         start = datetime(2026, 5, number, 12, 0, tzinfo=UTC)
-        known_ship.write_voyage(
+        simulated_ship.write_voyage(
             sea / "logs" / f"trip_{number}.mcap", voyage, seed=number, start=start
         )
     (sea / "circle.toml").write_text(sailing.PROFILE)

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from shiplog import cache
+from shiplog import disk_cache
 
 
 @pytest.fixture
@@ -20,19 +20,19 @@ def kept(tmp_path, monkeypatch):
 
 
 def test_the_oldest_go_first_until_the_limit_holds(kept):
-    assert cache.size() == 300
-    assert cache.trim(250) == 100
+    assert disk_cache.size() == 300
+    assert disk_cache.trim(250) == 100
     assert [path.exists() for path in kept] == [False, True, True]
-    assert cache.trim(250) == 0
+    assert disk_cache.trim(250) == 0
 
 
 def test_all_of_it_can_be_removed(kept):
-    assert cache.trim(0) == 300
-    assert cache.size() == 0
+    assert disk_cache.trim(0) == 300
+    assert disk_cache.size() == 0
 
 
 def test_a_file_that_another_process_removed_is_passed_over(kept, monkeypatch):
-    found = cache.files()
-    monkeypatch.setattr(cache, "files", lambda: found)
+    found = disk_cache.files()
+    monkeypatch.setattr(disk_cache, "files", lambda: found)
     kept[0].unlink()
-    assert cache.trim(150) == 200  # the two that are there
+    assert disk_cache.trim(150) == 200  # the two that are there

@@ -8,17 +8,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from shiplog.models.causes.environment import Current, WindForce
+from shiplog.models.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
 
-from shiplog import causes as catalogue
 from shiplog import profile as profiles
-from shiplog.causes import CATALOGUE, Setting
-from shiplog.causes.environment import Current, WindForce
-from shiplog.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
+from shiplog.models import causes as catalogue
 from shiplog.models import mmg
+from shiplog.models.causes import CATALOGUE, Setting
+from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
-from shiplog.models.network import Network
 from shiplog.profile import Profile
-from shiplog.record import Record
+from shiplog.voyages.recording import Record
 
 TWIN = profiles.load("esso-vectwin")  # velocity over ground, by an antenna 0.3 m ahead
 SINGLE = profiles.load("esso-osaka")  # velocity in body axes, at midship; one rudder

@@ -11,7 +11,7 @@ import pytest
 import sailing
 from typer.testing import CliRunner
 
-from pipelines import known_ship
+from pipelines.experiments import simulated_ship
 from shiplog import cli
 from shiplog.exceptions import ShiplogError
 
@@ -33,9 +33,11 @@ def logs(tmp_path_factory):
     """Three short voyages of the simulated ship."""
     folder = tmp_path_factory.mktemp("logs")
     for number in range(1, 4):
-        voyage = known_ship.sail(150.0, seed=number, wind=known_ship.Wind(2.0, number))
+        voyage = simulated_ship.sail(150.0, seed=number, wind=simulated_ship.Wind(2.0, number))
         start = datetime(2026, 5, number, 12, 0, tzinfo=UTC)
-        known_ship.write_voyage(folder / f"trip_{number}.mcap", voyage, seed=number, start=start)
+        simulated_ship.write_voyage(
+            folder / f"trip_{number}.mcap", voyage, seed=number, start=start
+        )
     return folder
 
 
@@ -99,8 +101,8 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
     """L of one window from errors.parquet, integrated again from rollouts and the 1 Hz rows."""
     from pipelines.prepare import seconds
-    from shiplog.store import Store
-    from shiplog.table import with_elapsed
+    from shiplog.voyages.one_hertz import with_elapsed
+    from shiplog.voyages.store import Store
 
     call("evaluate", run, "--store", store)
     errors = pl.read_parquet(run / "errors.parquet").filter(

@@ -10,11 +10,11 @@ import pytest
 
 from pipelines.convert import convert
 from shiplog import profile as profiles
-from shiplog.conversion import clock, heartbeat
-from shiplog.conversion.delimited import read_table
-from shiplog.conversion.nmea import is_nmea, read_nmea
 from shiplog.exceptions import ChannelMissing, ProfileError
-from shiplog.ingest import ingest
+from shiplog.logs.conversion import clock, heartbeat
+from shiplog.logs.conversion.delimited import read_table
+from shiplog.logs.conversion.nmea import is_nmea, read_nmea
+from shiplog.voyages.ingest import ingest
 
 NOON = 1_617_969_600_000_000_000  # 2021-04-09 12:00:00 UTC, ns
 

@@ -9,21 +9,21 @@ import pytest
 from test_cli import call
 from test_parity import BODY, DEGREE, VECTWIN, in_body_axes
 
-from pipelines.known_ship import Effects, Wind, cases, sail, write_voyage
-from shiplog import parity
+from pipelines.experiments.simulated_ship import Effects, Wind, cases, sail, write_voyage
 from shiplog.channels import UNUSABLE, Quality
-from shiplog.correct import corrected, put_right
-from shiplog.ingest import ingest
-from shiplog.parity import Estimate
-from shiplog.store import Store
+from shiplog.voyages import sensor_consistency
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_correction import corrected, put_right
+from shiplog.voyages.store import Store
 
 
 def certain(table):
-    return [e for e in parity.estimates(table, BODY) if e.certain]
+    return [e for e in sensor_consistency.estimates(table, BODY) if e.certain]
 
 
 def left(table, profile=BODY):
-    return {(e.kind, e.channel) for e in parity.estimates(table, profile) if e.notable}
+    return {(e.kind, e.channel) for e in sensor_consistency.estimates(table, profile) if e.notable}
 
 
 def late(channel, seconds):

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import coverage
+from shiplog.simulation import coverage
 
 
 def seconds(count, wind_from, seed, surge=0.3):

@@ -5,8 +5,8 @@ import json
 from rerun.chunk import RrdReader
 
 from pipelines import demo
-from shiplog.config import Fast
-from shiplog.store import Store
+from shiplog.training.run_config import Fast
+from shiplog.voyages.store import Store
 
 
 def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monkeypatch):

@@ -8,21 +8,20 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from pipelines.diagnose import diagnose_run
-from pipelines.diagnosis import own
-from pipelines.diagnosis import trial as trials
-from pipelines.diagnosis.held_out import HeldOut
-from pipelines.diagnosis.setup import trial_of
-from pipelines.diagnosis.trial import in_ship_time, record_of, windows_of
-from pipelines.known_ship import cases, sensors
+from pipelines.experiments.simulated_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
-from shiplog import runs
-from shiplog import verdict as verdicts
-from shiplog.config import Config, Fast, Network, Split
-from shiplog.diagnosis import placebo, search
+from shiplog.diagnosis import network_base, placebo, search
+from shiplog.diagnosis import trial_voyages as trials
 from shiplog.diagnosis.decide import decide
+from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.setup import trial_of
+from shiplog.diagnosis.trial_voyages import in_ship_time, record_of, windows_of
 from shiplog.exceptions import RunError
-from shiplog.store import Store
+from shiplog.report import verdict as verdicts
+from shiplog.training import run_folder
+from shiplog.training.run_config import Config, Fast, Network, Split
+from shiplog.voyages.store import Store
 
 SEED = 7101
 
@@ -53,7 +52,7 @@ def afloat(tmp_path_factory):
     found = search.Search(trial, point, placebo.placebos(trial.campaign))
     found.run()
     decision, _ = decide(found)
-    network = own.Own(run, trial)
+    network = network_base.Own(run, trial)
     cut = windows_of(run, store, names, run.profile)
     before = run.extended(run.config.seeds[0], recorded)
     return SimpleNamespace(
@@ -126,7 +125,7 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     left_out[3] = 0.0
     try:
         afloat.trial.weight = left_out
-        again, _ = own.Own(afloat.run, afloat.trial).beside(afloat.decision)
+        again, _ = network_base.Own(afloat.run, afloat.trial).beside(afloat.decision)
     finally:
         afloat.trial.weight = kept
     assert (again.weight == 0.0).nonzero()[0].tolist() == [3]
@@ -157,7 +156,7 @@ def test_what_refutes_a_cause_of_a_network_is_its_mmg(afloat):
     ref = afloat.trial.reference
     assert judge.theta == pytest.approx(ref.theta) and judge.model.causes == ()
     assert type(judge.model.base).__name__ == "MMG"
-    extended = runs.extend(
+    extended = run_folder.extend(
         afloat.run, afloat.work / "current", afloat.held.extended(afloat.decision)
     )
     trial = trial_of(extended, None, afloat.recorded, ()).trial
@@ -202,8 +201,8 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     after = held.extended(alone)
     assert np.abs(after.model.base.bent).max() > 0.0
     assert not np.allclose(after.losses(cut), before.losses(cut), rtol=1e-3)
-    kept = runs.extend(afloat.run, afloat.work / "extended", after)
-    again = runs.load(kept.path).extended(afloat.run.config.seeds[0], afloat.recorded)
+    kept = run_folder.extend(afloat.run, afloat.work / "extended", after)
+    again = run_folder.load(kept.path).extended(afloat.run.config.seeds[0], afloat.recorded)
     assert again.losses(cut) == pytest.approx(after.losses(cut), rel=1e-9)
     bent = again.model.base.bent
     assert kept.base()[0].bent == pytest.approx(bent)
@@ -213,7 +212,7 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
 
 def test_a_network_that_an_earlier_program_bent_is_told_of(afloat):
     plain = afloat.run.extended(afloat.run.config.seeds[0], afloat.recorded)
-    kept = runs.extend(afloat.run, afloat.work / "earlier", plain)
+    kept = run_folder.extend(afloat.run, afloat.work / "earlier", plain)
     assert kept.extension is not None
     file = kept.path / "extension.safetensors"
     arrays = dict(load_file(file))

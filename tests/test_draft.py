@@ -8,13 +8,13 @@ import polars as pl
 import pytest
 
 from pipelines.convert import convert
-from pipelines.split import choose_split
 from shiplog import profile as profiles
-from shiplog.draft import draft, draft_table
 from shiplog.exceptions import LogUnreadable, ProfileError
-from shiplog.ingest import ingest
 from shiplog.logs.write import Series, write_log
-from shiplog.store import Store
+from shiplog.voyages.draft_profile import draft, draft_table
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.split import choose_split
+from shiplog.voyages.store import Store
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "voyage_1.mcap"
 

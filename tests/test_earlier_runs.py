@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from shiplog.earlier_runs import kept
 from shiplog.exceptions import RunError
+from shiplog.training.earlier_runs import kept
 
 TODAY = ("hull.c_d", "hull.x_u", "rudder.eps", "rudder.inboard", "network.w1_0", "network.c1_0")
 

@@ -11,7 +11,7 @@ import psutil
 import pytest
 from test_cli import call
 
-from pipelines import known_ship
+from pipelines.experiments import simulated_ship
 
 ROOT = Path(__file__).parent.parent
 
@@ -20,9 +20,11 @@ ROOT = Path(__file__).parent.parent
 def store(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sea")
     for number in (1, 2):
-        voyage = known_ship.sail(60.0, seed=number, wind=known_ship.Wind(2.0, number))
+        voyage = simulated_ship.sail(60.0, seed=number, wind=simulated_ship.Wind(2.0, number))
         start = datetime(2026, 5, number, 12, 0, tzinfo=UTC)
-        known_ship.write_voyage(folder / f"trip_{number}.mcap", voyage, seed=number, start=start)
+        simulated_ship.write_voyage(
+            folder / f"trip_{number}.mcap", voyage, seed=number, start=start
+        )
     assert call("ingest", folder, "--store", folder / "store")[0] == 0
     return folder / "store"
 

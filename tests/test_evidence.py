@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shiplog import evidence
-from shiplog.evidence import Unrest
-from shiplog.linearise import Linear, Path
-from shiplog.reference import inflation, marginal, usual
-from shiplog.segments import Cut
-from shiplog.timescale import KNOT
+from shiplog.diagnosis import likelihood
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.nominal_reference import inflation, marginal, usual
+from shiplog.diagnosis.segments import Cut
+from shiplog.voyages.timescale import KNOT
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 UNREST = Unrest(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))
@@ -59,8 +59,8 @@ def observed(unrest: Unrest, bins: int) -> np.ndarray:
     return whole
 
 
-def _gram(weighed: evidence.Weighed, unrest: Unrest) -> evidence.Gram:
-    return evidence.modes(weighed, unrest).gram()
+def _gram(weighed: likelihood.Weighed, unrest: Unrest) -> likelihood.Gram:
+    return likelihood.modes(weighed, unrest).gram()
 
 
 def dense(given: Linear, unrest: Unrest, fitted: bool = False):
@@ -94,7 +94,7 @@ def test_gram_is_the_dense_gaussian(unrest):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
     restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
     given = linear(3)
-    found = _gram(evidence.weighed(given, unrest), unrest)
+    found = _gram(likelihood.weighed(given, unrest), unrest)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         block = np.concatenate((e[:, None], j), 1)
         assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
@@ -114,9 +114,9 @@ def test_a_square_of_errors_alone_is_that_of_their_gram(unrest):
     """Of one pass under each size of unrest, with a pulse and without."""
     given = linear(3)
     alone = replace(given, j=given.j[..., :0])
-    weighed = evidence.weighed(alone, unrest)
+    weighed = likelihood.weighed(alone, unrest)
     for other in (unrest, unrest.louder(3.0), replace(unrest, pulse=np.array([0.1, 2.0, 0.7]))):
-        each, volume = evidence.startless(weighed, unrest).square(other)
+        each, volume = likelihood.startless(weighed, unrest).square(other)
         wanted = _gram(weighed, other)
         assert each == pytest.approx(wanted.each[:, 0, 0], rel=1e-9)
         assert volume == pytest.approx(wanted.logdet, rel=1e-9)
@@ -129,7 +129,7 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
     towards = np.concatenate(([1.0], -d))
     found, wanted = [], []
     for unrest in (sure, sure.louder(3.0)):
-        gram = _gram(evidence.weighed(given, UNREST), unrest)
+        gram = _gram(likelihood.weighed(given, UNREST), unrest)
         found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
         every = dense(given, unrest)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
@@ -139,10 +139,10 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
 
 def test_units_scale_columns_and_not_the_error():
     given = linear(2)
-    found = _gram(evidence.weighed(given, UNREST), UNREST)
+    found = _gram(likelihood.weighed(given, UNREST), UNREST)
     unit = np.array([1e-3, 40.0])
     bent = replace(given, j=given.j * unit)
-    direct = _gram(evidence.weighed(bent, UNREST), UNREST)
+    direct = _gram(likelihood.weighed(bent, UNREST), UNREST)
     assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
     assert found.scaled(unit).logdet == found.logdet
 
@@ -150,14 +150,17 @@ def test_units_scale_columns_and_not_the_error():
 def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     given = linear(3)
     pushed = np.random.default_rng(9).standard_normal((3, 9, 4))
-    found = evidence.modes(evidence.weighed(given, UNREST), UNREST).beside(pushed).gram()
+    found = likelihood.modes(likelihood.weighed(given, UNREST), UNREST).beside(pushed).gram()
     columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
-    direct = _gram(evidence.weighed(written_out, UNREST), UNREST)
+    direct = _gram(likelihood.weighed(written_out, UNREST), UNREST)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
-    modes, weight = evidence.modes(evidence.weighed(given, UNREST), UNREST), np.array([1, 0, 0.4])
+    modes, weight = (
+        likelihood.modes(likelihood.weighed(given, UNREST), UNREST),
+        np.array([1, 0, 0.4]),
+    )
     for louder in (0.5, 2.0):
-        each = _gram(evidence.weighed(written_out, UNREST), UNREST.louder(louder)).each
+        each = _gram(likelihood.weighed(written_out, UNREST), UNREST.louder(louder)).each
         whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, louder)
         wanted = np.einsum("s,sij->ij", weight, each)
         assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
@@ -172,16 +175,16 @@ def test_less_an_acceleration_is_less_what_it_does():
 
 def test_the_total_is_the_weighted_sum():
     given, weight = linear(3), np.array([1.0, 0.0, 0.4])
-    weighed = evidence.weighed(given, UNREST)
+    weighed = likelihood.weighed(given, UNREST)
     each = _gram(weighed, UNREST.louder(2.0)).each
-    whole = evidence.modes(weighed, UNREST.louder(2.0)).total(weight)
+    whole = likelihood.modes(weighed, UNREST.louder(2.0)).total(weight)
     assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
 
 
 def test_one_pass_serves_every_size_of_unrest():
     given = linear(3)
-    weighed, weight = evidence.weighed(given, UNREST), np.array([1.0, 0.0, 0.4])
-    modes = evidence.modes(weighed, UNREST)
+    weighed, weight = likelihood.weighed(given, UNREST), np.array([1.0, 0.0, 0.4])
+    modes = likelihood.modes(weighed, UNREST)
     for louder in (0.5, 2.0, 5.0):
         found, wanted = modes.gram(louder), _gram(weighed, UNREST.louder(louder))
         assert found.each == pytest.approx(wanted.each, rel=1e-6)
@@ -194,7 +197,7 @@ def test_one_pass_serves_every_size_of_unrest():
 def test_start_and_knots_are_the_posterior_mean(unrest):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
-    found, _ = evidence.starts_and_knots(given, d, unrest)
+    found, _ = likelihood.starts_and_knots(given, d, unrest)
     kernel = covariance(unrest, 3)
     for s, (e, j, c) in enumerate(dense(given, unrest)):
         z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
@@ -205,7 +208,7 @@ def test_start_and_knots_are_the_posterior_mean(unrest):
 def test_marginal_is_the_dense_gaussian():
     """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
     given = linear(3)
-    total = evidence.modes(evidence.weighed(given, UNREST), UNREST).total(np.ones(len(given.e)))
+    total = likelihood.modes(likelihood.weighed(given, UNREST), UNREST).total(np.ones(len(given.e)))
     found, wanted = [], []
     for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
         information = np.diag(sure)
@@ -256,7 +259,7 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
     e[~given.cut.used] = 1e3  # nobody looks there
     begin = replace(UNREST, noise=NOISE * 3.0, push=UNREST.push / 3.0)
-    found = evidence.learnt(replace(given, e=e), d, begin, rounds=25)
+    found = likelihood.learnt(replace(given, e=e), d, begin, rounds=25)
     assert found.noise == pytest.approx(NOISE, rel=0.15)
     assert found.push == pytest.approx(UNREST.push, rel=0.15)
     assert found.time == UNREST.time and (found.start == UNREST.start).all()
@@ -275,19 +278,19 @@ def test_sizes_learnt_are_the_likeliest():
     noise = NOISE * rng.standard_normal(given.e.shape)
     given = replace(given, e=np.einsum("sbcz,sz->sbc", given.z, z) + noise)
     begin = replace(UNREST, noise=NOISE * 10.0, push=UNREST.push / 10.0)
-    found = evidence.learnt(given, np.zeros(2), begin, rounds=5)
+    found = likelihood.learnt(given, np.zeros(2), begin, rounds=5)
 
-    def likelihood(sizes):
+    def log_density(sizes):
         tried = replace(found, noise=sizes[:6], push=sizes[6:])
         return sum(
             multivariate_normal.logpdf(e, np.zeros(len(e)), c) for e, _, c in dense(given, tried)
         )
 
     at = np.concatenate((found.noise, found.push))
-    here = likelihood(at)
+    here = log_density(at)
     for i in range(9):
         for by in (0.98, 1.02):
-            assert likelihood(np.where(np.arange(9) == i, by * at, at)) < here
+            assert log_density(np.where(np.arange(9) == i, by * at, at)) < here
 
 
 def test_colour_of_the_noise_is_learnt_from_draws_of_it():
@@ -303,14 +306,14 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise.reshape(given.e.shape)
     drawn, found = replace(given, e=e), UNREST
     for _ in range(4):
-        found = evidence.learnt(drawn, d, found, rounds=6)
+        found = likelihood.learnt(drawn, d, found, rounds=6)
     assert found.coloured[5] == pytest.approx(0.8, abs=0.1) and found.fade[5] == 4.0
     assert (found.coloured[:5] <= 0.2).all()
     assert found.noise == pytest.approx(NOISE, rel=0.1)
     holes = replace(
         drawn, cut=replace(drawn.cut, used=drawn.cut.used & (np.arange(15) != 7)[:, None])
     )
-    assert (evidence.learnt(holes, d, UNREST, rounds=1).coloured == 0.0).all()
+    assert (likelihood.learnt(holes, d, UNREST, rounds=1).coloured == 0.0).all()
 
 
 def test_one_campaign_is_believed_less_where_voyages_disagree():

@@ -6,8 +6,8 @@ import afloat
 import numpy as np
 import pytest
 
-from shiplog import external
-from shiplog.external import Stretch
+from shiplog.diagnosis import external_forces
+from shiplog.diagnosis.external_forces import Stretch
 
 START, END = 70.0, 85.0
 NONE = np.zeros(0)
@@ -20,7 +20,7 @@ def sailed():
 
 def found(record) -> tuple[Stretch, ...]:
     linear = afloat.linear(record)
-    return external.find(linear, NONE, afloat.UNREST, record, afloat.MODEL, afloat.THETA)
+    return external_forces.find(linear, NONE, afloat.UNREST, record, afloat.MODEL, afloat.THETA)
 
 
 def under(sailed, force, noise=1.0):
@@ -76,7 +76,7 @@ def test_full_thrust_is_that_of_the_open_water_diagram(sailed):
     """(1 - t) k₀ ρ D⁴ n² at 12.5 rev/s, by hand: rudders amidships neither add nor brake."""
     p = afloat.COEFFICIENTS
     bollard = (1.0 - p["propeller.t"]) * p["propeller.k0"] * 998.0 * 0.1**4 * 12.5**2
-    full = external.means(afloat.record(sailed), afloat.MODEL, afloat.THETA)
+    full = external_forces.means(afloat.record(sailed), afloat.MODEL, afloat.THETA)
     assert full[0] == pytest.approx(bollard, rel=1e-6)
 
 

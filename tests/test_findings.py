@@ -6,11 +6,11 @@ import pytest
 
 from pipelines.convert import convert
 from pipelines.demo import sample_logs
-from pipelines.findings import faults, kvlcc2, milliampere
+from pipelines.experiments.findings import faults, kvlcc2, milliampere
 from pipelines.prepare import expand, ingest_logs
-from shiplog import parity
 from shiplog import profile as profiles
-from shiplog.store import Store
+from shiplog.voyages import sensor_consistency
+from shiplog.voyages.store import Store
 
 
 @pytest.mark.shared
@@ -21,7 +21,7 @@ def test_a_berthing_says_that_its_yaw_rate_is_late(shared_data, tmp_path):
     ingest_logs(expand([tmp_path / "logs"]), "esso-osaka", store)
     rows = store.tables([source.stem])[0].collect()
     (late,) = (
-        e for e in parity.estimates(rows, store.profile([source.stem]))
+        e for e in sensor_consistency.estimates(rows, store.profile([source.stem]))
         if (e.kind, e.channel) == ("clock_offset", "yaw_rate")
     )  # fmt: skip
     assert late.notable

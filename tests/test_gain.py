@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from shiplog.evaluate import prediction_error, window_loss
-from shiplog.gain import RUNAWAY, gain, parts
+from shiplog.simulation.error_reduction import RUNAWAY, gain, parts
+from shiplog.simulation.scoring import prediction_error, window_loss
 
 
 def even(*losses: float) -> np.ndarray:

@@ -12,8 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipelines.diagnosis import baseline, trial
-from pipelines.hidden_effects import (
+from pipelines.experiments.hidden_effects import (
     methods,
     plan,
     program,
@@ -23,16 +22,18 @@ from pipelines.hidden_effects import (
     suites,
     without,
 )
-from pipelines.hidden_effects.__main__ import main
-from pipelines.hidden_effects.plan import Plan, Planned
-from shiplog import remembered
+from pipelines.experiments.hidden_effects.__main__ import main
+from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from shiplog.diagnosis import (
+    baseline_check,
     discrepancy,
+    nominal_cache,
     nominal_campaign,
     placebo,
     posterior,
     refutation,
     thresholds,
+    trial_voyages,
 )
 from shiplog.exceptions import ShiplogError
 
@@ -223,12 +224,12 @@ def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
     """What a part replaces exists under that name, and is itself again afterwards."""
     watched = {
         "placebo": (placebo, "placebos"), "form-error": (thresholds, "FORM_ERROR"),
-        "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (remembered, "characteristics"),
-        "share-of-trial": (remembered, "characteristics"),
+        "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (nominal_cache, "characteristics"),
+        "share-of-trial": (nominal_cache, "characteristics"),
         "robust-weights": (nominal_campaign, "robust_weights"),
-        "refutation": (refutation, "judged"), "baseline": (baseline, "lacking"),
+        "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
         "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
-        "time-scale": (trial, "in_ship_time"), "imitation": (without.Trial, "imitated"),
+        "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.Trial, "imitated"),
     }  # fmt: skip
     assert set(without.PARTS) == {without.WHOLE, *watched}
     before = {name: getattr(*where) for name, where in watched.items()}

@@ -11,14 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.hidden_effects import oracle, parameters, plan, run, score, suites, tables
-from pipelines.hidden_effects.__main__ import main
-from pipelines.hidden_effects.parameters import compare
-from pipelines.hidden_effects.plan import Plan, Planned
-from pipelines.hidden_effects.score import Answer, Sealed, calibration, open_key
-from pipelines.known_ship.cases import CATALOGUE, OUTSIDE, draw
+from pipelines.experiments.hidden_effects import (
+    oracle,
+    parameters,
+    plan,
+    run,
+    score,
+    score_tables,
+    suites,
+)
+from pipelines.experiments.hidden_effects.__main__ import main
+from pipelines.experiments.hidden_effects.parameters import compare
+from pipelines.experiments.hidden_effects.plan import Plan, Planned
+from pipelines.experiments.hidden_effects.score import Answer, Sealed, calibration, open_key
+from pipelines.experiments.simulated_ship.cases import CATALOGUE, OUTSIDE, draw
 from shiplog import profile as profiles
-from shiplog.causes import Setting
+from shiplog.models.causes import Setting
 
 ROOT = Path(__file__).parent.parent
 
@@ -54,7 +62,7 @@ def answer(key, verdict, seconds=7000, seed=1):
 
 def measured(answers):
     """First column of the goals' table → the others."""
-    return {row[0]: row[1:] for row in tables.goals(answers)}
+    return {row[0]: row[1:] for row in score_tables.goals(answers)}
 
 
 # --- what is right --------------------------------------------------------------------------------
@@ -320,15 +328,15 @@ def test_a_mistake_says_what_and_how_to_make_it_again():
     verdict = named("thrust_loss", margin=4.06)
     verdict["causes"][0]["indistinguishable_from"] = ["fouling"]
     wrong = Answer(planned, verdict, hidden(rudder_lag=(0.3, {})), STEPS)
-    line = tables.mistakes([wrong, answer(CURRENT, named("current"))]).splitlines()[2:]
+    line = score_tables.mistakes([wrong, answer(CURRENT, named("current"))]).splitlines()[2:]
     assert len(line) == 1
     cells = [cell.strip() for cell in line[0].strip("|").split("|")]
     assert cells == [
         "20017-2", "rudder_lag x0.3", "named thrust_loss or fouling", "4.1",
         "20017 LOGS --key KEY --cause rudder_lag --size 0.3 --seconds 7000",
     ]  # fmt: skip
-    assert tables.mistakes([answer(CURRENT, named("current"))]) == "Nothing was mistaken."
-    table = tables.per_cause([wrong, answer(CURRENT, named("current"))])
+    assert score_tables.mistakes([answer(CURRENT, named("current"))]) == "Nothing was mistaken."
+    table = score_tables.per_cause([wrong, answer(CURRENT, named("current"))])
     assert "| current    | 1/1    |" in table and "| rudder_lag |        | 0/1" in table
 
 
@@ -359,8 +367,9 @@ def test_no_key_is_opened_before_the_verdict_is_sealed(tmp_path):
 
 def test_the_scorer_knows_nothing_of_the_simulator():
     program = (
-        "import sys, pipelines.hidden_effects.tables, pipelines.hidden_effects.score; "
-        "sys.exit(any(name.startswith('pipelines.known_ship') for name in sys.modules))"
+        "import sys; from pipelines.experiments.hidden_effects import score, score_tables; "
+        "simulator = 'pipelines.experiments.simulated_ship'; "
+        "sys.exit(any(name.startswith(simulator) for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
 
@@ -485,7 +494,7 @@ def test_a_case_goes_the_whole_way_once(tmp_path, stubs):
     assert sorted(commands_said(tmp_path)) == ["diagnose"] * 2 + ["ingest"] * 2 + ["train"] * 2
     found = score.read(out)
     assert [one.right for one in found.answers] == [True, True] and not found.pending
-    assert "2/2" in tables.text(found)
+    assert "2/2" in score_tables.text(found)
     (folder / "verdict.json").write_text(json.dumps(NONE))
     with pytest.raises(Sealed):
         score.read(out)
@@ -532,7 +541,7 @@ def test_what_has_not_run_is_pending_and_what_could_not_be_made_is_told(tmp_path
     out = tmp_path / "out"
     plan.save(out, suites.plan("nightly", 5, 2))
     assert len(score.read(out).pending) == 2
-    assert tables.text(score.read(out)) == "nightly: 0 of 2 cases scored; 2 not run yet."
+    assert score_tables.text(score.read(out)) == "nightly: 0 of 2 cases scored; 2 not run yet."
     (tmp_path / "simulator.py").write_text("raise SystemExit(1)")
     run.run(out, plan.load(out), stubs())
     found = score.read(out)

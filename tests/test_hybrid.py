@@ -7,12 +7,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import coverage, forces, residual, sensitivity
 from shiplog import profile as profiles
-from shiplog.identify import Identified
 from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG, estimated, geometry_of
-from shiplog.sensitivity import Series, Simulator
+from shiplog.simulation import coverage, force_breakdown, sensitivities
+from shiplog.simulation.sensitivities import Series, Simulator
+from shiplog.training import hybrid_training
+from shiplog.training.output_error import Identified
 
 SHIP = """
 [ship]
@@ -87,12 +88,12 @@ def theta(ship) -> np.ndarray:
 @pytest.fixture(scope="module")
 def data(physics, theta) -> Series:
     plain = driven(0)
-    return plain._replace(measured=sensitivity.rollout(physics, theta, plain))
+    return plain._replace(measured=sensitivities.rollout(physics, theta, plain))
 
 
 @pytest.fixture(scope="module")
 def hybrid(physics, data) -> Hybrid:
-    return Hybrid(physics, residual.residual(physics, data, WIDTH))
+    return Hybrid(physics, hybrid_training.residual(physics, data, WIDTH))
 
 
 @pytest.fixture(scope="module")
@@ -195,10 +196,10 @@ def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, loud, the
     far = away(data)
     at = flat(far)
     assert (hybrid.acceleration(loud, *at) == physics.acceleration(theta, *at)).all()
-    rolled = sensitivity.rollout(hybrid, loud, far)
-    assert rolled == pytest.approx(sensitivity.rollout(physics, theta, far), abs=1e-12)
-    near = sensitivity.rollout(hybrid, loud, data)
-    assert np.abs(near - sensitivity.rollout(physics, theta, data)).max() > 0.01
+    rolled = sensitivities.rollout(hybrid, loud, far)
+    assert rolled == pytest.approx(sensitivities.rollout(physics, theta, far), abs=1e-12)
+    near = sensitivities.rollout(hybrid, loud, data)
+    assert np.abs(near - sensitivities.rollout(physics, theta, data)).max() > 0.01
 
 
 # ---------------------------------------------------------------- what it sees
@@ -207,7 +208,7 @@ def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, loud, the
 def table(data: Series) -> pl.DataFrame:
     """The samples as the 1 Hz table has them, the wind as it was felt on board."""
     state, actuator, wind = flat(data)
-    felt = sensitivity.apparent_wind(state, wind)
+    felt = sensitivities.apparent_wind(state, wind)
     names = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
     columns = {name: state[:, i] for i, name in enumerate(names)}
     columns |= {"azimuth": actuator[:, 0], "thruster": actuator[:, 1]}
@@ -229,7 +230,7 @@ def test_it_sees_what_coverage_measures(hybrid, ship, data):
 
 def test_without_wind_it_has_five_inputs(ship, data):
     calm = MMG(geometry_of(ship, without=["wind"])[0])
-    net = residual.residual(calm, data, WIDTH)
+    net = hybrid_training.residual(calm, data, WIDTH)
     assert len(net.mean) == net.anchors.shape[1] == 5
     z = Hybrid(calm, net).features(*flat(data))
     assert z.shape == (COUNT * SIZE, 5)
@@ -240,15 +241,15 @@ def test_windows_of_no_weight_teach_it_nothing(physics, data):
     wrong = data.measured.copy()
     wrong[5:] = 99.0
     weight = np.where(np.arange(COUNT) < 5, 1.0, 0.0)
-    some = residual.residual(physics, data._replace(measured=wrong, weight=weight), WIDTH)
-    alone = residual.residual(physics, sensitivity.pick(data, slice(0, 5)), WIDTH)
+    some = hybrid_training.residual(physics, data._replace(measured=wrong, weight=weight), WIDTH)
+    alone = hybrid_training.residual(physics, sensitivities.pick(data, slice(0, 5)), WIDTH)
     for name in ("mean", "std", "bound", "anchors", "radius", "limit"):
         assert getattr(some, name) == pytest.approx(getattr(alone, name)), name
 
 
 def test_an_input_that_never_changes_does_not_divide_by_nothing(physics, data):
     steady = data._replace(actuator=np.full_like(data.actuator, 0.5))
-    net = residual.residual(physics, steady, WIDTH)
+    net = hybrid_training.residual(physics, steady, WIDTH)
     assert net.std[3:5].tolist() == [1.0, 1.0]
     assert np.isfinite(net.anchors).all()
 
@@ -281,7 +282,7 @@ def test_the_parts_of_the_force_move_the_ship(part, ship, physics, hybrid, theta
     model, numbers = {"mmg": (physics, theta), "hybrid": (hybrid, loud)}[part]
     seconds = table(data)[::7]
     simulator = Simulator(model, numbers, np.zeros((len(numbers),) * 2))
-    found = forces.along(simulator, seconds, ship)
+    found = force_breakdown.along(simulator, seconds, ship)
     assert found.columns == ["voyage", "time", "part", "surge", "sway", "yaw"]
     named = ["hull", "thruster", "wind", *(["network"] if part == "hybrid" else []), "total"]
     order = found["part"].unique(maintain_order=True).to_list()
@@ -319,7 +320,7 @@ def test_the_forces_of_a_ship_without_wind_sensor_are_those_of_a_calm(data):
     g, main, _ = geometry_of(ship)
     numbers = estimated(g, main).values
     seconds = table(data).drop("wind_speed", "wind_angle")[:9]
-    found = forces.along(Simulator(MMG(g), numbers, np.zeros((2, 2))), seconds, ship)
+    found = force_breakdown.along(Simulator(MMG(g), numbers, np.zeros((2, 2))), seconds, ship)
     assert found["part"].unique(maintain_order=True).to_list() == ["hull", "thruster", "total"]
     assert found.height == 3 * 9
 
@@ -334,7 +335,7 @@ def pulled(physics, theta, data) -> Series:
     path = [state]
     for i in range(SIZE - 1):
         at, blowing = data.actuator[:, i], data.wind[:, i]
-        moved = np.array(sensitivity.rate(physics, theta, state, at, blowing))
+        moved = np.array(sensitivities.rate(physics, theta, state, at, blowing))
         moved[:, 3] += PULL * at[:, 1]
         state = state + moved
         path.append(state)
@@ -351,7 +352,7 @@ def known(theta) -> Identified:
 
 def trained(physics, known, data, strength):
     rng = np.random.default_rng(3)
-    return residual.fit(physics, known, data, width=WIDTH, strength=strength, rng=rng)
+    return hybrid_training.fit(physics, known, data, width=WIDTH, strength=strength, rng=rng)
 
 
 @pytest.fixture(scope="module")
@@ -369,8 +370,11 @@ def test_the_network_learns_a_small_force_and_leaves_the_physics_alone(
     assert not done.covariance[:count, count:].any()
     assert np.diag(done.covariance)[count:].all()
     assert done.free.tolist() == known.free.tolist() + [True] * model.residual.count
-    before = sensitivity.losses(physics, theta, pulled).mean()
-    assert done.loss == (77.0, pytest.approx(sensitivity.losses(model, done.values, pulled).mean()))
+    before = sensitivities.losses(physics, theta, pulled).mean()
+    assert done.loss == (
+        77.0,
+        pytest.approx(sensitivities.losses(model, done.values, pulled).mean()),
+    )
     assert done.loss[1] < 0.2 * before
 
 

@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import band, identifiability, residual, sensitivity
-from shiplog.crossvalidation import cross_validate, folds
 from shiplog.exceptions import ModelError
-from shiplog.identify import CORRELATION, Identified, identify
-from shiplog.sensitivity import Series, Simulator
+from shiplog.simulation import prediction_interval, sensitivities
+from shiplog.simulation.sensitivities import Series, Simulator
+from shiplog.training import hybrid_training, identifiability
+from shiplog.training.cross_validation import cross_validate, folds
+from shiplog.training.output_error import CORRELATION, Identified, identify
 
 
 @jax.tree_util.register_static
@@ -88,7 +89,7 @@ def driven(actuators: int, seed: int = 0, count: int = COUNT) -> Series:
 
 
 def measured(model, theta, data: Series) -> Series:
-    return data._replace(measured=sensitivity.rollout(model, np.array(theta), data))
+    return data._replace(measured=sensitivities.rollout(model, np.array(theta), data))
 
 
 def noisy(data: Series, seed: int, sigma: float = 0.02) -> Series:
@@ -151,7 +152,7 @@ def test_the_ridge_holds_as_firmly_as_the_closed_form_says(tight, factor):
     spread = factor * np.array([tight, 3 * tight, tight])
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=2)
     start = np.array([0.05, 0.03, 0.0])
-    at = sensitivity.normal(Straight(), start, data)
+    at = sensitivities.normal(Straight(), start, data)
     noise = CORRELATION * at.loss.sum() / (3 * COUNT * (SIZE - 1.0))
     gram = at.gram * np.outer(spread, spread) / noise
     wanted = -np.linalg.solve(gram + np.eye(3), at.pull.sum(0) * spread / noise)
@@ -239,7 +240,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
     weight = np.array([1.0, 0, 1, 1, 0, 1, 1, 1])
     wrong = blurred.measured.copy()
     wrong[weight == 0] += 3.0
-    some = sensitivity.pick(blurred, np.flatnonzero(weight))
+    some = sensitivities.pick(blurred, np.flatnonzero(weight))
     alone = identify(Boat(), START, WIDE, some)
     left_out = identify(Boat(), START, WIDE, Series(wrong, *blurred[1:4], weight))
     assert left_out.values == pytest.approx(alone.values, rel=1e-9)
@@ -260,7 +261,7 @@ def growing() -> Series:
 
 def test_a_start_that_runs_away_is_led_in_from_short_windows(growing):
     """A hundred times the growth: no window is held to its end, but each to its third second."""
-    assert np.isinf(sensitivity.losses(Growing(), np.array([2.0]), growing)).all()
+    assert np.isinf(sensitivities.losses(Growing(), np.array([2.0]), growing)).all()
     done = identify(Growing(), np.array([2.0]), np.full(1, 10.0), growing)
     assert done.values == pytest.approx([0.02], rel=1e-4) and done.converged
     assert done.loss[0] == np.inf and done.loss[1] < 1e-9
@@ -276,7 +277,7 @@ def test_a_window_of_no_weight_may_run_away(growing):
     wild = growing.measured.copy()
     wild[3, :, 1] = 1e6  # from here even the true growth is endless
     data = growing._replace(measured=wild, weight=np.where(np.arange(COUNT) == 3, 0.0, 1.0))
-    assert sensitivity.losses(Growing(), np.array([0.02]), data)[3] == np.inf
+    assert sensitivities.losses(Growing(), np.array([0.02]), data)[3] == np.inf
     done = identify(Growing(), np.array([0.015]), np.ones(1), data)
     assert done.values == pytest.approx([0.02], rel=1e-4)
     assert np.isfinite(done.covariance).all() and np.isfinite(done.loss).all()
@@ -286,9 +287,9 @@ def test_a_window_of_no_weight_may_run_away(growing):
 
 def test_a_step_too_far_is_drawn_back(growing):
     """From no growth at all the tangent points far beyond where the rollout has an end."""
-    at = sensitivity.normal(Growing(), np.zeros(1), growing)
+    at = sensitivities.normal(Growing(), np.zeros(1), growing)
     leap = -at.pull.sum(0) / at.gram[0]
-    assert np.isinf(sensitivity.losses(Growing(), leap, growing)).any()
+    assert np.isinf(sensitivities.losses(Growing(), leap, growing)).any()
     done = identify(Growing(), np.zeros(1), np.ones(1), growing)
     assert done.values == pytest.approx([0.02], rel=1e-4) and done.converged
 
@@ -339,7 +340,7 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
     s² (w S + 1/f⁴) / (w s²JᵀJ/σ² + 1/f²)², S between the gradient's square and what is expected
     of it, f how many times the plausible spread s the ridge allows."""
     whole = measured(Straight(), (0.02, -0.01, 0.005), driven(2))
-    data = noisy(sensitivity.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
+    data = noisy(sensitivities.pick(whole, [0]), seed=4)._replace(weight=np.array([weight]))
     free, spread = np.array([True, False, False]), np.array([0.03, 1.0, 1.0])
     start = np.array([0.05, -0.01, 0.005])
     done = identify(Straight(), start, spread, data, free=free, factor=factor, rounds=1)
@@ -351,7 +352,7 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
     pull = 1e4 * (trapezoid * slope * error).sum()
     noise, s = done.noise, spread[0]
     rest = 1e4 * (trapezoid * error**2).sum()
-    states = sensitivity.rollout(Straight(), done.values, data)[0]
+    states = sensitivities.rollout(Straight(), done.values, data)[0]
     others = (states - data.measured[0])[:, [3, 5]] * (100.0, 1800.0 / math.pi)
     rest += (trapezoid[:, None] * others**2).sum()
     assert done.loss[1] == pytest.approx(rest)
@@ -372,12 +373,12 @@ def test_each_window_is_one_observation_of_its_own_gradient():
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=5)
     start, spread = np.array([0.03, 0.0, 0.0]), np.full(3, 100.0)
     one = identify(Straight(), start, spread, data)
-    at = sensitivity.normal(Straight(), one.values, data)
+    at = sensitivities.normal(Straight(), one.values, data)
     inverse = np.linalg.inv(at.gram)
     scatter = (COUNT * at.pull.T @ at.pull + 3.0 * one.noise * at.gram) / (COUNT + 3.0)
     wanted = COUNT / (COUNT - 1.0) * inverse @ scatter @ inverse
     assert one.covariance == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).min())
-    twice = identify(Straight(), start, spread, sensitivity.pick(data, [*range(COUNT)] * 2))
+    twice = identify(Straight(), start, spread, sensitivities.pick(data, [*range(COUNT)] * 2))
     assert twice.values == pytest.approx(one.values, rel=1e-6)
     weighed = identify(Straight(), start, spread, data._replace(weight=np.full(COUNT, 2.0)))
     assert weighed.covariance == pytest.approx(twice.covariance, rel=1e-6)
@@ -433,14 +434,14 @@ def test_each_of_two_voyages_is_rolled_out_with_what_the_other_said():
     assert sorted(w.tolist() for w in seen) == [[0.0, 2.0] * 4, [2.0, 0.0] * 4]
     crossed = np.where(
         is_a[:, None, None],
-        sensitivity.rollout(Boat(), second, data),
-        sensitivity.rollout(Boat(), first, data),
+        sensitivities.rollout(Boat(), second, data),
+        sensitivities.rollout(Boat(), first, data),
     )
     assert done.states == pytest.approx(crossed, abs=1e-5)
     sure = np.where(
         is_a[:, None, None],
-        sensitivity.spread(Boat(), second, np.diag([1e-4, 0, 0]), data),
-        sensitivity.spread(Boat(), first, np.diag([1e-4, 0, 0]), data),
+        sensitivities.spread(Boat(), second, np.diag([1e-4, 0, 0]), data),
+        sensitivities.spread(Boat(), first, np.diag([1e-4, 0, 0]), data),
     )
     assert done.spread == pytest.approx(sure, abs=1e-5) and sure[:, 1:, 1].min() > 0.0
     error = 100.0 * (crossed - data.measured)[..., 1]
@@ -459,7 +460,7 @@ def test_a_voyage_that_was_corrupted_spoils_every_fit_but_its_own(exact):
         return Simulator(Boat(), done.values, done.covariance)
 
     done = cross_validate(fit, exact._replace(measured=bad), groups)
-    truth = sensitivity.rollout(Boat(), TRUE, exact)
+    truth = sensitivities.rollout(Boat(), TRUE, exact)
     assert done.states[5:] == pytest.approx(truth[5:], abs=1e-4)
     assert np.abs(done.states - truth)[:5, :, 1].max((1,)).min() > 1.0
 
@@ -490,10 +491,10 @@ def walks(count: int, seed: int) -> np.ndarray:
 def test_a_calibrated_band_holds_nine_in_ten_of_fresh_errors():
     old, new = walks(2000, 0), walks(2000, 1)
     for own in (np.zeros_like(old), np.full_like(old, 0.5) * np.abs(old).mean((0, 1))):
-        learnt = band.calibrate(old, own, groups=1000)
-        shares = band.coverage(new, learnt.half_width(own))
+        learnt = prediction_interval.calibrate(old, own, groups=1000)
+        shares = prediction_interval.coverage(new, learnt.half_width(own))
         assert shares == pytest.approx(np.full(6, 0.9), abs=0.03)
-    plain = band.calibrate(old, np.zeros_like(old), groups=1000)
+    plain = prediction_interval.calibrate(old, np.zeros_like(old), groups=1000)
     assert plain.growth[10:34, 0] == pytest.approx(np.sqrt(np.arange(10, 34)), rel=0.06)
     assert plain.factor == pytest.approx(np.full(6, 1.645), rel=0.05)  # Gaussian
 
@@ -506,14 +507,14 @@ def test_few_voyages_ask_for_a_wider_quantile(groups, level, wanted):
     """level (1 + 1/groups), no further than 0.95, of the very errors it has seen."""
     errors = walks(500, 2)
     nothing = np.zeros_like(errors)
-    learnt = band.calibrate(errors, nothing, groups, level)
-    inside = band.coverage(errors, learnt.half_width(nothing))
+    learnt = prediction_interval.calibrate(errors, nothing, groups, level)
+    inside = prediction_interval.coverage(errors, learnt.half_width(nothing))
     assert inside == pytest.approx(np.full(6, wanted), abs=2e-4)
 
 
 def test_more_spread_of_its_own_is_a_wider_band():
     errors = walks(200, 3)
-    learnt = band.calibrate(errors, np.full_like(errors, 0.05), groups=20)
+    learnt = prediction_interval.calibrate(errors, np.full_like(errors, 0.05), groups=20)
     narrow, wide = (learnt.half_width(np.full((3, 40, 6), s)) for s in (0.0, 0.2))
     assert (wide > narrow).all()
     assert narrow == pytest.approx(np.broadcast_to(learnt.factor * learnt.growth, (3, 40, 6)))
@@ -525,7 +526,7 @@ def test_what_the_spread_explains_is_not_counted_twice():
     """Errors as large as the model says: the growth left over is the least, 5 % of the square."""
     errors = walks(2000, 4)
     size = np.sqrt((errors**2).mean(0))
-    learnt = band.calibrate(errors, np.broadcast_to(size, errors.shape), groups=1000)
+    learnt = prediction_interval.calibrate(errors, np.broadcast_to(size, errors.shape), groups=1000)
     assert learnt.growth[10:34] == pytest.approx(np.sqrt(0.05) * size[10:34], rel=0.05)
 
 
@@ -533,8 +534,8 @@ def test_rollouts_that_diverged_widen_no_band():
     errors = walks(100, 5)
     own = np.full_like(errors, 0.01)
     wild = np.concatenate((errors, np.full((1, 40, 6), np.inf), np.full((1, 40, 6), np.nan)))
-    plain = band.calibrate(errors, own, 20)
-    same = band.calibrate(wild, np.concatenate((own, own[:2])), 20)
+    plain = prediction_interval.calibrate(errors, own, 20)
+    same = prediction_interval.calibrate(wild, np.concatenate((own, own[:2])), 20)
     assert same.growth.tolist() == plain.growth.tolist()
     assert same.factor.tolist() == plain.factor.tolist()
 
@@ -545,14 +546,14 @@ def test_the_share_inside_is_counted_without_the_first_samples():
     error[0, 1, 0], error[1, 1:, 0] = -2.0, (0.5, np.nan)
     error[:, 1:, 1] = -1.0
     half = np.ones((2, 3, 6))
-    assert band.coverage(error, half).tolist() == [0.5, 1.0, 1.0, 1.0, 1.0, 1.0]
+    assert prediction_interval.coverage(error, half).tolist() == [0.5, 1.0, 1.0, 1.0, 1.0, 1.0]
 
 
 def test_the_spread_of_seeds():
     one = np.zeros((1, 2, 6))
-    assert not band.seeds_spread([one]).any()
-    assert band.seeds_spread([one, one + 2.0, one + 4.0]) == pytest.approx(one + 2.0)
-    assert np.isinf(band.seeds_spread([one, one * np.nan])).all()
+    assert not prediction_interval.seeds_spread([one]).any()
+    assert prediction_interval.seeds_spread([one, one + 2.0, one + 4.0]) == pytest.approx(one + 2.0)
+    assert np.isinf(prediction_interval.seeds_spread([one, one * np.nan])).all()
 
 
 # ---------------------------------------------------------------- how much a network may say
@@ -583,11 +584,11 @@ def judged(**gain: float) -> dict[float, np.ndarray]:
     ],
 )
 def test_the_least_strength_within_one_standard_error_is_chosen(gain, wanted):
-    assert residual.choose(judged(**gain)) == wanted
+    assert hybrid_training.choose(judged(**gain)) == wanted
 
 
 def test_windows_are_compared_in_pairs():
     """Windows differ by hundreds; a network that takes 5 from every one of them is no chance."""
     physics = np.linspace(100.0, 900.0, 40)
     better = physics - 5.0 + 0.1 * np.cos(np.arange(40.0))
-    assert residual.choose({0.0: physics, 0.1: better}) == 0.1
+    assert hybrid_training.choose({0.0: physics, 0.1: better}) == 0.1

@@ -7,11 +7,12 @@ import polars as pl
 import pytest
 import sailing
 
-from shiplog import align, quality, report
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
-from shiplog.ingest import ingest
 from shiplog.logs.write import Series
+from shiplog.report import tables
+from shiplog.voyages import fault_detection, resampling
+from shiplog.voyages.ingest import ingest
 
 
 def changed(parts, topic, **columns):
@@ -211,7 +212,7 @@ def test_a_slow_coarse_log_is_said_to_be_one_and_is_not_full_of_faults(voyage):
     assert found["heading"] == (2.0, pytest.approx(1.0))
     assert found["propeller"] == (10.0, 0.0)
     assert done.report.slowest.rate_hz == 1.0
-    lines = "\n".join(report.voyage_lines(done.report))
+    lines = "\n".join(tables.voyage_lines(done.report))
     assert "rudder, velocity" in lines and "at 1 Hz" in lines and "heading 1 deg" in lines
 
 
@@ -250,11 +251,11 @@ def test_many_findings_of_a_kind_are_summed_up_and_all_are_kept(voyage):
     for second in range(10, 290, 4):
         mask[10 * second : 10 * second + 6 + second // 100] = False
     done = voyage(kept(parts, "/wind", mask)).report
-    assert len([f for f in done.findings if f.kind == "gap"]) == quality.LISTED + 1
-    (line,) = [line for line in report.voyage_lines(done) if "gap" in line]
+    assert len([f for f in done.findings if f.kind == "gap"]) == fault_detection.LISTED + 1
+    (line,) = [line for line in tables.voyage_lines(done) if "gap" in line]
     total = sum(f.value for f in done.findings)
     assert f"{total:.1f} s in all" in line and "from 201.9 s" in line
-    assert len(report.voyage_lines(done)) < 25
+    assert len(tables.voyage_lines(done)) < 25
 
 
 @pytest.mark.parametrize(
@@ -334,8 +335,8 @@ def test_a_sensor_that_fell_out_for_long_and_came_back_for_a_moment_is_data(voya
 
 def test_a_slow_sensor_has_no_strays():
     time = sailing.START + np.arange(0, 200) * 180 * 10**9  # a report every three minutes
-    assert not align.strays(time, time + 10**9).any()
-    assert not align.strays(time, sailing.START + np.arange(0, 200)).any()  # replayed at once
+    assert not resampling.strays(time, time + 10**9).any()
+    assert not resampling.strays(time, sailing.START + np.arange(0, 200)).any()  # replayed at once
 
 
 def test_stamps_scattered_over_years_are_refused_and_not_laid_on_a_grid(voyage):

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.judgement import FEWEST, force_line, judge
+from shiplog.report.judgement import FEWEST, force_line, judge
 
 
 def errors(losses, off=3.0, turned=10.0) -> pl.DataFrame:

@@ -17,8 +17,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 import shiplog
-from pipelines import known_ship
-from pipelines.known_ship import (
+from pipelines.experiments import simulated_ship
+from pipelines.experiments.simulated_ship import (
     BANK_EAST,
     CALM,
     LIMITS,
@@ -31,11 +31,11 @@ from pipelines.known_ship import (
     varied,
     write_voyage,
 )
-from pipelines.known_ship import __main__ as command
-from pipelines.known_ship.sample_logs import PLANS, SEASONS, SEED, voyages
-from pipelines.known_ship.sensors import DATUM, Blemishes
-from pipelines.known_ship.ship import ANTENNA
-from pipelines.known_ship.voyage import PULSE_TIMES
+from pipelines.experiments.simulated_ship import __main__ as command
+from pipelines.experiments.simulated_ship.sample_logs import PLANS, SEASONS, SEED, voyages
+from pipelines.experiments.simulated_ship.sensors import DATUM, Blemishes
+from pipelines.experiments.simulated_ship.ship import ANTENNA
+from pipelines.experiments.simulated_ship.voyage import PULSE_TIMES
 
 START = datetime(2025, 10, 7, 1, 0, tzinfo=UTC)
 STEADY = Wind(4.0, 0.7, gust=0.0, veer=0.0, wander=0.0)
@@ -184,7 +184,7 @@ def test_the_step_in_use_is_fine_enough_for_an_operators_orders():
 
 def _orders(seconds: float, seed: int) -> list:
     """What the operator of this seed orders, second by second."""
-    operator = known_ship.helm.Operator(np.random.default_rng([seed, 1]))
+    operator = simulated_ship.helm.Operator(np.random.default_rng([seed, 1]))
     orders = []
 
     def note(time, now):
@@ -463,7 +463,7 @@ def test_an_effect_of_no_strength_is_no_effect_to_the_last_bit():
 
 def test_the_committed_logs_are_what_she_still_sails(sailed, tmp_path):
     """To a step of resolution: another processor may round the last bit otherwise."""
-    folder = Path(known_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
     for number in (0, 6, 10):  # nothing hidden, and something
         plan, voyage = sailed[number]
         write_voyage(tmp_path / "a.mcap", voyage, seed=SEED + number, start=plan.start)
@@ -648,14 +648,14 @@ def test_the_profile_is_of_this_ship():
 
 
 def test_the_sample_logs_are_small_and_complete():
-    folder = Path(known_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
     names = {f"{plan.name}.mcap" for plan in (*PLANS, *itertools.chain(*SEASONS.values()))}
     assert {p.name for p in folder.glob("*.mcap")} == names
     assert sum(p.stat().st_size for p in folder.glob("*.mcap")) <= 22_000_000
 
 
 def test_the_samples_hide_two_things_nothing_and_something_outside_the_catalogue():
-    folder = Path(known_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
     key = json.loads((folder / "answers" / "key.json").read_text("utf-8"))
     said = {voyage: [cause["name"] for cause in causes] for voyage, causes in key.items()}
     wanted = {2: ["current", "clock_offset"], 3: [], 4: ["tether"]}
@@ -732,7 +732,7 @@ def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
         sailed = sail(
             120.0, seed=3, wind=STEADY, ship=case.ship, effects=case.effects, campaign=(0.5, 1.0)
         )
-        series = known_ship.sensors.measure(sailed, seed=1, start=START, blemishes=Blemishes())
+        series = simulated_ship.sensors.measure(sailed, seed=1, start=START, blemishes=Blemishes())
         columns.append([values for one in series for values in one.columns.values()])
     assert any(not np.array_equal(a, b) for a, b in zip(*columns, strict=True))
 
@@ -849,7 +849,7 @@ def test_the_command_writes_a_case(tmp_path, monkeypatch, capsys):
 
 
 def test_it_shares_no_code_with_shiplog_but_the_writer():
-    for source in Path(known_ship.__file__).parent.glob("*.py"):
+    for source in Path(simulated_ship.__file__).parent.glob("*.py"):
         for node in ast.walk(ast.parse(source.read_text())):
             names = []
             if isinstance(node, ast.Import):

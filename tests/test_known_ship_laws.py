@@ -8,14 +8,33 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pipelines.known_ship import CALM, Effects, Laws, Ship, Wind, cases, physics, sail, varied
-from pipelines.known_ship.laws import BEDS, Air, Bank, Growth, Hull, Noise, Shallow, drawn
-from pipelines.known_ship.noise import oscillator, process_noise
+from pipelines.experiments.simulated_ship import (
+    CALM,
+    Effects,
+    Laws,
+    Ship,
+    Wind,
+    cases,
+    physics,
+    sail,
+    varied,
+)
+from pipelines.experiments.simulated_ship.laws import (
+    BEDS,
+    Air,
+    Bank,
+    Growth,
+    Hull,
+    Noise,
+    Shallow,
+    drawn,
+)
+from pipelines.experiments.simulated_ship.noise import oscillator, process_noise
 from shiplog import profile as profiles
-from shiplog import reference
-from shiplog.causes import CATALOGUE, Setting
-from shiplog.causes.environment import Bank as CatalogueBank
-from shiplog.causes.environment import ShallowWater
+from shiplog.diagnosis.nominal_reference import UNREST_TIME
+from shiplog.models.causes import CATALOGUE, Setting
+from shiplog.models.causes.environment import Bank as CatalogueBank
+from shiplog.models.causes.environment import ShallowWater
 
 SEEDS = range(300)
 PROFILE = profiles.load("esso-vectwin")
@@ -330,9 +349,9 @@ def constants() -> dict[str, tuple[float, Callable[[Laws], float]]]:
         "bank speed of lead": (
             0.01 * math.sqrt(1 / share**2 - 1), lambda laws: laws.bank.lead_speed,
         ),
-        "process noise, time": (reference.UNREST_TIME, lambda laws: laws.noise.time[0]),
-        "process noise, time in sway": (reference.UNREST_TIME, lambda laws: laws.noise.time[1]),
-        "process noise, time in yaw": (reference.UNREST_TIME, lambda laws: laws.noise.time[2]),
+        "process noise, time": (UNREST_TIME, lambda laws: laws.noise.time[0]),
+        "process noise, time in sway": (UNREST_TIME, lambda laws: laws.noise.time[1]),
+        "process noise, time in yaw": (UNREST_TIME, lambda laws: laws.noise.time[2]),
     }  # fmt: skip
     for name in TERMS:
         found[f"shallow {name}"] = (

@@ -16,9 +16,9 @@ import pytest
 
 from pipelines.convert import convert
 from shiplog import profile as profiles
-from shiplog.ingest import ingest
 from shiplog.logs.read import contents, read
 from shiplog.logs.write import Series, write_log
+from shiplog.voyages.ingest import ingest
 
 START = 1_617_969_600.0  # 2021-04-09 12:00:00 UTC
 SPEED, RATE, RADIUS_M = 2.0, 0.02, 100.0  # m/s, rad/s: half a circle and more in 200 s

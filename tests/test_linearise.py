@@ -7,17 +7,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
+from shiplog.models.causes.ship import RudderDelay, RudderLag
 
-from shiplog import evidence, linearise, reading, segments
 from shiplog import profile as profiles
-from shiplog.causes import Cause, Setting
-from shiplog.causes.sensors import AntennaOffset, HeadingOffset
-from shiplog.causes.ship import RudderDelay, RudderLag
-from shiplog.linearise import Path, Wide
+from shiplog.diagnosis import likelihood, linearisation, measurement_correction, segments
+from shiplog.diagnosis.linearisation import Path, Wide
+from shiplog.diagnosis.segments import Cut
 from shiplog.models import mmg
-from shiplog.record import Record
-from shiplog.segments import Cut
-from shiplog.timescale import KNOT, NODE_ROWS, Timescale
+from shiplog.models.causes import Cause, Setting
+from shiplog.voyages.recording import Record
+from shiplog.voyages.timescale import KNOT, NODE_ROWS, Timescale
 
 PROFILE = profiles.load("esso-osaka")  # rudder and propeller
 SETTING = Setting(PROFILE, {"speed": 0.6, "length": 3.0}, np.zeros((1, 2)), 1.0)
@@ -75,7 +75,7 @@ def test_the_integration_is_of_second_order():
     for step in (0.2, 0.1, 0.05):
         nodes = round(seconds / step) + 1
         start = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
-        states = linearise._path(
+        states = linearisation._path(
             Coasting(), np.array([k]), start, np.zeros((1, nodes, 3)), np.zeros((1, nodes, 3)), step
         )
         last = np.asarray(states)[0, -1]
@@ -90,7 +90,7 @@ def test_a_push_is_an_acceleration():
     nodes, step = 61, 0.2
     push = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
-        linearise._path(
+        linearisation._path(
             Coasting(), np.zeros(1), np.zeros((1, 6)), push, np.zeros((1, nodes, 3)), step
         )
     )
@@ -164,19 +164,25 @@ def linearised():
         "rudder_lag": np.array([1.5]),
     }  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:  # a wider step than a derivative's averages noise
-        patch.setattr(reading, "STEP", 0.02)
-        cut, moved, shown = reading.read(model, SETTING, SEEN, ROWS, numbers)
+        patch.setattr(measurement_correction, "STEP", 0.02)
+        cut, moved, shown = measurement_correction.read(model, SETTING, SEEN, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()
-    return model, numbers, theta, at, linearise.linear(model, theta, cut, GRID, at, moved, shown)
+    return (
+        model,
+        numbers,
+        theta,
+        at,
+        linearisation.linear(model, theta, cut, GRID, at, moved, shown),
+    )
 
 
 def gap(model, theta, at: Path, numbers) -> np.ndarray:
     """Measured less simulated [S, B, 6], from the nodes: the trapezium of each two seconds."""
-    record = reading.corrected(model.causes, SEEN, numbers)
+    record = measurement_correction.corrected(model.causes, SEEN, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
-        linearise._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
+        linearisation._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)
@@ -243,7 +249,7 @@ def test_columns_of_causes_that_read(linearised, label, i, column):
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
     """Segments whose measurements are the toy's own."""
     cut = segments.cut(SEEN, ROWS)
-    y, _ = linearise._run(Toy(), theta, cut, at, GRID)
+    y, _ = linearisation._run(Toy(), theta, cut, at, GRID)
     return replace(cut, y=y)
 
 
@@ -251,7 +257,7 @@ def test_nothing_is_left_of_what_the_model_made():
     at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
-    found = linearise.linear(Toy(), THETA, cut, GRID, at, *none)
+    found = linearisation.linear(Toy(), THETA, cut, GRID, at, *none)
     assert np.array_equal(found.e, np.zeros_like(found.e))
     assert found.j.shape[-1] == 4
     picked = found.pick(np.array([False, True, True, False]))
@@ -265,7 +271,8 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     exact, found = (
-        linearise.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none) for smooth in (0.0, 1.0)
+        linearisation.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none)
+        for smooth in (0.0, 1.0)
     )
     assert np.array_equal(found.e, exact.e)
     for one, other in ((found.z, exact.z), (found.j, exact.j)):
@@ -273,7 +280,7 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
         assert 0.0 < np.abs((one - other) / size).max() < 0.01
     k = np.array([0.3])
     same = [
-        linearise.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z
+        linearisation.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z
         for smooth in (0.0, 1.0)
     ]
     assert same[0] == pytest.approx(same[1], abs=1e-12)
@@ -285,8 +292,8 @@ def test_a_path_is_pulled_onto_a_known_push():
     push = np.stack((0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t)))
     true = Path(SEEN.state[ROWS], np.tile(push, (4, 1, 1)))
     cut = simulated(true)
-    found = linearise.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
-    y, _ = linearise._run(Toy(), THETA, cut, found, GRID)
+    found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
+    y, _ = linearisation._run(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
     # within, where bins on both sides see a knot
@@ -300,14 +307,14 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
     t = g.knot * np.arange(g.knots)
     push = np.stack((0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t)))
     true = Path(SEEN.state[rows], np.tile(push, (2, 1, 1)))
-    cut, moved, shown = reading.read(Toy(), SETTING, seen, rows)
+    cut, moved, shown = measurement_correction.read(Toy(), SETTING, seen, rows)
     assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
-    y, _ = linearise._run(Toy(), THETA, cut, true, g)
+    y, _ = linearisation._run(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)
-    found = linearise.pulled(Toy(), THETA, cut, g, tight, rounds=3)
+    found = linearisation.pulled(Toy(), THETA, cut, g, tight, rounds=3)
     assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
-    assert not linearise.linear(Toy(), THETA, cut, g, found, moved, shown, WIDE).lost.any()
+    assert not linearisation.linear(Toy(), THETA, cut, g, found, moved, shown, WIDE).lost.any()
 
 
 def test_what_was_not_used_does_not_pull():
@@ -317,8 +324,8 @@ def test_what_was_not_used_does_not_pull():
     used[:, 6:8] = False
     wrong = np.where(used, cut.y, 1e3)
     bad = replace(cut, y=wrong, used=used)
-    found = linearise.pulled(Toy(), THETA, bad, GRID, WIDE, true)
-    y, _ = linearise._run(Toy(), THETA, bad, found, GRID)
+    found = linearisation.pulled(Toy(), THETA, bad, GRID, WIDE, true)
+    y, _ = linearisation._run(Toy(), THETA, bad, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 
@@ -329,17 +336,17 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)
     wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
-    stood = linearise.pulled(Toy(), wrong, cut, GRID, tight)
+    stood = linearisation.pulled(Toy(), wrong, cut, GRID, tight)
     size = np.abs(stood.push[:, 2]).max()
     assert size > 1e-4
     nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
-    linear = linearise.linear(Toy(), wrong, cut, GRID, stood, *nothing)
-    found = linearise.ahead(linear, THETA - wrong, tight)
+    linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing)
+    found = linearisation.ahead(linear, THETA - wrong, tight)
     assert np.abs(found.push[:, 2]).max() < 0.1 * size
     assert found.start == pytest.approx(true.start, abs=1e-3)
-    stays = linearise.ahead(linear, np.zeros(4), tight)
+    stays = linearisation.ahead(linear, np.zeros(4), tight)
     assert stays.push == pytest.approx(stood.push, abs=0.1 * size)
-    firm = linearise.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
+    firm = linearisation.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
     assert np.abs(firm.push[:, 2]).max() < 0.1 * size  # held about none, not about where it stood
 
 
@@ -367,10 +374,10 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     """Holding the recorded rudder over a step would show as 0.05 s here."""
     record = weaving(late)
     model = Toy((RudderDelay(),))
-    cut, moved, shown = reading.read(model, SETTING, record, ROWS)
+    cut, moved, shown = measurement_correction.read(model, SETTING, record, ROWS)
     theta = np.concatenate((THETA, [0.0]))
     at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
-    found = linearise.linear(model, theta, cut, GRID, at, moved, shown)
+    found = linearisation.linear(model, theta, cut, GRID, at, moved, shown)
     rows = found.e[..., 4:].ravel()  # heading and yaw rate
     start = found.z[..., 4:, 4:6].reshape(len(rows), 2)
     owned = np.zeros((len(rows), 8))  # each segment has a start of its own
@@ -421,7 +428,7 @@ def nothing(cut: Cut) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(("substeps", "many"), [(1, 1), (2, 1), (4, 2), (8, 4)])
 def test_steps_between_nodes_follow_trainings(substeps, many):
     """Stable where training is: |λ| up to 2n a second there, up to one over the step here."""
-    assert linearise.finer(Stiff(substeps), 0.2) == many
+    assert linearisation.finer(Stiff(substeps), 0.2) == many
     assert 2.0 * substeps * 0.2 / many <= 1.0
 
 
@@ -429,10 +436,10 @@ def test_what_training_holds_is_held_here():
     """Damping of 7 1/s, stable with four Euler steps a second: u = e^(-7t). With the nodes' step
     alone the speed would grow by half from step to step."""
     cut, at, y = coasting()
-    found, columns = linearise._run(Stiff(4), np.array([7.0]), cut, at, GRID)
+    found, columns = linearisation._run(Stiff(4), np.array([7.0]), cut, at, GRID)
     assert found[:, 1:] == pytest.approx(y[:, 1:], abs=0.02)  # of the whole way, 1/7 m
     assert np.abs(columns[..., 1]).max() < 1.0
-    wild, _ = linearise._run(Stiff(1), np.array([7.0]), cut, at, GRID)
+    wild, _ = linearisation._run(Stiff(1), np.array([7.0]), cut, at, GRID)
     assert not np.isfinite(wild).all() or np.abs(wild).max() > 1e6
 
 
@@ -440,10 +447,10 @@ def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
     cut, theta = segments.cut(SEEN, ROWS), THETA
     at, model = path(), Toy(substeps=4)
     none = nothing(cut)
-    found = linearise.linear(model, theta, cut, GRID, at, *none)
+    found = linearisation.linear(model, theta, cut, GRID, at, *none)
 
     def y(theta, at):
-        return linearise._run(model, theta, cut, at, GRID)[0]
+        return linearisation._run(model, theta, cut, at, GRID)[0]
 
     for i in range(4):
         h = 1e-5 * np.eye(4)[i]
@@ -470,13 +477,13 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     model = mmg.MMG(ship)
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
-    ((_, filled),) = linearise._chunks(4)  # as many at a time, so that rounding is the same
+    ((_, filled),) = linearisation._chunks(4)  # as many at a time, so that rounding is the same
     start, push, driven = map(filled, (at.start, at.at_nodes(GRID), plain.driven))
-    states = np.asarray(linearise._path(model, theta, start, push, driven, cut.step))[:4]
+    states = np.asarray(linearisation._path(model, theta, start, push, driven, cut.step))[:4]
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     wanted = pairs.reshape(4, GRID.bins, -1, 6).mean(2)
     for substeps in (1, 2):
-        found, _ = linearise._run(replace(model, substeps=substeps), theta, plain, at, GRID)
+        found, _ = linearisation._run(replace(model, substeps=substeps), theta, plain, at, GRID)
         assert np.array_equal(found, wanted)
 
 
@@ -485,7 +492,7 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
     """Where the actuator is on, damping is 70 1/s: no step holds that, and it says nothing."""
     cut, at, _ = coasting(segments_on=(2,))
     theta = np.array([7.0])
-    found = linearise.linear(Stiff(4), theta, cut, GRID, at, *nothing(cut), wide)
+    found = linearisation.linear(Stiff(4), theta, cut, GRID, at, *nothing(cut), wide)
     assert found.lost.tolist() == [False, False, True, False]
     assert found.said == "1 of 4 segments were left out: the model runs away there."
     for values in (found.e, found.z, found.j):
@@ -493,7 +500,7 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
     assert not found.cut.used[2].any() and found.cut.used[[0, 1, 3]].all()
     assert cut.used.all()  # what was cut stays as it was
     others = np.array([True, True, False, True])
-    alone = linearise.linear(
+    alone = linearisation.linear(
         Stiff(4), theta, cut.pick(others), GRID, Path(at.start[others], at.push[others]),
         *nothing(cut.pick(others)), wide,
     )  # fmt: skip
@@ -504,10 +511,10 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
 
 def test_what_was_left_out_carries_no_information():
     cut, at, _ = coasting(segments_on=(2,))
-    found = linearise.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
-    unrest = evidence.Unrest(WIDE.noise, WIDE.push, WIDE.start, 4.0)
-    whole = evidence.weighed(found, unrest)
-    part = evidence.weighed(found.pick(np.array([True, True, False, True])), unrest)
+    found = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
+    unrest = likelihood.Unrest(WIDE.noise, WIDE.push, WIDE.start, 4.0)
+    whole = likelihood.weighed(found, unrest)
+    part = likelihood.weighed(found.pick(np.array([True, True, False, True])), unrest)
     assert not whole.dd[2].any() and not whole.zd[2].any() and not whole.zz[2].any()
     assert whole.dd.sum(0) == pytest.approx(part.dd.sum(0), rel=1e-12)
     assert whole.logdet == pytest.approx(part.logdet, rel=1e-12)
@@ -516,7 +523,7 @@ def test_what_was_left_out_carries_no_information():
 def test_numbers_of_each_segment_are_taken_off_it_alone():
     """Of columns of its own and of pushes at the knots; segments without numbers stay."""
     cut, at, _ = coasting()
-    linear = linearise.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
+    linear = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
     rng = np.random.default_rng(3)
     pushed = rng.standard_normal((4, linear.z.shape[-1] - 6, 2))
     numbers = np.array([[0.4, 0.0, 0.0], [0.0, 1.0, -2.0], [0.0, 0.0, 0.0], [0.3, 0.5, 0.0]])
@@ -531,8 +538,8 @@ def test_numbers_of_each_segment_are_taken_off_it_alone():
 def test_a_path_that_runs_away_does_not_move_and_leaves_the_others_alone():
     cut, at, _ = coasting(segments_on=(2,))
     theta = np.array([7.0])
-    found = linearise.pulled(Stiff(4), theta, cut, GRID, WIDE, at)
+    found = linearisation.pulled(Stiff(4), theta, cut, GRID, WIDE, at)
     assert np.array_equal(found.start[2], at.start[2]) and np.isfinite(found.push).all()
     free, _, _ = coasting()
-    alone = linearise.pulled(Stiff(4), theta, free, GRID, WIDE, at)
+    alone = linearisation.pulled(Stiff(4), theta, free, GRID, WIDE, at)
     assert found.start[[0, 1, 3]] == pytest.approx(alone.start[[0, 1, 3]], abs=1e-12)

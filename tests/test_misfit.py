@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shiplog import evidence, misfit
-from shiplog.evidence import Unrest
-from shiplog.linearise import Linear, Path
-from shiplog.models.network import Network
-from shiplog.reference import marginal
-from shiplog.segments import Cut, Grid
-from shiplog.structure import at_knots
-from shiplog.timescale import KNOT, NODE_ROWS
+from shiplog.diagnosis import input_misfit, likelihood
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.nominal_reference import marginal
+from shiplog.diagnosis.segment_nodes import at_knots
+from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.models.compiled_network import Network
+from shiplog.voyages.timescale import KNOT, NODE_ROWS
 
 KNOTS, BINS, STEP = 6, 5, 0.2
 GRID = Grid(STEP, round((KNOTS - 1) * KNOT / STEP), round((KNOTS - 1) * KNOT / STEP) // NODE_ROWS
@@ -59,9 +59,9 @@ def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) ->
     return Linear(cut, Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, KNOTS))), e, z, j)
 
 
-def nats(linear: Linear, own: misfit.Misfit | None) -> float:
+def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
     """Of the column, above nothing; of usual unrest."""
-    modes = evidence.modes(evidence.weighed(linear, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(linear, UNREST), UNREST)
     if own is not None:
         modes = modes.beside(own.pushed(linear.cut, GRID))
     total = modes.total(np.ones(len(linear.cut)))
@@ -72,10 +72,10 @@ def nats(linear: Linear, own: misfit.Misfit | None) -> float:
     )
 
 
-def learned(linear: Linear) -> misfit.Misfit:
-    modes = evidence.modes(evidence.weighed(linear, UNREST), UNREST)
+def learned(linear: Linear) -> input_misfit.Misfit:
+    modes = likelihood.modes(likelihood.weighed(linear, UNREST), UNREST)
     one = np.ones(1)
-    return misfit.of(network(), linear.cut, GRID, modes, one, one, UNREST.push)
+    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, UNREST.push)
 
 
 def test_what_it_bends_the_network_by_is_what_it_pushes():

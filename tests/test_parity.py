@@ -10,10 +10,11 @@ import polars as pl
 import pytest
 import sailing
 
-from pipelines.known_ship import Effects, Wind, sail, write_voyage
-from shiplog import midship, parity, profile
+from pipelines.experiments.simulated_ship import Effects, Wind, sail, write_voyage
+from shiplog import frames, profile
 from shiplog.channels import Quality
-from shiplog.ingest import ingest
+from shiplog.voyages import sensor_consistency
+from shiplog.voyages.ingest import ingest
 
 SAMPLES = Path(__file__).parent.parent / "sample_logs"
 DEGREE = np.pi / 180.0
@@ -82,8 +83,10 @@ def in_body_axes(seed, late=None, heading_offset=0.0, antenna=(0.0, 0.0), speed_
 
 
 def found(table):
-    estimates = parity.estimates(table, BODY)
-    return {(f.kind, f.channel): f for f in parity.findings(estimates, table.height, BODY)}
+    estimates = sensor_consistency.estimates(table, BODY)
+    return {
+        (f.kind, f.channel): f for f in sensor_consistency.findings(estimates, table.height, BODY)
+    }
 
 
 @pytest.mark.parametrize("number", range(1, 7))
@@ -155,10 +158,10 @@ def test_velocity_in_body_axes_shows_whose_clock_is_late(channel):
 def turned_when_recorded(seed, late):
     """Body velocities as an estimator gives them: a late GNSS velocity, turned by the heading."""
     voyage, table = sail(900.0, seed=seed, wind=Wind(2.0, 1.0)), in_body_axes(seed)
-    earth = midship.to_body(np.stack((voyage.surge, voyage.sway), 1), -voyage.heading)
+    earth = frames.to_body(np.stack((voyage.surge, voyage.sway), 1), -voyage.heading)
     t = voyage.time
     earth = np.stack([np.interp(t - late, t, column) for column in earth.T], 1)
-    body = midship.to_body(earth, table["heading"].to_numpy())
+    body = frames.to_body(earth, table["heading"].to_numpy())
     return table.with_columns(surge=body[:, 0], sway=body[:, 1])
 
 
@@ -196,8 +199,9 @@ def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
         voyage = sail(500.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
         write_voyage(tmp_path / "a.mcap", voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
         table = ingest(tmp_path / "a.mcap", VECTWIN).table
-        inside += [e.low <= truth[e.kind] <= e.high for e in parity.estimates(table, VECTWIN)
-                   if e.channel == "yaw_rate"]  # fmt: skip
+        for e in sensor_consistency.estimates(table, VECTWIN):
+            if e.channel == "yaw_rate":
+                inside.append(e.low <= truth[e.kind] <= e.high)
     assert len(inside) == 36
     assert sum(inside) >= 28
 
@@ -222,7 +226,7 @@ def slalom(seconds=300.0, late=0.0, bias=0.0, scale=1.0, swing=1.0):
 
 @pytest.mark.parametrize("late", [0.37, -0.81, 2.6])
 def test_a_delay_in_closed_form(late):
-    values = {e.kind: e.value for e in parity.estimates(slalom(late=late), BODY)
+    values = {e.kind: e.value for e in sensor_consistency.estimates(slalom(late=late), BODY)
               if e.channel == "yaw_rate"}  # fmt: skip
     assert values["clock_offset"] == pytest.approx(late, abs=2e-3)
     assert values["yaw_rate_scale"] == pytest.approx(1.0, abs=2e-3)
@@ -231,7 +235,11 @@ def test_a_delay_in_closed_form(late):
 
 def test_bias_and_scale_in_closed_form():
     table = slalom(bias=0.01, scale=0.97)
-    values = {e.kind: e.value for e in parity.estimates(table, BODY) if e.channel == "yaw_rate"}
+    values = {
+        e.kind: e.value
+        for e in sensor_consistency.estimates(table, BODY)
+        if e.channel == "yaw_rate"
+    }
     assert values["yaw_rate_scale"] == pytest.approx(0.97, abs=1e-3)
     assert values["yaw_rate_bias"] == pytest.approx(0.01 / DEGREE, abs=2e-3)
 
@@ -245,7 +253,7 @@ def test_a_ship_that_hardly_turns_shows_no_scale_and_no_delay():
             heading=table["heading"] + rng.normal(0, 0.1 * DEGREE, table.height),
             yaw_rate=table["yaw_rate"] + rng.normal(0, 0.1 * DEGREE, table.height),
         )
-        assert not [e for e in parity.estimates(noisy, BODY) if e.notable]
+        assert not [e for e in sensor_consistency.estimates(noisy, BODY) if e.notable]
 
 
 def test_a_steady_circle_tells_no_bias_from_a_scale(tmp_path):
@@ -279,7 +287,7 @@ def test_gaps_spikes_and_held_values_are_no_delay():
 
 
 def test_too_short_a_voyage_says_nothing():
-    assert parity.estimates(in_body_axes(7, seconds=40.0), BODY) == []
+    assert sensor_consistency.estimates(in_body_axes(7, seconds=40.0), BODY) == []
 
 
 def test_eight_hours_take_seconds():

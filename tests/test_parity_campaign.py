@@ -7,16 +7,16 @@ import pytest
 import sailing
 
 from pipelines import sensors
-from shiplog import parity, parity_campaign
-from shiplog.ingest import ingest
-from shiplog.parity import Estimate
-from shiplog.parity_campaign import campaign, deviates, seasons, together
-from shiplog.store import Store
+from shiplog.voyages import campaign_consistency, sensor_consistency
+from shiplog.voyages.campaign_consistency import campaign, deviates, seasons, together
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.store import Store
 
 DAY = 86_400.0
 
 
-def motion(seed: int, seconds: float, late: float = 0.0) -> parity.Motion:
+def motion(seed: int, seconds: float, late: float = 0.0) -> sensor_consistency.Motion:
     """Turns to either side, the yaw rate so much after the heading, with noise of a cheap gyro."""
     rng = np.random.default_rng(seed)
     t = 0.1 * np.arange(round(seconds / 0.1))
@@ -29,7 +29,7 @@ def motion(seed: int, seconds: float, late: float = 0.0) -> parity.Motion:
     speed = np.full(len(t), 0.5)
     c, s = np.cos(heading(t)), np.sin(heading(t))
     gone = np.cumsum(np.stack((c, s), 1) * 0.05, axis=0)
-    return parity.Motion(
+    return sensor_consistency.Motion(
         np.arange(len(t)) == 0,
         heading(t) + 2e-3 * rng.standard_normal(len(t)),
         rate + 6e-3 * rng.standard_normal(len(t)),
@@ -43,7 +43,7 @@ def of(monkeypatch):
     """A campaign of motions, as if they had been read from tables."""
 
     def made(motions):
-        monkeypatch.setattr(parity, "measured", lambda table, profile: table)
+        monkeypatch.setattr(sensor_consistency, "measured", lambda table, profile: table)
         return campaign(motions, sailing.profile())
 
     return made
@@ -58,7 +58,7 @@ def test_several_short_voyages_know_a_clock_better_than_each(of):
     late = 0.15
     motions = {f"v{i}": motion(100 + i, 60.0, late) for i in range(6)}
     found = clock(of(motions).estimates)
-    alone = [clock(parity.of_motion(m, sailing.profile())) for m in motions.values()]
+    alone = [clock(sensor_consistency.of_motion(m, sailing.profile())) for m in motions.values()]
     assert found.low < late < found.high
     widths = [np.inf if e is None else e.high - e.low for e in alone]
     assert found.high - found.low < 0.6 * np.median(widths)
@@ -81,7 +81,7 @@ def test_voyages_do_not_run_into_each_other():
 
 
 def test_a_long_voyage_leaves_room_for_the_others(monkeypatch):
-    monkeypatch.setattr(parity_campaign, "MOST_ROWS", 400)
+    monkeypatch.setattr(campaign_consistency, "MOST_ROWS", 400)
     both = together([motion(0, 100.0), motion(1, 10.0)])
     assert np.flatnonzero(both.starts).tolist() == [0, 200] and len(both.starts) == 300
 

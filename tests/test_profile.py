@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import sailing
 
-from pipelines import profile_reference
+from pipelines.experiments import profile_reference
 from shiplog import profile, units
 from shiplog.exceptions import ProfileError
 
@@ -61,7 +61,9 @@ def test_a_profile_that_is_no_text_or_no_file(tmp_path):
 
 def test_the_reference_is_what_the_code_reads():
     page = (Path(__file__).parent.parent / "docs" / "profile.md").read_text(encoding="utf-8")
-    assert page == profile_reference.text(), "python -m pipelines.profile_reference --markdown ..."
+    assert page == profile_reference.text(), (
+        "python -m pipelines.experiments.profile_reference --markdown ..."
+    )
 
 
 def test_the_reference_has_every_key_kind_channel_and_unit():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shiplog import quality
+from shiplog.voyages import fault_detection
 
 RNG = np.random.default_rng(1)
 TIME = np.arange(0, 60, 0.1)
@@ -14,51 +14,53 @@ def test_a_spike_is_found_and_a_step_is_not():
     value = (0.3 * TIME + RNG.normal(0, 0.01, 600))[:, None]
     value[200] += 1.0
     value[400:] += 1.0
-    assert np.flatnonzero(quality.spikes(value, 0.01)).tolist() == [200]
+    assert np.flatnonzero(fault_detection.spikes(value, 0.01)).tolist() == [200]
 
 
 def test_a_hard_turn_is_no_spike():
     value = np.sin(2 * np.pi * TIME / 20)[:, None] * 0.5 + RNG.normal(0, 0.002, (600, 1))
-    assert not quality.spikes(value, 0.002).any()
+    assert not fault_detection.spikes(value, 0.002).any()
 
 
 def test_a_held_position_is_found_only_while_the_ship_moves():
     position = np.stack((0.5 * TIME, np.zeros(600)), axis=1)
     position[300:310] = position[299]
-    runs = quality.repeats(position)
-    moving = quality.held_on_grid(GRID, GRID, runs, 0.5 * TIME, least=0.06)
-    at_rest = quality.held_on_grid(GRID, GRID, runs, np.zeros(600), least=0.06)
+    runs = fault_detection.repeats(position)
+    moving = fault_detection.held_on_grid(GRID, GRID, runs, 0.5 * TIME, least=0.06)
+    at_rest = fault_detection.held_on_grid(GRID, GRID, runs, np.zeros(600), least=0.06)
     assert moving == [(299, 309)]
     assert at_rest == []
 
 
 def test_a_coarse_instrument_is_not_called_held():
     coarse = np.round(RNG.normal(0, 0.3, 600))[:, None]
-    assert quality.improbable(quality.repeats(coarse), 600) == []
+    assert fault_detection.improbable(fault_detection.repeats(coarse), 600) == []
     stuck = RNG.normal(0, 0.3, 600)[:, None]
     stuck[100] = stuck[99]
     stuck[200:215] = stuck[199]
-    assert quality.improbable(quality.repeats(stuck), 600) == [(200, 214)]
+    assert fault_detection.improbable(fault_detection.repeats(stuck), 600) == [(200, 214)]
 
 
 @pytest.mark.parametrize("step", [1.0, 0.01, 1.0 / 3.0])
 def test_the_step_in_which_an_instrument_counts_is_found(step):
     motion = np.cumsum(RNG.normal(0, 3.0 * step, 600))
-    assert quality.resolution(step * np.round(motion / step)[:, None]) == pytest.approx(step)
-    assert quality.resolution(motion[:, None]) == 0.0
+    assert fault_detection.resolution(step * np.round(motion / step)[:, None]) == pytest.approx(
+        step
+    )
+    assert fault_detection.resolution(motion[:, None]) == 0.0
     both = np.stack((motion, step * np.round(motion / step)), axis=1)
-    assert quality.resolution(both) == pytest.approx(step)
+    assert fault_detection.resolution(both) == pytest.approx(step)
 
 
 def test_an_instrument_that_hardly_moves_shows_no_step():
-    assert quality.resolution(np.repeat(np.arange(4.0), 100)[:, None]) == 0.0
+    assert fault_detection.resolution(np.repeat(np.arange(4.0), 100)[:, None]) == 0.0
 
 
 def test_a_lost_second_is_a_jump_with_its_size():
     position = np.stack((0.5 * TIME, np.zeros(600)), axis=1) + RNG.normal(0, 0.002, (600, 2))
     position[350:, 0] += 0.5  # a second's way
     rate = np.tile([0.5, 0.0], (600, 1))
-    ((row, size),) = quality.jumps(position, rate, np.ones(600, bool), noise=0.002)
+    ((row, size),) = fault_detection.jumps(position, rate, np.ones(600, bool), noise=0.002)
     assert row == 350 and abs(size - 0.5) < 0.02
 
 
@@ -69,12 +71,14 @@ def test_a_gap_that_the_ship_sailed_through_is_no_jump_but_a_clock_step_is():
     sailed = np.stack((0.5 * TIME, np.zeros(600)), axis=1) + RNG.normal(0, 0.002, (600, 2))
     stepped = sailed.copy()
     stepped[230:, 0] -= 1.5  # three seconds on the clock in which the ship did not move on
-    assert quality.jumps(sailed, rate, usable, 0.002) == []
-    assert [row for row, _ in quality.jumps(stepped, rate, usable, 0.002)] == [230]
+    assert fault_detection.jumps(sailed, rate, usable, 0.002) == []
+    assert [row for row, _ in fault_detection.jumps(stepped, rate, usable, 0.002)] == [230]
 
 
 def test_long_lists_are_counted_not_cut():
-    findings = quality.said("gap", "wind", [(float(i), i + 0.5) for i in range(30)], "is silent")
-    assert len(findings) == quality.LISTED + 1
+    findings = fault_detection.said(
+        "gap", "wind", [(float(i), i + 0.5) for i in range(30)], "is silent"
+    )
+    assert len(findings) == fault_detection.LISTED + 1
     assert "10 more stretches" in findings[-1].sentence
     assert findings[-1].value == 5.0

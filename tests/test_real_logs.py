@@ -8,9 +8,9 @@ import pytest
 from test_cli import call
 
 from pipelines.prepare import seconds
-from pipelines.split import plan
-from shiplog import table
-from shiplog.store import Store
+from shiplog.voyages import one_hertz
+from shiplog.voyages.split import plan
+from shiplog.voyages.store import Store
 
 pytestmark = pytest.mark.shared
 TWIN = "turn_cut_14-Sep-2020_15_58_08"  # the first 287 s of turn_14-Sep-2020_15_58_08
@@ -60,7 +60,7 @@ def test_the_trials_give_the_119_windows_and_one_pair_of_twins(trials):
     windows = plan(rows, "ref", 100)
     assert windows.filter(pl.col("voyage") != TWIN).height == 119
     assert "berthing_12-Nov-2020_13_37_05" not in windows["voyage"]  # 92 s long
-    assert table.shared_rows(rows).select("left", "right").rows() == [
+    assert one_hertz.shared_rows(rows).select("left", "right").rows() == [
         ("turn_14-Sep-2020_15_58_08", TWIN)
     ]
 

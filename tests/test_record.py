@@ -9,9 +9,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import midship, record
+from shiplog import frames
 from shiplog import profile as profiles
 from shiplog.channels import Quality
+from shiplog.voyages import recording
 
 PROFILE = profiles.load("esso-vectwin")
 BODY = profiles.load("esso-osaka")
@@ -45,7 +46,7 @@ def faulty(count: int, *gaps: tuple[int, int], mark: Quality = Quality.GAP) -> n
 
 
 def read(*tables: pl.DataFrame, profile=PROFILE):
-    return record.read(tables, [f"v{i}" for i in range(len(tables))], profile)
+    return recording.read(tables, [f"v{i}" for i in range(len(tables))], profile)
 
 
 # --- gaps -----------------------------------------------------------------------------------------
@@ -126,7 +127,7 @@ def test_true_wind_turns_with_the_ship():
 def test_voyages_stand_in_order_of_time_with_their_share():
     late = table(60, DAY + timedelta(days=3), y0=np.full(60, 3.0))
     early = table(40, DAY, y0=np.full(40, 1.0))
-    found = record.read([late, early], ["late", "early"], PROFILE)
+    found = recording.read([late, early], ["late", "early"], PROFILE)
     assert found.names == ("early", "late")
     assert (found.state[:40, 2] == 1.0).all() and (found.state[40:, 2] == 3.0).all()
     assert found.voyage.tolist() == [0] * 40 + [1] * 60
@@ -189,15 +190,15 @@ def test_sights_are_reduced_as_ingest_does(profile):
     """`reduced` undoes `sighted`, and both are the formulas of `midship`."""
     seen = closed.record(profile)
     sight = seen.sighted
-    again = record.reduced(seen, sight)
+    again = recording.reduced(seen, sight)
     assert again.state == pytest.approx(seen.state, abs=1e-12)
     arm = profile.sensors.position.lever_arm_m
-    at = midship.position_at_midship(sight.position, seen.state[:, 4], arm)
+    at = frames.position_at_midship(sight.position, seen.state[:, 4], arm)
     assert at == pytest.approx(seen.state[:, [0, 2]], abs=1e-12)
     velocity = sight.velocity
     if profile is PROFILE:
-        velocity = midship.to_body(velocity, seen.state[:, 4])
-    going = midship.velocity_at_midship(
+        velocity = frames.to_body(velocity, seen.state[:, 4])
+    going = frames.velocity_at_midship(
         velocity, seen.state[:, 5], profile.sensors.velocity.lever_arm_m
     )
     assert going == pytest.approx(seen.state[:, [1, 3]], abs=1e-12)
@@ -216,7 +217,7 @@ def test_an_antenna_that_is_sighted_moves_as_its_velocity_says():
 def test_an_antenna_elsewhere_takes_its_velocity_along():
     seen = closed.record(PROFILE)
     sight = seen.sighted
-    found = record.reduced(seen, sight, (0.4, -0.1))
+    found = recording.reduced(seen, sight, (0.4, -0.1))
     c, s, r = np.cos(seen.state[:, 4]), np.sin(seen.state[:, 4]), seen.state[:, 5]
     back = found.state - seen.state
     assert back[:, 0] == pytest.approx(-(0.4 * c + 0.1 * s), abs=1e-12)

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from test_identify import Straight, driven, measured, noisy
 
-from shiplog import ridge, sensitivity
-from shiplog.crossvalidation import as_good
-from shiplog.identify import Identified, identify
-from shiplog.sensitivity import Series
+from shiplog.simulation import sensitivities
+from shiplog.simulation.sensitivities import Series
+from shiplog.training import regularisation
+from shiplog.training.cross_validation import as_good
+from shiplog.training.output_error import Identified, identify
 
 FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 START = np.array([0.05, 0.03, 0.0])
@@ -19,9 +20,9 @@ def judged(data: Series, unseen: Series, spread: np.ndarray):
     def fit(factor: float, begin: np.ndarray | None) -> Identified:
         return identify(Straight(), START, spread, data, factor=factor, begin=begin)
 
-    found = ridge.ladder(fit, FACTORS)
+    found = regularisation.ladder(fit, FACTORS)
     return found, {
-        f: sensitivity.losses(Straight(), one.values, unseen) for f, one in found.items()
+        f: sensitivities.losses(Straight(), one.values, unseen) for f, one in found.items()
     }
 
 
@@ -39,7 +40,7 @@ def test_a_voyage_that_says_nothing_is_not_listened_to():
     off = np.array([abs(one.values[1] - START[1]) for one in found.values()])
     assert (np.diff(off) > 0).all() and off[-1] > 5.0 * off[0]
     assert (np.diff([loss.mean() for loss in losses.values()]) > 0).all()
-    assert ridge.choose(losses) == 0.25
+    assert regularisation.choose(losses) == 0.25
 
 
 def test_a_voyage_that_misleads_is_held_back():
@@ -54,7 +55,7 @@ def test_a_voyage_that_misleads_is_held_back():
     slope = np.concatenate((np.zeros((8, 1)), np.cumsum(unseen.actuator[:, :-1, 0], 1)), 1)
     ahead = ((found[4.0].values[0] - START[0]) * slope * 100.0) ** 2
     assert losses[4.0].mean() > np.trapezoid(ahead, axis=1).mean() > 0.0
-    assert ridge.choose(losses) == 0.25
+    assert regularisation.choose(losses) == 0.25
 
 
 def test_a_start_that_two_voyages_contradict_is_let_go():
@@ -63,7 +64,7 @@ def test_a_start_that_two_voyages_contradict_is_let_go():
     data = noisy(measured(Straight(), truth, driven(2, seed=1)), seed=2, sigma=0.5)
     unseen = measured(Straight(), truth, driven(2, seed=3))
     _, losses = judged(data, unseen, np.full(3, 0.001))
-    assert ridge.choose(losses) > 1.0
+    assert regularisation.choose(losses) > 1.0
 
 
 def test_each_rung_is_the_fit_with_that_ridge_alone():
@@ -88,7 +89,7 @@ def test_rungs_begin_where_their_neighbour_ended():
             np.array([factor]), np.eye(1), np.ones(1, bool), 1.0, (1.0, 1.0), 1, True, ""
         )
 
-    assert list(ridge.ladder(fit, (4.0, 0.25, 0.5, 2.0))) == [0.25, 0.5, 1.0, 2.0, 4.0]
+    assert list(regularisation.ladder(fit, (4.0, 0.25, 0.5, 2.0))) == [0.25, 0.5, 1.0, 2.0, 4.0]
     assert begun == {1.0: None, 2.0: 1.0, 4.0: 2.0, 0.5: 1.0, 0.25: 0.5}
 
 
@@ -120,23 +121,23 @@ def windows(**less: float) -> dict[float, np.ndarray]:
     ],
 )
 def test_the_nearest_to_plausible_within_one_standard_error_is_chosen(less, wanted):
-    assert ridge.choose(windows(**less)) == wanted
+    assert regularisation.choose(windows(**less)) == wanted
 
 
 def test_too_few_windows_overrule_nothing():
-    assert ridge.choose({1.0: np.array([300.0]), 0.5: np.array([3.0])}) == 1.0
+    assert regularisation.choose({1.0: np.array([300.0]), 0.5: np.array([3.0])}) == 1.0
     lost = {1.0: np.array([300.0, np.inf]), 0.5: np.array([3.0, np.inf])}
-    assert as_good(lost) == [] and ridge.choose(lost) == 1.0
+    assert as_good(lost) == [] and regularisation.choose(lost) == 1.0
 
 
 def test_a_ridge_that_lets_a_window_run_away_is_no_choice():
     losses = windows(f05=-50.0, f2=50.0)
     losses[2.0][3] = np.inf
-    assert ridge.choose(losses) == 1.0
+    assert regularisation.choose(losses) == 1.0
     for one in losses.values():
         one[5] = np.inf  # what every one of them loses says nothing
     losses[2.0][3] = losses[1.0][3] - 50.0
-    assert ridge.choose(losses) == 2.0
+    assert regularisation.choose(losses) == 2.0
     losses[1.0][6] = np.inf  # here the plausible one loses what the looser one holds
     losses[0.5][6] = np.inf
-    assert ridge.choose(losses) == 2.0
+    assert regularisation.choose(losses) == 2.0

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from jax.typing import ArrayLike
 
-from pipelines.hidden_effects import plan, rivals, run, score, suites, tables
-from pipelines.hidden_effects.plan import Planned
-from pipelines.hidden_effects.score import Answer, Sealed
-from shiplog.columns import Columns
-from shiplog.linearise import Linear
-from shiplog.linearise import Path as Along
-from shiplog.segments import BIN, Cut
+from pipelines.experiments.hidden_effects import plan, rivals, run, score, score_tables, suites
+from pipelines.experiments.hidden_effects.plan import Planned
+from pipelines.experiments.hidden_effects.score import Answer, Sealed
+from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linearisation import Path as Along
+from shiplog.diagnosis.parameter_layout import Columns
+from shiplog.diagnosis.segments import BIN, Cut
 
 ROOT = Path(__file__).parent.parent
 OURS = ("pipelines.", "shiplog.")
@@ -211,7 +211,7 @@ def test_noise_and_coefficients_of_the_usual_voyages_are_learnt():
 
 def methods(**named):
     ranking = [{"name": "current", "score": 3.0}]
-    return {n: {"answer": named.get(n), "ranking": ranking} for n in tables.RIVALS}
+    return {n: {"answer": named.get(n), "ranking": ranking} for n in score_tables.RIVALS}
 
 
 def sealed(path: Path, content) -> None:
@@ -265,7 +265,7 @@ def test_the_table_counts_by_hand():
         answer(None, [], rivals=methods()),
         answer("current", [], steps=[{"step": "rivals", "rc": 1}]),  # they failed: no part of it
     ]  # fmt: skip
-    lines = tables.methods(answers).splitlines()
+    lines = score_tables.methods(answers).splitlines()
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[:-1]]
     assert rows[0][0] == "method, 6 cases"
     assert rows[0][1:] == ["size 1", "0.3 to 1", "500 s", "nothing hidden: a cause named"]
@@ -277,8 +277,8 @@ def test_the_table_counts_by_hand():
     ]  # fmt: skip
     assert rows[-1][0] == "shiplog diagnose"
     assert lines[-1] == "1 more where the simpler methods failed"
-    assert "method, 6 cases" in tables.text(score.Score("goals", tuple(answers), (), ()))
-    assert "method," not in tables.text(score.Score("goals", tuple(answers[-1:]), (), ()))
+    assert "method, 6 cases" in score_tables.text(score.Score("goals", tuple(answers), (), ()))
+    assert "method," not in score_tables.text(score.Score("goals", tuple(answers[-1:]), (), ()))
 
 
 # --- the step -------------------------------------------------------------------------------------
@@ -383,7 +383,7 @@ def imported(source: Path):
 
 def test_rivals_know_nothing_of_the_simulator():
     """Nor does anything of ours that they import, however far down."""
-    met, waiting = set(), ["pipelines.hidden_effects.rivals"]
+    met, waiting = set(), ["pipelines.experiments.hidden_effects.rivals"]
     while waiting:
         name = waiting.pop()
         path = ROOT / name.replace(".", "/")
@@ -392,5 +392,5 @@ def test_rivals_know_nothing_of_the_simulator():
             continue
         met.add(name)
         waiting += [module for module in imported(source) if module.startswith(OURS)]
-    assert "shiplog.hypotheses" in met
-    assert not any(name.startswith("pipelines.known_ship") for name in met)
+    assert "shiplog.diagnosis.evidence" in met
+    assert not any(name.startswith("pipelines.experiments.simulated_ship") for name in met)

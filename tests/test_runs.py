@@ -6,12 +6,11 @@ import sailing
 import torch
 from small_networks import network, windows
 
-from shiplog import runs
-from shiplog.config import Config, Network, Paper, Split
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
-from shiplog.training import network_gradient
+from shiplog.training import network_gradient, run_folder
 from shiplog.training.network_training import paper
+from shiplog.training.run_config import Config, Network, Paper, Split
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))
@@ -25,7 +24,7 @@ ROWS = pl.DataFrame({"voyage": ["a"] * 3, "surge": [0.1, 0.2, 0.3]})
 def begun(tmp_path):
     data = windows(5, 12, actuators=2)
     model = network(SHAPE, data).float()
-    run = runs.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    run = run_folder.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
     batches = [network_gradient.batch(data, model.scaling, SHAPE, torch.float32)] * 2
     return run, model, batches
 
@@ -36,7 +35,7 @@ def test_a_run_comes_back_as_it_was(begun):
     for seed in CONFIG.seeds:
         run.save_seed(seed, progress)
     done = run.finish({"shiplog": "test"})
-    opened = runs.load(done.path)
+    opened = run_folder.load(done.path)
     assert opened.config == CONFIG
     assert opened.label == "feedforward ref (paper recipe, wind angle)"
     assert opened.profile.model_dump() == PROFILE.model_dump()
@@ -65,25 +64,25 @@ def test_the_same_command_goes_on_and_another_is_refused(begun):
     run, model, batches = begun
     run.save_seed(0, paper(model, *batches, Paper(most_epochs=1), seed=0))
     out = run.path.with_name("run")
-    again = runs.create(out, CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    again = run_folder.create(out, CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
     assert again.finished(0)
     other = CONFIG.model_copy(update={"window": 50})
     with pytest.raises(RunError, match="other settings"):
-        runs.create(out, other, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+        run_folder.create(out, other, PROFILE, model.scaling, ROWS, ROWS, ROWS)
     moved = ROWS.with_columns(surge=pl.col("surge") + 0.1)
     with pytest.raises(RunError, match="other settings or data"):
-        runs.create(out, CONFIG, PROFILE, model.scaling, ROWS, moved, ROWS)
+        run_folder.create(out, CONFIG, PROFILE, model.scaling, ROWS, moved, ROWS)
 
 
 def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path):
     run, model, _ = begun
     with pytest.raises(RunError, match="not finished"):
-        runs.load(tmp_path / "run")
+        run_folder.load(tmp_path / "run")
     with pytest.raises(RunError, match="no run"):
-        runs.load(tmp_path / "nothing")
+        run_folder.load(tmp_path / "nothing")
     run.path.rename(tmp_path / "run")
     with pytest.raises(RunError, match="exists already"):
-        runs.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+        run_folder.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
 
 
 def test_a_torn_weight_file_is_named(begun):
@@ -96,5 +95,5 @@ def test_a_torn_weight_file_is_named(begun):
 
 
 def test_json_has_no_infinity(tmp_path):
-    runs.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
+    run_folder.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
     assert (tmp_path / "a.json").read_text().count("null") == 2

@@ -13,13 +13,13 @@ import pytest
 import torch
 
 from shiplog import profile as profiles
-from shiplog import sensitivity
-from shiplog.evaluate import prediction_error, window_loss
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.sensitivity import Series
-from shiplog.windows import Windows
+from shiplog.simulation import sensitivities
+from shiplog.simulation.scoring import prediction_error, window_loss
+from shiplog.simulation.sensitivities import Series
+from shiplog.voyages.windows import Windows
 
 
 @jax.tree_util.register_static
@@ -95,9 +95,9 @@ def coupled():
 
 def test_a_ship_at_rest_heading_north_has_an_east_wind_from_starboard():
     rest = np.zeros(6)
-    found = sensitivity.true_wind(rest, np.array([5.0, math.pi / 2]))
+    found = sensitivities.true_wind(rest, np.array([5.0, math.pi / 2]))
     assert found == pytest.approx([0.0, 5.0], abs=1e-12)
-    assert sensitivity.apparent_wind(rest, found) == pytest.approx([5.0, math.pi / 2])
+    assert sensitivities.apparent_wind(rest, found) == pytest.approx([5.0, math.pi / 2])
 
 
 @pytest.mark.parametrize(
@@ -112,16 +112,16 @@ def test_a_ship_at_rest_heading_north_has_an_east_wind_from_starboard():
 )
 def test_apparent_winds_worked_by_hand(state, true, apparent):
     state, true, apparent = (np.array(a, dtype=float) for a in (state, true, apparent))
-    assert sensitivity.apparent_wind(state, true) == pytest.approx(apparent, abs=1e-12)
-    assert sensitivity.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
+    assert sensitivities.apparent_wind(state, true) == pytest.approx(apparent, abs=1e-12)
+    assert sensitivities.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
 
 
 def test_true_and_apparent_wind_are_inverses():
     rng = np.random.default_rng(0)
     state, true = rng.normal(size=(4, 7, 6)), rng.normal(size=(4, 7, 2)) * 3.0
-    apparent = sensitivity.apparent_wind(state, true)
+    apparent = sensitivities.apparent_wind(state, true)
     assert apparent.shape == (4, 7, 2) and (np.abs(apparent[..., 1]) <= math.pi).all()
-    assert sensitivity.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
+    assert sensitivities.true_wind(state, apparent) == pytest.approx(true, abs=1e-12)
 
 
 # ---------------------------------------------------------------- series
@@ -136,11 +136,11 @@ def windows(data: Series, wind: np.ndarray | None = None) -> Windows:
 
 def test_windows_become_a_series_over_ground(coupled):
     _, _, data = coupled
-    apparent = sensitivity.apparent_wind(data.measured, data.wind)
-    found = sensitivity.series(windows(data, apparent))
+    apparent = sensitivities.apparent_wind(data.measured, data.wind)
+    found = sensitivities.series(windows(data, apparent))
     for name in Series._fields:
         assert getattr(found, name) == pytest.approx(getattr(data, name), abs=1e-12), name
-    calm = sensitivity.series(windows(data))  # no sensor
+    calm = sensitivities.series(windows(data))  # no sensor
     assert calm.wind.shape == data.wind.shape and not calm.wind.any()
 
 
@@ -156,7 +156,7 @@ def test_samples_weigh_by_the_trapezoidal_rule(coupled):
 @pytest.mark.parametrize(("count", "size"), [(1, 8), (8, 8), (9, 16), (128, 128), (129, 256)])
 def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
     data = sailed(count, 4, 1, (1.0,))
-    whole = sensitivity.padded(data)
+    whole = sensitivities.padded(data)
     for name in Series._fields:
         values = getattr(whole, name)
         assert len(values) == size
@@ -167,7 +167,7 @@ def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
 
 def test_picked_windows_keep_all_that_is_theirs(coupled):
     data = coupled[2]
-    some = sensitivity.pick(data, [3, 0])
+    some = sensitivities.pick(data, [3, 0])
     for name in Series._fields:
         assert (getattr(some, name) == getattr(data, name)[[3, 0]]).all()
 
@@ -178,7 +178,7 @@ def test_picked_windows_keep_all_that_is_theirs(coupled):
 def test_the_rate_turns_velocities_into_earth_axes():
     """Heading east: ahead is y₀, starboard is -x₀."""
     state = jnp.array([7.0, 2.0, 7.0, 0.5, math.pi / 2, 0.1])
-    found = sensitivity.rate(Damped(), jnp.ones(3), state, jnp.zeros(3), jnp.zeros(2))
+    found = sensitivities.rate(Damped(), jnp.ones(3), state, jnp.zeros(3), jnp.zeros(2))
     assert np.asarray(found) == pytest.approx([-0.5, -2.0, 2.0, -0.5, 0.1, -0.1], abs=1e-12)
 
 
@@ -188,7 +188,7 @@ def test_a_rollout_is_euler_in_closed_form_over_uneven_steps(substeps):
     data = sailed(3, 12, 2, (0.02, 0.01, 0.001))
     driven = np.repeat(data.actuator[:, :1], 12, axis=1)
     theta = np.array([0.1, 0.3, 0.2])
-    found = sensitivity.rollout(Damped(substeps), theta, data._replace(actuator=driven))
+    found = sensitivities.rollout(Damped(substeps), theta, data._replace(actuator=driven))
     assert found.shape == data.measured.shape
     assert (found[:, 0] == data.measured[:, 0]).all()
     shrink = (1.0 - theta * data.dt[..., None] / substeps) ** substeps
@@ -204,7 +204,7 @@ def test_a_rollout_is_euler_in_closed_form_over_uneven_steps(substeps):
 def test_inputs_act_in_the_step_that_they_begin():
     data = sailed(1, 5, 3, (1.0, 1.0, 1.0))._replace(actuator=np.zeros((1, 5, 3)))
     data.actuator[0, 2, 0] = 1.0
-    found = sensitivity.rollout(Damped(), np.zeros(3), data)[0, :, 1]
+    found = sensitivities.rollout(Damped(), np.zeros(3), data)[0, :, 1]
     assert np.diff(found) == pytest.approx([0.0, 0.0, data.dt[0, 2], 0.0], abs=1e-15)
 
 
@@ -218,7 +218,7 @@ def test_halving_the_step_halves_eulers_error():
     exact = rest + (data.measured[:, 0, [1, 3, 5]] - rest) * np.exp(-theta * elapsed)
     held = data._replace(actuator=driven)
     error = [
-        sensitivity.rollout(Damped(k), theta, held)[:, -1, [1, 3, 5]] - exact for k in (2, 4, 8)
+        sensitivities.rollout(Damped(k), theta, held)[:, -1, [1, 3, 5]] - exact for k in (2, 4, 8)
     ]
     for coarse, fine in itertools.pairwise(error):
         assert coarse / fine == pytest.approx(np.full_like(fine, 2.0), abs=0.2)
@@ -228,28 +228,28 @@ def test_halving_the_step_halves_eulers_error():
 def test_a_turning_ships_path_converges_at_the_first_order_too(coupled):
     """Each halving changes the end half as much as the one before."""
     model, theta, data = coupled
-    end = [sensitivity.rollout(replace(model, substeps=k), theta, data)[:, -1] for k in (2, 4, 8)]
+    end = [sensitivities.rollout(replace(model, substeps=k), theta, data)[:, -1] for k in (2, 4, 8)]
     change = [np.linalg.norm(a - b) for a, b in itertools.pairwise(end)]
     assert change[0] / change[1] == pytest.approx(2.0, abs=0.1)
 
 
 def test_padding_and_neighbours_change_no_rollout(coupled):
     model, theta, data = coupled
-    together = sensitivity.rollout(model, theta, data)
-    assert sensitivity.rollout(model, theta, sensitivity.padded(data))[:5] == pytest.approx(
+    together = sensitivities.rollout(model, theta, data)
+    assert sensitivities.rollout(model, theta, sensitivities.padded(data))[:5] == pytest.approx(
         together, rel=1e-12
     )
-    alone = sensitivity.rollout(model, theta, sensitivity.pick(data, [4]))
+    alone = sensitivities.rollout(model, theta, sensitivities.pick(data, [4]))
     assert alone[0] == pytest.approx(together[4], rel=1e-12)
 
 
 def test_simulated_windows_are_the_rollout(coupled):
     model, theta, data = coupled
-    apparent = sensitivity.apparent_wind(data.measured, data.wind)
-    simulator = sensitivity.Simulator(model, theta, np.zeros((4, 4)))
+    apparent = sensitivities.apparent_wind(data.measured, data.wind)
+    simulator = sensitivities.Simulator(model, theta, np.zeros((4, 4)))
     found = simulator.simulate(windows(data, apparent))
     assert found.dtype == torch.float64
-    assert found.numpy() == pytest.approx(sensitivity.rollout(model, theta, data), abs=1e-10)
+    assert found.numpy() == pytest.approx(sensitivities.rollout(model, theta, data), abs=1e-10)
     found += 1.0  # a tensor of one's own, to be written to
 
 
@@ -260,7 +260,7 @@ def test_the_derivative_of_a_damped_motion_in_closed_form():
     """u_k = u₀ ∏ (1 - θ dt): ∂u/∂θ = -u Σ dt/(1 - θ dt); no other parameter moves it."""
     data = sailed(2, 12, 4, (0.0, 0.0, 0.0))
     theta = np.array([0.1, 0.3, 0.2])
-    states, slopes = sensitivity.linearised(Damped(), theta, data)
+    states, slopes = sensitivities.linearised(Damped(), theta, data)
     assert slopes.shape == (2, 12, 6, 3)
     for i, row in enumerate((1, 3, 5)):
         total = np.cumsum(data.dt / (1.0 - theta[i] * data.dt), axis=1)
@@ -270,10 +270,10 @@ def test_the_derivative_of_a_damped_motion_in_closed_form():
 
 def differ(model, theta, data, scale):
     """Slopes, central differences, and the size of each parameter's greatest effect a row."""
-    states, slopes = sensitivity.linearised(model, theta, data)
-    assert states == pytest.approx(sensitivity.rollout(model, theta, data), rel=1e-12)
+    states, slopes = sensitivities.linearised(model, theta, data)
+    assert states == pytest.approx(sensitivities.rollout(model, theta, data), rel=1e-12)
     assert not slopes[:, 0].any()
-    numeric = central(theta, lambda t: sensitivity.rollout(model, t, data), scale)
+    numeric = central(theta, lambda t: sensitivities.rollout(model, t, data), scale)
     return slopes, numeric, np.abs(numeric).max((0, 1), keepdims=True)
 
 
@@ -307,9 +307,9 @@ def test_derivatives_of_the_mmg_are_the_central_differences():
 def test_the_spread_of_one_uncertain_parameter_is_its_slope():
     """σ_u = σ_θ |∂u/∂θ|, the parameters that do not move it adding nothing."""
     data, theta = sailed(2, 12, 4, (0.0, 0.0, 0.0)), np.array([0.1, 0.3, 0.2])
-    _, slopes = sensitivity.linearised(Damped(), theta, data)
+    _, slopes = sensitivities.linearised(Damped(), theta, data)
     sigma = np.array([0.01, 0.02, 0.03])
-    found = sensitivity.spread(Damped(), theta, np.diag(sigma**2), data)
+    found = sensitivities.spread(Damped(), theta, np.diag(sigma**2), data)
     for i, row in enumerate((1, 3, 5)):
         assert found[..., row] == pytest.approx(sigma[i] * np.abs(slopes[..., row, i]))
     assert not found[:, 0].any()
@@ -318,11 +318,11 @@ def test_the_spread_of_one_uncertain_parameter_is_its_slope():
 def test_parameters_that_err_together_spread_by_their_sum(coupled, monkeypatch):
     """Fully correlated errors σ add up before they are squared: |Σ σ ∂x/∂θ|. Chunk by chunk."""
     model, theta, data = coupled
-    _, slopes = sensitivity.linearised(model, theta, data)
+    _, slopes = sensitivities.linearised(model, theta, data)
     sigma = np.array([0.01, -0.02, 0.003, 0.001])
-    monkeypatch.setattr(sensitivity, "CHUNK", 8)
-    many = sensitivity.pick(data, [0, 1, 2, 3, 4] * 3)
-    found = sensitivity.spread(model, theta, np.outer(sigma, sigma), many)
+    monkeypatch.setattr(sensitivities, "CHUNK", 8)
+    many = sensitivities.pick(data, [0, 1, 2, 3, 4] * 3)
+    found = sensitivities.spread(model, theta, np.outer(sigma, sigma), many)
     assert found == pytest.approx(np.tile(np.abs(slopes @ sigma), (3, 1, 1)), abs=1e-7)
 
 
@@ -331,27 +331,27 @@ def test_parameters_that_err_together_spread_by_their_sum(coupled, monkeypatch):
 
 def test_losses_are_the_papers(coupled):
     model, theta, data = coupled
-    states = torch.tensor(sensitivity.rollout(model, theta, data))
+    states = torch.tensor(sensitivities.rollout(model, theta, data))
     wanted = window_loss(
         prediction_error(states, torch.from_numpy(data.measured)), torch.from_numpy(data.dt)
     ).numpy()
-    assert sensitivity.losses(model, theta, data) == pytest.approx(wanted, rel=1e-10)
-    assert sensitivity.normal(model, theta, data).loss == pytest.approx(wanted, rel=1e-10)
+    assert sensitivities.losses(model, theta, data) == pytest.approx(wanted, rel=1e-10)
+    assert sensitivities.normal(model, theta, data).loss == pytest.approx(wanted, rel=1e-10)
 
 
 def test_a_rollout_that_diverges_has_an_infinite_loss_of_its_own(coupled):
     model, theta, data = coupled
     wild = data._replace(actuator=data.actuator.copy())
     wild.actuator[1, :, 0] = np.inf
-    found, before = (sensitivity.losses(model, theta, d) for d in (wild, data))
+    found, before = (sensitivities.losses(model, theta, d) for d in (wild, data))
     assert found[1] == np.inf
     assert np.delete(found, 1) == pytest.approx(np.delete(before, 1))
 
 
 def test_the_pull_is_half_the_gradient(coupled):
     model, theta, data = coupled
-    found = sensitivity.normal(model, theta, data).pull
-    numeric = central(theta, lambda t: sensitivity.losses(model, t, data), COUPLED)
+    found = sensitivities.normal(model, theta, data).pull
+    numeric = central(theta, lambda t: sensitivities.losses(model, t, data), COUPLED)
     assert found == pytest.approx(0.5 * numeric, rel=1e-6)
 
 
@@ -359,21 +359,21 @@ def test_the_gram_is_the_sum_of_squared_weighted_slopes(coupled):
     """√dt of the trapezoidal rule, and 100, 100, 10 · 180/π: m/s, m/s, deg/s."""
     model, theta, data = coupled
     weight = np.array([1.0, 0.5, 2.0, 0.0, 1.0])
-    _, slopes = sensitivity.linearised(model, theta, data)
+    _, slopes = sensitivities.linearised(model, theta, data)
     jacobian = slopes[:, :, [1, 3, 5]] * np.array([100.0, 100.0, 1800.0 / math.pi])[:, None]
     wanted = np.einsum("n,nk,nkip,nkiq->pq", weight, data.steps, jacobian, jacobian)
-    found = sensitivity.normal(model, theta, data._replace(weight=weight))
+    found = sensitivities.normal(model, theta, data._replace(weight=weight))
     assert found.gram == pytest.approx(wanted, rel=1e-10)
     assert found.gram == pytest.approx(found.gram.T, rel=1e-12)
-    plain = sensitivity.normal(model, theta, data)
+    plain = sensitivities.normal(model, theta, data)
     assert found.loss.tolist() == plain.loss.tolist()  # each window's own, whatever its weight
     assert found.pull.tolist() == plain.pull.tolist()
 
 
 def test_windows_of_no_weight_are_left_out(coupled):
     model, theta, data = coupled
-    some = sensitivity.normal(model, theta, sensitivity.pick(data, [0, 2]))
-    weighed = sensitivity.normal(model, theta, data._replace(weight=np.array([1.0, 0, 1, 0, 0])))
+    some = sensitivities.normal(model, theta, sensitivities.pick(data, [0, 2]))
+    weighed = sensitivities.normal(model, theta, data._replace(weight=np.array([1.0, 0, 1, 0, 0])))
     assert weighed.gram == pytest.approx(some.gram, rel=1e-10)
     assert weighed.loss[[0, 2]] == pytest.approx(some.loss, rel=1e-12)
     assert weighed.pull[[0, 2]] == pytest.approx(some.pull, rel=1e-10)
@@ -382,16 +382,16 @@ def test_windows_of_no_weight_are_left_out(coupled):
 def test_a_gauss_newton_step_finds_the_parameters_again(coupled):
     """Half a percent off; one step of pull and gram leaves the square of that."""
     model, theta, data = coupled
-    made = data._replace(measured=sensitivity.rollout(model, theta, data))
+    made = data._replace(measured=sensitivities.rollout(model, theta, data))
     off = theta * (1.0 + 0.005 * np.array([1, -1, 1, -1]))
-    found = sensitivity.normal(model, off, made)
+    found = sensitivities.normal(model, off, made)
     better = off - np.linalg.solve(found.gram, found.pull.sum(0))
     assert better == pytest.approx(theta, rel=2e-4)
 
 
 def test_derivatives_by_some_parameters_are_those_among_all(coupled):
     model, theta, data = coupled
-    whole, some = (sensitivity.normal(model, theta, data, free) for free in (None, (1, 3)))
+    whole, some = (sensitivities.normal(model, theta, data, free) for free in (None, (1, 3)))
     assert some.loss == pytest.approx(whole.loss, rel=1e-12)
     assert some.pull == pytest.approx(whole.pull[:, [1, 3]], rel=1e-10)
     assert some.gram == pytest.approx(whole.gram[np.ix_([1, 3], [1, 3])], rel=1e-10)
@@ -400,10 +400,10 @@ def test_derivatives_by_some_parameters_are_those_among_all(coupled):
 def test_chunks_change_nothing(coupled, monkeypatch):
     model, theta, _ = coupled
     data = sailed(19, 30, 6, (1.0, 0.2))._replace(weight=np.linspace(0.0, 2.0, 19))
-    whole = sensitivity.normal(model, theta, data)
-    monkeypatch.setattr(sensitivity, "CHUNK", 8)
-    assert len(sensitivity.padded(data).weight) == 24
-    parts = sensitivity.normal(model, theta, data)
+    whole = sensitivities.normal(model, theta, data)
+    monkeypatch.setattr(sensitivities, "CHUNK", 8)
+    assert len(sensitivities.padded(data).weight) == 24
+    parts = sensitivities.normal(model, theta, data)
     assert parts.loss == pytest.approx(whole.loss, rel=1e-12)
     assert parts.pull == pytest.approx(whole.pull, rel=1e-10)
     assert parts.gram == pytest.approx(whole.gram, rel=1e-10)
@@ -413,10 +413,10 @@ def test_derivatives_hold_for_a_model_that_cuts_its_step(coupled):
     """Slopes of three Euler steps a second against central differences of the same rollout."""
     model, theta, data = coupled
     finer = replace(model, substeps=3)
-    states, slopes = sensitivity.linearised(finer, theta, data)
-    assert states == pytest.approx(sensitivity.rollout(finer, theta, data), abs=1e-12)
+    states, slopes = sensitivities.linearised(finer, theta, data)
+    assert states == pytest.approx(sensitivities.rollout(finer, theta, data), abs=1e-12)
     for i in range(len(theta)):
         step = np.zeros(len(theta))
         step[i] = SHIFT
-        up, down = (sensitivity.rollout(finer, theta + s * step, data) for s in (1.0, -1.0))
+        up, down = (sensitivities.rollout(finer, theta + s * step, data) for s in (1.0, -1.0))
         assert slopes[..., i] == pytest.approx((up - down) / (2.0 * SHIFT), rel=1e-3, abs=1e-7)

@@ -6,10 +6,10 @@ import polars as pl
 import pytest
 import torch
 
-from shiplog import evaluate, floors
 from shiplog.models.base import kinematics
-from shiplog.simulate import rollout, simulate
-from shiplog.windows import Windows
+from shiplog.simulation import baselines, scoring
+from shiplog.simulation.rollout import rollout, simulate
+from shiplog.voyages.windows import Windows
 
 
 def drag(state, actuator, wind):
@@ -37,7 +37,7 @@ def test_heading_counts_on_and_a_held_velocity_sails_a_circle():
     state = torch.tensor([[0.0, 0.8, 0.0, 0.0, 3.0, 0.04]], dtype=torch.float64)
     none = torch.zeros(1, 10001, 0, dtype=torch.float64)
     dt = torch.full((1, 10000), 0.01, dtype=torch.float64)
-    path = rollout(floors.hold, state, none, none, dt)[0]
+    path = rollout(baselines.hold, state, none, none, dt)[0]
     heading = 3.0 + 0.04 * 100.0
     assert path[-1, 4].item() == pytest.approx(heading)
     assert path[-1, 0].item() == pytest.approx(20 * (math.sin(heading) - math.sin(3.0)), abs=0.01)
@@ -47,7 +47,7 @@ def test_heading_counts_on_and_a_held_velocity_sails_a_circle():
 def test_a_drifting_ship_moves_over_ground_by_its_turned_velocity():
     state = torch.tensor([[1.0, 0.3, 2.0, 0.2, 0.7, 0.0]], dtype=torch.float64)
     none = torch.zeros(1, 11, 0, dtype=torch.float64)
-    path = rollout(floors.hold, state, none, none, torch.ones(1, 10, dtype=torch.float64))[0, -1]
+    path = rollout(baselines.hold, state, none, none, torch.ones(1, 10, dtype=torch.float64))[0, -1]
     c, s = math.cos(0.7), math.sin(0.7)
     assert path[0].item() == pytest.approx(1.0 + 10 * (0.3 * c - 0.2 * s))
     assert path[2].item() == pytest.approx(2.0 + 10 * (0.3 * s + 0.2 * c))
@@ -70,7 +70,7 @@ def still(state, actuator, wind):
 def test_the_error_has_the_papers_weights_and_degrees():
     """0.01 m/s, 0.02 m/s and 0.1 deg/s off from 1 s on: d = 1 + 4 + 1, L = 6 (0.5 + 9)."""
     data = one_window([3.0, 0.01, 4.0, 0.02, 0.0, math.radians(0.1)])
-    scores = evaluate.score(still, data)
+    scores = scoring.score(still, data)
     assert scores.d[0, 0] == 0.0
     assert scores.d[0, 5].item() == pytest.approx(6.0)
     row = scores.errors.to_dicts()[0]
@@ -82,14 +82,14 @@ def test_the_error_has_the_papers_weights_and_degrees():
 @pytest.mark.parametrize("turns", [-2, 0, 1])
 def test_the_heading_error_is_modulo_a_full_turn(turns):
     data = one_window([0, 0, 0, 0, math.radians(10.0) + 2 * math.pi * turns, 0])
-    assert evaluate.score(still, data).errors["end_heading_deg"][0] == pytest.approx(10.0)
+    assert scoring.score(still, data).errors["end_heading_deg"][0] == pytest.approx(10.0)
 
 
 def test_a_model_that_diverges_scores_infinity_and_not_nan():
     def explode(state, actuator, wind):
         return state**9 * 1e9 + 1e9
 
-    scores = evaluate.score(explode, one_window([0] * 6))
+    scores = scoring.score(explode, one_window([0] * 6))
     assert scores.errors["loss"][0] == math.inf
 
 
@@ -110,5 +110,5 @@ def test_least_squares_finds_a_quadratic_ship_again():
         state[:, k + 1, 1] = u + rate
     plan = pl.DataFrame({"copy": [0] * count})
     data = Windows(plan, state, actuator, wind, torch.ones(count, size - 1, dtype=torch.float64))
-    fitted = floors.least_squares(data, ridge=1e-12)
+    fitted = baselines.least_squares(data, ridge=1e-12)
     assert (simulate(fitted, data)[..., 1] - state[..., 1]).abs().max() < 1e-3

@@ -4,12 +4,12 @@ import pytest
 import sailing
 
 from pipelines.prepare import seconds
-from pipelines.split import choose_split
 from pipelines.train import train_run
-from shiplog.config import Config, Split
 from shiplog.exceptions import StoreError
-from shiplog.parts import overlap, parse
-from shiplog.store import Store
+from shiplog.training.run_config import Config, Split
+from shiplog.voyages.parts import overlap, parse
+from shiplog.voyages.split import choose_split
+from shiplog.voyages.store import Store
 
 
 def test_six_voyages_in_order_are_the_papers(tmp_path):

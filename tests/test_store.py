@@ -10,8 +10,8 @@ import pytest
 import sailing
 
 from shiplog.exceptions import StoreError
-from shiplog.ingest import ingest
-from shiplog.store import Store, fingerprint_of
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.store import Store, fingerprint_of
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
 
-from shiplog import table
 from shiplog.channels import Quality
+from shiplog.voyages import one_hertz
 
 START = datetime(2026, 5, 1, 12, 0, 0, tzinfo=UTC)
 
@@ -24,7 +24,7 @@ def rows(seconds=20, voyage="a", start=START, **columns):
 
 def seconds(frame):
     parts = [part.lazy() for part in frame.partition_by("voyage")]
-    return table.resample(parts, ("heading", "surge"), ("heading",))
+    return one_hertz.resample(parts, ("heading", "surge"), ("heading",))
 
 
 def test_the_mean_of_359_and_1_degree_is_north():
@@ -90,12 +90,12 @@ def test_voyages_are_apart_and_the_order_of_rows_does_not_matter():
 def test_a_voyage_of_days_is_the_same_in_pieces(monkeypatch, tmp_path):
     frame = rows(60, start=START + timedelta(milliseconds=300))
     whole = seconds(frame)
-    monkeypatch.setattr(table, "ONE_DAY", timedelta(seconds=7))
-    assert len(list(table.days(frame.lazy()))) > 5
+    monkeypatch.setattr(one_hertz, "ONE_DAY", timedelta(seconds=7))
+    assert len(list(one_hertz.days(frame.lazy()))) > 5
     assert_frame_equal(seconds(frame), whole)
-    table.sink_averages([frame.lazy()], ("heading", "surge"), ("heading",), tmp_path / "out")
+    one_hertz.sink_averages([frame.lazy()], ("heading", "surge"), ("heading",), tmp_path / "out")
     sunk = pl.read_parquet(tmp_path / "out" / "*.parquet")
-    assert_frame_equal(table.segments(sunk).select(whole.columns), whole)
+    assert_frame_equal(one_hertz.segments(sunk).select(whole.columns), whole)
 
 
 def test_the_same_data_under_two_names_is_found():
@@ -107,4 +107,4 @@ def test_the_same_data_under_two_names_is_found():
                             yaw_rate="yaw_rate")  # fmt: skip
     columns = ["voyage", *names]
     all_rows = pl.concat([original.select(columns), copy.select(columns), other.select(columns)])
-    assert table.shared_rows(all_rows).rows() == [("a", "b", 50)]
+    assert one_hertz.shared_rows(all_rows).rows() == [("a", "b", 50)]

@@ -6,10 +6,10 @@ import closed
 import numpy as np
 import pytest
 
-from pipelines.diagnosis import trial
 from shiplog import profile as profiles
-from shiplog import segments, timescale
-from shiplog.timescale import NODE_ROWS, Timescale
+from shiplog.diagnosis import segments, trial_voyages
+from shiplog.voyages import timescale
+from shiplog.voyages.timescale import NODE_ROWS, Timescale
 
 SEEN = closed.record(profiles.load("esso-osaka"))  # 120 s
 
@@ -92,5 +92,5 @@ def test_without_a_row_there_is_no_speed_to_scale_by(empty):
     """The campaigns stay as they are; that they are too short for a verdict is said later."""
     none = replace(SEEN, state=SEEN.state[:0], voyage=SEEN.voyage[:0], time=SEEN.time[:0])
     nominal, recorded = (SEEN, none) if empty == "trial" else (none, SEEN)
-    given = trial.in_ship_time(None, nominal, recorded)
+    given = trial_voyages.in_ship_time(None, nominal, recorded)
     assert given[0] is nominal and given[1] is recorded

@@ -6,11 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from shiplog.models.causes.environment import Current
 
-from shiplog import cache
-from shiplog.causes import CATALOGUE
-from shiplog.causes.environment import Current
-from shiplog.traced import Traced
+from shiplog import disk_cache
+from shiplog.jit_cache import Traced
+from shiplog.models.causes import CATALOGUE
 
 X = np.array([1.0, 2.0, 3.0])
 traces = []
@@ -56,7 +56,7 @@ def test_what_changed_is_traced_anew(changed, monkeypatch):
     elif changed == "structure":
         same(Traced(bent)((X,), X, 0.5))
     else:
-        monkeypatch.setattr(cache, "source", lambda: b"another")
+        monkeypatch.setattr(disk_cache, "source", lambda: b"another")
         same(Traced(bent)((), X, 0.5))
     assert traces
 

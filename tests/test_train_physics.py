@@ -15,16 +15,16 @@ from safetensors.numpy import load_file, save_file
 from test_cli import call
 from test_user_causes import GOOD
 
-from pipelines import known_ship
+from pipelines.experiments import simulated_ship
 from pipelines.identify import identify_run
-from pipelines.split import choose_physical_split
-from shiplog import identify as identification
-from shiplog import ridge, runs, user_causes
-from shiplog.causes import CATALOGUE
-from shiplog.config import Config, Split
 from shiplog.exceptions import RunError
-from shiplog.ingest import ingest
-from shiplog.store import Store
+from shiplog.models.causes import CATALOGUE, user
+from shiplog.training import output_error as identification
+from shiplog.training import regularisation, run_folder
+from shiplog.training.run_config import Config, Split
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.split import choose_physical_split
+from shiplog.voyages.store import Store
 
 HULL = ("--without", "propeller", "--without", "rudder")  # a hull in the wind compiles quickly
 WINDOW = ("--window", 25)
@@ -37,9 +37,11 @@ def logs(tmp_path_factory):
     """Three short voyages of the simulated ship, all on one day."""
     folder = tmp_path_factory.mktemp("logs")
     for number in range(1, 4):
-        voyage = known_ship.sail(80.0, seed=number, wind=known_ship.Wind(3.0, number))
+        voyage = simulated_ship.sail(80.0, seed=number, wind=simulated_ship.Wind(3.0, number))
         start = datetime(2026, 5, 1, 10 + number, 0, tzinfo=UTC)
-        known_ship.write_voyage(folder / f"trip_{number}.mcap", voyage, seed=number, start=start)
+        simulated_ship.write_voyage(
+            folder / f"trip_{number}.mcap", voyage, seed=number, start=start
+        )
     return folder
 
 
@@ -112,12 +114,12 @@ def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
     ran = tmp_path / "ran"
     mine = tmp_path / "mine.py"
     mine.write_text(f"{GOOD}\nwith open({str(ran)!r}, 'a') as f:\n    f.write('x')\n")
-    causes = user_causes.load([mine])
-    run = runs.load(published[0])
+    causes = user.load([mine])
+    run = run_folder.load(published[0])
     after = run.extended(0).with_causes(
         causes, {"tide_gate": np.array([3.0])}, {"tide_gate": np.array([[0.01]])}
     )
-    kept = runs.extend(run, tmp_path / "extended", after, [mine])
+    kept = run_folder.extend(run, tmp_path / "extended", after, [mine])
     assert kept.label == "mmg with tide_gate"
     was = ran.read_text()
     for command in ("evaluate", "compare"):
@@ -126,8 +128,8 @@ def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
         assert f"--cause FILE; a copy to look over first: {kept.path / 'extension-0.py'}" in said
     assert ran.read_text() == was
     with pytest.raises(RunError, match="--cause"):
-        runs.load(kept.path).models()
-    again = runs.load(kept.path, user_causes.load([mine])).models()[0]
+        run_folder.load(kept.path).models()
+    again = run_folder.load(kept.path, user.load([mine])).models()[0]
     assert again.theta == pytest.approx(after.theta)
     code, said, _ = call("evaluate", kept.path, "--store", store, "--voyages", "trip_3",
                          "--cause", mine)  # fmt: skip
@@ -139,12 +141,12 @@ def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_pa
     """Also where the owner's causes were tested and not named: nothing of theirs is in it."""
     mine = tmp_path / "mine.py"
     mine.write_text(GOOD)
-    run = runs.load(published[0])
+    run = run_folder.load(published[0])
     (current,) = [c for c in CATALOGUE if c.label == "current"]
     numbers = {"current": np.array([0.1, -0.05])}
     after = run.extended(0).with_causes([current], numbers, {"current": 1e-4 * np.eye(2)})
-    kept = runs.extend(run, tmp_path / "extended", after, [mine])
-    assert runs.load(kept.path).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
+    kept = run_folder.extend(run, tmp_path / "extended", after, [mine])
+    assert run_folder.load(kept.path).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
     assert not list(kept.path.glob("*.py"))
 
 
@@ -152,7 +154,7 @@ def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_p
     """Its folder holds neither names nor numbers of the five coefficients."""
     old = tmp_path / "old"
     shutil.copytree(published[0], old)
-    table = runs.load(old).identified()
+    table = run_folder.load(old).identified()
     late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
     assert late.sum() == 5
     table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
@@ -162,7 +164,7 @@ def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_p
     save_file(
         {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
     )
-    now, was = runs.load(published[0]), runs.load(old)
+    now, was = run_folder.load(published[0]), run_folder.load(old)
     assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
     start = was.base()[1]
     assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
@@ -170,7 +172,7 @@ def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_p
 
 
 def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
-    run = runs.load(published[0])
+    run = run_folder.load(published[0])
     identified = run.identified()
     assert (identified["value"] == identified["start"]).all()
     assert not identified["free"].any() and (identified["standard_error"] == 0.0).all()
@@ -184,7 +186,7 @@ def test_a_force_left_out_is_said_and_gone(store, tmp_path):
         store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
     )
     assert code == 0 and "mmg as given, without propeller, rudder, wind in" in said
-    names = runs.load(tmp_path / "r").identified()["name"]
+    names = run_folder.load(tmp_path / "r").identified()["name"]
     assert {name.split(".")[0] for name in names} == {"body", "hull"}
 
 
@@ -207,7 +209,7 @@ def test_the_answer_says_what_was_found(fitted):
 
 
 def test_the_training_windows_fit_better_than_at_the_start(fitted):
-    run = runs.load(fitted[0])
+    run = run_folder.load(fitted[0])
     identified = run.identified()
     assert (identified["standard_error"] > 0.0).all() and identified["free"].all()
     assert (identified["standard_error"] <= 1.05 * identified["spread"]).all()
@@ -217,22 +219,22 @@ def test_the_training_windows_fit_better_than_at_the_start(fitted):
 
 
 def test_voyages_are_held_out_in_as_many_parts_as_are_asked_for(fitted, store, tmp_path):
-    assert runs.load(fitted[0]).config.physics.folds == 5
+    assert run_folder.load(fitted[0]).config.physics.folds == 5
     code, _, _ = train(
         store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, "--folds", 2, "--free", "hull.x_0f"
     )
-    assert code == 0 and runs.load(tmp_path / "r").config.physics.folds == 2
+    assert code == 0 and run_folder.load(tmp_path / "r").config.physics.folds == 2
     assert call("train", "--store", store, "--out", tmp_path / "n", "--folds", 2)[0] == 2
 
 
 def test_one_identification_stands_for_all_seeds(fitted):
-    run = runs.load(fitted[0])
+    run = run_folder.load(fitted[0])
     assert run.config.seeds == (0,)
     assert sorted(p.name for p in run.path.glob("seed*")) == ["seed0"]
 
 
 def test_the_run_folder_holds_what_it_says(fitted):
-    run = runs.load(fitted[0])
+    run = run_folder.load(fitted[0])
     settings = tomllib.loads((run.path / "config.toml").read_text(encoding="utf-8"))
     assert not {"network", "paper", "fast"} & settings.keys()
     assert settings["physics"]["without"] == ["propeller", "rudder"]
@@ -267,14 +269,14 @@ def test_identified_parameters_can_be_given_again(fitted, published, store, tmp_
     )
     assert other == pytest.approx(one, rel=1e-9)
     assert before != pytest.approx(one, rel=1e-3)
-    again = runs.load(tmp_path / "again")
+    again = run_folder.load(tmp_path / "again")
     assert again.config.physics.parameters == "identified by shiplog in fitted"
 
 
 def test_only_the_free_parameters_move(store, tmp_path):
     code, _, _ = train(store, tmp_path / "r", "--model", "mmg", "--free", "wind.*", *BOTH, *HULL)
     assert code == 0
-    found = runs.load(tmp_path / "r").identified()
+    found = run_folder.load(tmp_path / "r").identified()
     wind = pl.col("name").str.starts_with("wind.")
     moved, held = found.filter(wind), found.filter(~wind)
     assert moved.height == 10 and moved["free"].all()
@@ -291,7 +293,7 @@ def test_one_voyage_leaves_the_gain_untested(store, tmp_path):
     assert code == 0 and "One voyage only: nothing was held out" in said
     assert "held-out" not in said
     assert not (run / "cross_validation.parquet").exists()
-    assert runs.load(run).band() is None
+    assert run_folder.load(run).band() is None
     content = scored(run, store, tmp_path / "e.json")
     assert math.isfinite(content["loss"]) and content["band_90"] == {}
 
@@ -301,7 +303,7 @@ def test_a_validation_voyage_is_where_the_band_comes_from(store, tmp_path):
     code, _, _ = train(store, run, "--model", "mmg", "--voyages", "trip_1", "--validation",
                        "trip_2", "--free", "wind.*", *HULL)  # fmt: skip
     assert code == 0
-    loaded = runs.load(run)
+    loaded = run_folder.load(run)
     assert loaded.config.split.validation == ("trip_2",)
     assert loaded.training()["voyage"].unique().to_list() == ["trip_1"]
     assert loaded.band() is not None
@@ -341,7 +343,7 @@ def test_without_validation_voyages_the_ridge_is_the_plausible_one(fitted):
 def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
     """Made to choose a quarter, it is the identification with a quarter of every spread, and so
     are the fits without each voyage."""
-    monkeypatch.setattr(ridge, "choose", lambda judged: 0.25)
+    monkeypatch.setattr(regularisation, "choose", lambda judged: 0.25)
     asked = []
     plain = identification.identify
 
@@ -357,17 +359,17 @@ def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
     assert answer(run / "provenance.json")["chosen"]["ridge"]["value"] == 0.25
     assert [factor for factor, _ in asked[:6]] == [1.0, 2.0, 4.0, 8.0, 0.5, 0.25]
     assert asked[6:] == [(0.25, True)] * 2  # a fold begins at the start: it knows nothing of all
-    found, loose = runs.load(run).identified(), runs.load(validated[0]).identified()
+    found, loose = run_folder.load(run).identified(), run_folder.load(validated[0]).identified()
     away = (pl.col("value") - pl.col("start")).abs() / pl.col("spread")
     moved = found.filter("free").select(away.mean()).item()
     assert 0.0 < moved < loose.filter("free").select(away.mean()).item()
 
 
 def test_a_validation_voyage_without_a_window_is_refused(logs, tmp_path):
-    short = known_ship.sail(20.0, seed=9, wind=known_ship.Wind(3.0, 9))
+    short = simulated_ship.sail(20.0, seed=9, wind=simulated_ship.Wind(3.0, 9))
     begun = datetime(2026, 5, 2, 10, 0, tzinfo=UTC)
     (tmp_path / "logs").mkdir()
-    known_ship.write_voyage(tmp_path / "logs" / "short.mcap", short, seed=9, start=begun)
+    simulated_ship.write_voyage(tmp_path / "logs" / "short.mcap", short, seed=9, start=begun)
     shutil.copy(logs / "trip_1.mcap", tmp_path / "logs")
     assert call("ingest", tmp_path / "logs", "--store", tmp_path / "store")[0] == 0
     code, _, said = train(tmp_path / "store", tmp_path / "r", "--model", "mmg", "--voyages",
@@ -475,7 +477,7 @@ def test_a_damaged_model_is_named(hybrid, tmp_path):
     path = copy / "seed0" / "model.safetensors"
     path.write_bytes(path.read_bytes()[:50])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
-        runs.load(copy).simulator(0)
+        run_folder.load(copy).simulator(0)
 
 
 # ---------------------------------------------------------------- the split

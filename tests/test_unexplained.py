@@ -6,12 +6,12 @@ import afloat
 import numpy as np
 import pytest
 
-from shiplog import segments, unexplained
-from shiplog.evidence import Unrest
-from shiplog.linearise import Linear, Path
+from shiplog.diagnosis import residual_acceleration, segments
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.segments import Cut
 from shiplog.models.mmg import body
-from shiplog.record import Record
-from shiplog.segments import Cut
+from shiplog.voyages.recording import Record
 
 UNREST = Unrest(
     noise=np.full(6, 3e-4), push=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)
@@ -53,7 +53,7 @@ def test_the_posterior_is_kriging():
     """K (K + R)⁻¹ y, with the covariance K = σ² exp(-|t - t'|/τ) that the precision came from."""
     rng = np.random.default_rng(0)
     y = 1e-3 * rng.standard_normal((2, 3, 16))
-    found = unexplained.posterior(
+    found = residual_acceleration.posterior(
         seen_directly(y, np.array([0, 300])), np.array([4e-4]), UNREST, rested((700,), (0,))
     )
     t = 2.0 * np.arange(16)
@@ -69,7 +69,7 @@ def test_the_posterior_is_kriging():
 
 def test_segments_cover_every_stretch_twice_and_to_its_end():
     record = rested((700, 299, 301, 650), (0, 0, 1, 1))
-    rows = unexplained.covering(record)
+    rows = residual_acceleration.covering(record)
     # 299 rows hold no 30 s; 16 s on from a beginning there is another where 30 s are left
     assert rows.tolist() == [0, 160, 300, 399, 999, 1300, 1460, 1600, 1649]
     assert set(segments.begins(record)) <= set(rows.tolist())
@@ -78,10 +78,10 @@ def test_segments_cover_every_stretch_twice_and_to_its_end():
 
 def test_each_instant_counts_once_and_by_the_better_known():
     y = np.zeros((3, 3, 16))
-    found = unexplained.posterior(
+    found = residual_acceleration.posterior(
         seen_directly(y, np.array([0, 300, 399])), np.zeros(1), UNREST, rested((700,), (0,))
     )
-    keep = unexplained.once(found)
+    keep = residual_acceleration.once(found)
     rows = np.sort(found.rows[keep])
     assert np.diff(rows).min() >= 10  # knots are 20 rows apart; no pair is nearer than half of it
     assert rows[0] == 0
@@ -98,7 +98,9 @@ def test_the_table_tells_what_went_with_it():
     wind = np.tile([3.0, -4.0], (700, 1))
     record = replace(record, state=state, wind=wind)
     linear = seen_directly(np.ones((2, 3, 16)) * 1e-3, np.array([0, 300]))
-    table = unexplained.table(unexplained.posterior(linear, np.zeros(1), UNREST, record), record)
+    table = residual_acceleration.table(
+        residual_acceleration.posterior(linear, np.zeros(1), UNREST, record), record
+    )
     assert table["time_s"].to_list() == pytest.approx([2.0 * i for i in range(31)])
     assert table["x0"][5] == pytest.approx(105.0)
     assert table["heading"][5] == pytest.approx(4.0 - 2.0 * np.pi)
@@ -114,7 +116,7 @@ def test_a_force_that_no_model_has_is_found_with_its_uncertainty():
     swell = np.sin(2.0 * np.pi * sailed.time / 50.0)[:, None] * np.array([3.0, -2.0, 1.0])
     record = afloat.record(sailed, afloat.pushed(sailed, swell))
     white = replace(afloat.UNREST.louder(10.0), noise=afloat.NOISE / np.sqrt(20.0))  # of 2 s
-    found = unexplained.posterior(afloat.linear(record), np.zeros(0), white, record)
+    found = residual_acceleration.posterior(afloat.linear(record), np.zeros(0), white, record)
     zero = np.zeros(1)
     added = body.accelerations(afloat.COEFFICIENTS, afloat.SHIP, zero, zero, zero, swell)
     true = np.moveaxis(np.asarray(added)[found.rows], -1, 1)

@@ -5,8 +5,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import unseen
-from shiplog.unexplained import ACCELERATIONS
+from shiplog.diagnosis import omitted_inputs
+from shiplog.diagnosis.residual_acceleration import ACCELERATIONS
 
 KNOTS = 250  # of 2 s a voyage
 
@@ -47,14 +47,14 @@ def campaign(voyages: int = 5, seed: int = 0) -> pl.DataFrame:
 
 def planted(knots: pl.DataFrame, effect: np.ndarray, channel: str) -> pl.DataFrame:
     """`effect`, brought to the variance of the noise: half of all is explained."""
-    name = ACCELERATIONS[unseen.CHANNELS.index(channel)]
+    name = ACCELERATIONS[omitted_inputs.CHANNELS.index(channel)]
     noise = knots[name].to_numpy()
     whole = noise + (effect - effect.mean()) / effect.std() * noise.std()
     return knots.with_columns(pl.Series(name, whole))
 
 
-def asked(knots: pl.DataFrame) -> dict[str, unseen.Dependence]:
-    found = unseen.table(knots, afloat.PROFILE, np.random.default_rng(7))
+def asked(knots: pl.DataFrame) -> dict[str, omitted_inputs.Dependence]:
+    found = omitted_inputs.table(knots, afloat.PROFILE, np.random.default_rng(7))
     return {row.variable: row for row in found}
 
 

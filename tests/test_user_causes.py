@@ -6,12 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import user_causes
 from shiplog.exceptions import RunError
+from shiplog.models.causes import user
 
 GOOD = '''
 import jax.numpy as jnp
-from shiplog.causes import Cause, Parameter
+from shiplog.models.causes import Cause, Parameter
 
 
 class Tide(Cause):
@@ -36,7 +36,7 @@ def write(folder, text, name="mine.py"):
 
 
 def test_a_good_file(tmp_path):
-    (cause,) = user_causes.load([write(tmp_path, GOOD)])
+    (cause,) = user.load([write(tmp_path, GOOD)])
     assert (cause.name, cause.user, cause.count) == ("tide_gate", True, 1)
     assert not cause.reads
     state = np.array([[0.0, 0.5, 0.0, 0.0, 0.5 * np.pi, 0.0]])
@@ -49,11 +49,11 @@ def test_several_files_and_several_causes_keep_their_order(tmp_path):
     more = GOOD.replace("tide_gate", "second").replace("class Tide", "class Second")
     both = write(tmp_path, GOOD + more.split("Parameter\n", 1)[1])
     third = write(tmp_path, GOOD.replace("tide_gate", "third"), "other.py")
-    assert [c.name for c in user_causes.load([both, third])] == ["tide_gate", "second", "third"]
+    assert [c.name for c in user.load([both, third])] == ["tide_gate", "second", "third"]
 
 
 def test_none_is_none():
-    assert user_causes.load([]) == ()
+    assert user.load([]) == ()
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_none_is_none():
         ("def broken(:\n", "SyntaxError"),
         ("import nothing_of_that_name\n", "nothing_of_that_name"),
         ("x = 1\n", "defines no cause"),
-        ("from shiplog.causes.environment import Current\n", "defines no cause"),
+        ("from shiplog.models.causes.environment import Current\n", "defines no cause"),
         (GOOD.replace('"tide_gate"', '"current"'), "'current' already"),
         (GOOD.replace('    kind = "environment"\n', ""), "Tide has no kind"),
         (GOOD.replace("    story =", "    tale ="), "Tide has no story"),
@@ -72,16 +72,16 @@ def test_none_is_none():
 def test_a_file_that_cannot_be_taken_says_why(tmp_path, text, said):
     path = write(tmp_path, text)
     with pytest.raises(RunError, match=said) as found:
-        user_causes.load([path])
+        user.load([path])
     assert found.value.hint
 
 
 def test_two_files_cannot_share_a_name(tmp_path):
     files = [write(tmp_path, GOOD, "one.py"), write(tmp_path, GOOD, "two.py")]
     with pytest.raises(RunError, match="'tide_gate' already"):
-        user_causes.load(files)
+        user.load(files)
 
 
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(RunError, match="no Python file"):
-        user_causes.load([tmp_path / "missing.py"])
+        user.load([tmp_path / "missing.py"])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from pipelines.hidden_effects import ranks, reliability
-from pipelines.hidden_effects.parameters import compare
+from pipelines.experiments.hidden_effects import ranks, reliability
+from pipelines.experiments.hidden_effects.parameters import compare
 
 # --- reliability ----------------------------------------------------------------------------------
 

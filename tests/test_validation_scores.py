@@ -8,10 +8,18 @@ from dataclasses import replace
 
 import pytest
 
-from pipelines.hidden_effects import goals, methods, parameters, score, scores, tables, validation
-from pipelines.hidden_effects.plan import Planned
-from pipelines.hidden_effects.score import Answer, clopper_pearson
-from pipelines.known_ship.cases import CATALOGUE
+from pipelines.experiments.hidden_effects import (
+    goals,
+    methods,
+    parameters,
+    score,
+    score_tables,
+    scores,
+    validation,
+)
+from pipelines.experiments.hidden_effects.plan import Planned
+from pipelines.experiments.hidden_effects.score import Answer, clopper_pearson
+from pipelines.experiments.simulated_ship.cases import CATALOGUE
 
 COMMIT = {"step": "diagnose", "rc": 0, "commit": "a" * 40, "dirty": False,
           "cpu_s": 9.0, "wall_s": 10.0, "peak_mb": 900.0}  # fmt: skip
@@ -115,7 +123,7 @@ def test_an_undecided_verdict_is_an_alarm_and_no_name():
         True
     ]
     assert not clean.right and not effect.right and not effect.named
-    assert effect.belief == (0.5, True) and "undecided current" in tables.said(effect)
+    assert effect.belief == (0.5, True) and "undecided current" in score_tables.said(effect)
 
 
 # --- the goals' table -----------------------------------------------------------------------------
@@ -160,7 +168,7 @@ def test_home_and_abroad_have_goals_of_their_own():
         "100 % (1/1) [5.0, 100.0]", ">= 75 %", "yes",
     ]  # fmt: skip
     assert goals.ROWS["named but wrong, any size"] == ((None, 0.015), (None, 0.03))
-    lines = tables.goals(away)
+    lines = score_tables.goals(away)
     assert next(r for r in lines if "named right" in r[0])[-2] == ">= 75 %"
 
 

@@ -1,7 +1,7 @@
 """Sentences of a verdict."""
 
-from shiplog.gain import Gain
-from shiplog.verdict import sentence
+from shiplog.report.verdict import sentence
+from shiplog.simulation.error_reduction import Gain
 
 
 def test_what_it_may_be_instead_is_in_the_sentence():

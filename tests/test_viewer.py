@@ -13,10 +13,18 @@ import psutil
 import pytest
 from rerun.chunk import RrdReader
 
-from shiplog import viewer
-from shiplog.comparison import Actuator, Comparison
 from shiplog.exceptions import ShiplogError
-from shiplog.viewer import display, forces, histogram, native, recording, timeline, trajectory
+from shiplog.report import viewer
+from shiplog.report.comparison_data import Actuator, Comparison
+from shiplog.report.viewer import (
+    display,
+    forces,
+    histogram,
+    native,
+    recording,
+    timeline,
+    trajectory,
+)
 
 ROOT = Path(__file__).parent.parent
 SECONDS = 201
@@ -505,7 +513,7 @@ def test_a_server_ends_with_the_command_whatever_ends_that(saved):
 
 @pytest.mark.viewer
 def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewer):
-    from shiplog.viewer.screenshot import screenshot
+    from shiplog.report.viewer.screenshot import screenshot
 
     try:
         state = screenshot(saved, tmp_path / "seen.png", time_s=100.0)

@@ -8,10 +8,10 @@ import polars as pl
 import pytest
 from rerun.chunk import RrdReader
 
-from shiplog import viewer
 from shiplog.channels import STATE
-from shiplog.exhibit import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
-from shiplog.viewer import diagnosis
+from shiplog.report import viewer
+from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.report.viewer import diagnosis
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
 

@@ -7,9 +7,10 @@ import polars as pl
 import pytest
 import torch
 
-from shiplog import seeds, windows
-from shiplog.config import AUGMENTATIONS
+from shiplog import random_streams
 from shiplog.exceptions import WindowError
+from shiplog.training.run_config import AUGMENTATIONS
+from shiplog.voyages import windows
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
 STATES = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
@@ -92,7 +93,7 @@ def test_heading_is_unwrapped_within_each_window():
 def test_jitter_has_the_papers_size_and_touches_velocities_of_copies_only():
     frame = seconds((1801,))
     clean = cut(frame, planned(frame, "jit10"))
-    noisy = windows.jittered(clean, seeds.generator(0, "jitter"))
+    noisy = windows.jittered(clean, random_streams.generator(0, "jitter"))
     difference = noisy.state - clean.state
     assert (difference[..., [0, 2, 4]] == 0).all()
     spread = difference[..., [1, 3, 5]].flatten(0, 1).std(0)
@@ -103,18 +104,21 @@ def test_jitter_has_the_papers_size_and_touches_velocities_of_copies_only():
     assert not torch.equal(copies[:, 0], copies[:, 1])
     reference = cut(frame, planned(frame, "ref"))
     assert torch.equal(
-        windows.jittered(reference, seeds.generator(0, "jitter")).state, reference.state
+        windows.jittered(reference, random_streams.generator(0, "jitter")).state, reference.state
     )
 
 
 def test_streams_are_by_seed_and_purpose():
     draws = {
-        (s, p): torch.rand(3, generator=seeds.generator(s, p)).tolist()
+        (s, p): torch.rand(3, generator=random_streams.generator(s, p)).tolist()
         for s in (0, 1)
         for p in ("jitter", "weights")
     }
     assert len({tuple(d) for d in draws.values()}) == 4
-    assert draws[0, "jitter"] == torch.rand(3, generator=seeds.generator(0, "jitter")).tolist()
+    assert (
+        draws[0, "jitter"]
+        == torch.rand(3, generator=random_streams.generator(0, "jitter")).tolist()
+    )
 
 
 def test_a_window_longer_than_every_segment_says_so():

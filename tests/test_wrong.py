@@ -7,8 +7,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import wrong
-from shiplog.sensitivity import Series, state_losses
+from shiplog.simulation import error_breakdown
+from shiplog.simulation.sensitivities import Series, state_losses
 
 COUNT, SIZE = 30, 100
 
@@ -52,7 +52,7 @@ def test_shares_are_those_of_the_loss(driven):
     data, windows = driven
     error = little(data)
     error[..., 3] *= 2.0
-    found = wrong.explain(error, data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(error, data, windows, afloat.PROFILE)
     assert found.channels[0].channel == "sway"
     assert {c.channel: c.share for c in found.channels} == pytest.approx(
         {"sway": 4.0 / 6.0, "surge": 1.0 / 6.0, "yaw_rate": 1.0 / 6.0}
@@ -95,7 +95,7 @@ def test_where_it_is_wrong_is_said(driven, regime, words):
     data, windows = driven
     error, inside = little(data), regime(data, windows)
     error[..., 5] = np.where(inside, np.radians(0.5), error[..., 5])
-    found = wrong.explain(error, data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(error, data, windows, afloat.PROFILE)
     worst = found.channels[0]
     assert worst.channel == "yaw_rate"
     assert worst.share > 0.99
@@ -112,7 +112,7 @@ def test_two_conditions_are_said_where_both_are_needed(driven):
     error = little(data)
     both = astern(data, windows) & late(data, windows)
     error[..., 1] = np.where(both, 0.05, error[..., 1])
-    where = wrong.explain(error, data, windows, afloat.PROFILE).channels[0].where
+    where = error_breakdown.explain(error, data, windows, afloat.PROFILE).channels[0].where
     assert where.startswith("astern, in the last third of the campaign (")
 
 
@@ -120,7 +120,7 @@ def test_the_worst_minute_is_found(driven):
     data, windows = driven
     error = little(data)
     error[17, 30:80, 1] = 0.1  # voyage b, 730 to 780 s: 100 a second, against 0.01 a channel
-    found = wrong.explain(error, data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(error, data, windows, afloat.PROFILE)
     assert found.worst is not None
     assert found.worst.voyage == "b"
     assert 720.0 <= found.worst.start_s <= 730.0
@@ -133,7 +133,7 @@ def test_one_bad_window_does_not_say_where(driven):
     data, windows = driven
     error = little(data)
     error[4] *= 100.0
-    found = wrong.explain(error, data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(error, data, windows, afloat.PROFILE)
     assert all(c.where == "everywhere alike" for c in found.channels)
 
 
@@ -141,7 +141,7 @@ def test_a_window_that_ran_away_is_counted_and_left_out(driven):
     data, windows = driven
     error = little(data)
     error[4, 50:] = np.inf
-    found = wrong.explain(error, data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(error, data, windows, afloat.PROFILE)
     assert found.diverged == 1
     assert sum(c.share for c in found.channels) == pytest.approx(1.0)
     assert found.timeline.height == COUNT * SIZE
@@ -149,6 +149,6 @@ def test_a_window_that_ran_away_is_counted_and_left_out(driven):
 
 def test_nothing_wrong_is_nothing(driven):
     data, windows = driven
-    found = wrong.explain(np.zeros_like(data.measured), data, windows, afloat.PROFILE)
+    found = error_breakdown.explain(np.zeros_like(data.measured), data, windows, afloat.PROFILE)
     assert found.channels == ()
     assert found.worst is None

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import straight
 
+from shiplog.diagnosis.evidence import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import NOMINAL, Remainder
-from shiplog.hypotheses import Found
-from shiplog.unnamed import Pulses
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.decision import Decision, Named, Structure
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
+from shiplog.diagnosis.result import Decision, Named, Structure
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL
-from shiplog.evidence import Unrest
-from shiplog.unnamed import pulse_force
+from shiplog.diagnosis.unrecorded_thruster import pulse_force
 
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 

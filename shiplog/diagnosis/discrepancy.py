@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog import structure
+from shiplog.diagnosis import segment_nodes
+from shiplog.diagnosis.segment_nodes import Knots
+from shiplog.diagnosis.segments import Cut, Grid
 from shiplog.profile import Profile
-from shiplog.segments import Cut, Grid
-from shiplog.structure import Knots
 
 SEEN = ("motion", "controls", "wind")  # by a model of forces
 UNSEEN = ("position", "heading", "time")
@@ -62,12 +62,12 @@ class Family:
         """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
         values = (_features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
-        out = structure.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
+        out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
         if self.name == "position":
             out = _turned(out, knots)
         if not plain:
             return out
-        even = structure.in_each_channel(values[..., :plain])
+        even = segment_nodes.in_each_channel(values[..., :plain])
         even[..., 2, 2 * plain] = 0.0  # a steady moment is the ship's own
         return np.concatenate((_turned(even, knots), out), -1)
 
@@ -87,8 +87,8 @@ class Discrepancy:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
         if not self.families:
             return np.zeros((len(cut), 3 * g.knots, 0))
-        knots = structure.at_knots(cut, g)
-        parts = [structure.pushed(f.features(knots), self.push) for f in self.families]
+        knots = segment_nodes.at_knots(cut, g)
+        parts = [segment_nodes.pushed(f.features(knots), self.push) for f in self.families]
         return np.concatenate(parts, axis=-1)
 
 

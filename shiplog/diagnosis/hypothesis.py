@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.causes import Cause
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.evidence import Found, Point
+from shiplog.diagnosis.linearisation import Path
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.hypotheses import Found, Point
-from shiplog.linearise import Path
-from shiplog.unnamed import Pulses
+from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.models.causes import Cause
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 

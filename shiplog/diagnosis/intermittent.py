@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shiplog import unnamed
+from shiplog.diagnosis import unrecorded_thruster
 from shiplog.diagnosis.nominal_campaign import Campaign
-from shiplog.segments import Grid
+from shiplog.diagnosis.segments import Grid
 
 
 def usual_push(campaign: Campaign, g: Grid) -> np.ndarray | None:
@@ -31,5 +31,5 @@ def usual_push(campaign: Campaign, g: Grid) -> np.ndarray | None:
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
         own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
     left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
-    found = unnamed.pulses_of(left, none, reference, reference.unrest, campaign.weight)
+    found = unrecorded_thruster.pulses_of(left, none, reference, reference.unrest, campaign.weight)
     return found.unit * found.force if found.gain > 0.0 else None

@@ -14,19 +14,26 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog import evidence, linearise, reference, segments, structure
-from shiplog.causes import Setting
-from shiplog.columns import HELD, Columns
-from shiplog.diagnosis import discrepancy, voyage_effects
+from shiplog.diagnosis import (
+    discrepancy,
+    likelihood,
+    linearisation,
+    nominal_reference,
+    segment_nodes,
+    segments,
+    voyage_effects,
+)
 from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.likelihood import Modes, Unrest
+from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.measurement_correction import read
+from shiplog.diagnosis.nominal_reference import Reference, Settled, Start
+from shiplog.diagnosis.parameter_layout import HELD, Columns
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
-from shiplog.evidence import Modes, Unrest
-from shiplog.linearise import Linear
+from shiplog.models.causes import Setting
+from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
-from shiplog.models.network import Network
-from shiplog.reading import read
-from shiplog.record import Record
-from shiplog.reference import Reference, Settled, Start
+from shiplog.voyages.recording import Record
 
 ROBUST = 6.0  # medians of χ², from which on a segment counts less
 PART = 20  # segments of one part of a campaign: 10 minutes of a three-metre ship
@@ -153,16 +160,16 @@ class _Pass:
 
 
 def _pass(model: Extended, setting: Setting, start: Start, record: Record, at: Settled) -> _Pass:
-    columns = reference.columns_of(model, setting, start)
+    columns = nominal_reference.columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
-    wide = reference.wide_of(setting)
-    linear = linearise.linear(model, whole, cut, g, at.path, moved, shown, wide)
-    held = reference.anchored(start, at.theta, columns)
+    wide = nominal_reference.wide_of(setting)
+    linear = linearisation.linear(model, whole, cut, g, at.path, moved, shown, wide)
+    held = nominal_reference.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.unrest.push, len(columns.unit), discrepancy.SEEN,
-        structure.at_knots(linear.cut, g),
+        segment_nodes.at_knots(linear.cut, g),
     )  # fmt: skip
     pushed = families.pushed(linear.cut, g)
     columns = columns.with_misfit(families.count)
@@ -181,7 +188,9 @@ def characteristics(
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
     for last in (False, False, True):
-        modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
+        modes = likelihood.modes(likelihood.weighed(made.linear, unrest), unrest).beside(
+            made.pushed
+        )
         each = products(modes, made.rows, columns.unit, weight)
         effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
         if not last:  # what the parts disagree in is no noise, nor what a few segments are off by
@@ -237,7 +246,7 @@ def _noise_of_parts(
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
     left = made.linear.less_numbers(own, made.pushed).pick(kept)
-    return evidence.learnt(left, np.zeros(made.columns.linearised), unrest, rounds=3)
+    return likelihood.learnt(left, np.zeros(made.columns.linearised), unrest, rounds=3)
 
 
 def learn(
@@ -248,10 +257,10 @@ def learn(
     made = _pass(model, setting, start, record, at)
     columns, held, families = made.columns, made.held, made.families
     unrest, known = found.unrest, made.columns.known
-    modes = evidence.modes(evidence.weighed(made.linear, unrest), unrest).beside(made.pushed)
+    modes = likelihood.modes(likelihood.weighed(made.linear, unrest), unrest).beside(made.pushed)
     unseen = discrepancy.of(
         record.profile, at.unrest.push, len(columns.unit), discrepancy.UNSEEN,
-        structure.at_knots(made.linear.cut, segments.grid(record)),
+        segment_nodes.at_knots(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
     whole = modes.beside(unseen.pushed(made.linear.cut, segments.grid(record)))
     unit = np.append(columns.unit, np.ones(unseen.count))
@@ -267,8 +276,9 @@ def learn(
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
     information, pull = prior(parts, size**-2.0, held, deviation, found.share)
     reference_made = Reference(
-        model, setting, at.theta, columns, unrest, reference.wide_of(setting), information, pull,
-        held, 1.0 / found.share, made.linear, modes, reference.freedom(len(made.rows)),
+        model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
+        pull, held, 1.0 / found.share, made.linear, modes,
+        nominal_reference.freedom(len(made.rows)),
         misfit=families,  # type: ignore[arg-type]  # it pushes as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
@@ -308,7 +318,7 @@ def noise_time(
             for _ in range(2 if factor == 1.0 else 1):
                 numbers, _ = _solved(linear, pushed, tried, columns, held)
                 left = linear.less(pushed @ numbers[columns.linearised :])
-                tried = evidence.learnt(left, numbers[: columns.linearised], tried, rounds=2)
+                tried = likelihood.learnt(left, numbers[: columns.linearised], tried, rounds=2)
             _, value = _solved(linear, pushed, tried, columns, held)
             if value < best:
                 break
@@ -320,11 +330,13 @@ def _solved(
     linear: Linear, pushed: np.ndarray, unrest: Unrest, columns: Columns, held: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
-    modes = evidence.modes(evidence.weighed(linear, unrest), unrest).beside(pushed)
+    modes = likelihood.modes(likelihood.weighed(linear, unrest), unrest).beside(pushed)
     by = np.concatenate(([1.0], columns.unit))
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     both = total[1:, 1:] + np.diag(columns.known)
-    value = reference.marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
+    value = (
+        nominal_reference.marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
+    )
     return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
 
 
@@ -347,7 +359,7 @@ def _share(parts: Sequence[np.ndarray], effects: VoyageEffects, held: np.ndarray
         for i, left in enumerate(parts):
             kept = [g for j, g in enumerate(parts) if j != i]
             information, pull = prior(kept, known, held, effects.deviation, share)
-            score += reference.marginal(left, information, pull)
+            score += nominal_reference.marginal(left, information, pull)
         scores.append(score)
         if score < max(scores):
             break
@@ -365,7 +377,7 @@ def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
             gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
             gram, logdet = reduced(gram, effects.deviation)
             volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
-            scores.append(reference.marginal(gram, information, pull) - 0.5 * volume)
+            scores.append(nominal_reference.marginal(gram, information, pull) - 0.5 * volume)
         found.append(math.log(tried[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))
 
@@ -381,12 +393,14 @@ def assumed(
     inputs   a network that was trained on these voyages
     """
     if inputs is not None:
-        made = reference.assume(model, setting, start, record, given, inputs)
+        made = nominal_reference.assume(model, setting, start, record, given, inputs)
         none = Discrepancy((), made.unrest.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
         return Campaign(made, effects, none, none, (), 0.0, (), np.zeros(0))
     start = widened(model, setting, start)
-    at = reference.settled(model, setting, start, record, rounds=0 if given else reference.ROUNDS)
+    at = nominal_reference.settled(
+        model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS
+    )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at)
@@ -394,7 +408,7 @@ def assumed(
     columns, known = whole.reference.columns, whole.effects.size**-2.0
     known[columns.base : columns.linearised] = HELD
     if given:
-        known[: columns.base] = reference.GIVEN**-2.0
+        known[: columns.base] = nominal_reference.GIVEN**-2.0
     made = replace(
         whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
         nominal=None, modes=None, adapts=not given,

@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from shiplog import decision as decisions
-from shiplog.decision import Decision
+from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.posterior import Posterior
+from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.search import Search
-from shiplog.gain import Gain
+from shiplog.simulation.error_reduction import Gain
 
 
 class HeldOut(Protocol):

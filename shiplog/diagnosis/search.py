@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shiplog.diagnosis.evidence import Found, Level, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
+from shiplog.diagnosis.relinearisation import settle
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
-from shiplog.hypotheses import Found, Level, Point
-from shiplog.settling import settle
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; what is left then is far behind

@@ -15,9 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog import hypotheses, segments, structure, unnamed
-from shiplog.columns import HELD
-from shiplog.diagnosis import discrepancy, intermittent
+from shiplog.diagnosis import (
+    discrepancy,
+    evidence,
+    intermittent,
+    segment_nodes,
+    segments,
+    unrecorded_thruster,
+)
+from shiplog.diagnosis.evidence import Found, Level, Point
+from shiplog.diagnosis.likelihood import Modes, Weighed
+from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.nominal_campaign import (
     Campaign,
     parts_of,
@@ -25,11 +33,9 @@ from shiplog.diagnosis.nominal_campaign import (
     robust_weights,
     squares,
 )
+from shiplog.diagnosis.parameter_layout import HELD
 from shiplog.diagnosis.voyage_effects import reduced
-from shiplog.evidence import Modes, Weighed
-from shiplog.hypotheses import Found, Level, Point
-from shiplog.linearise import Linear
-from shiplog.record import Record
+from shiplog.voyages.recording import Record
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
 NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the usual
@@ -54,13 +60,13 @@ class Remainder:
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
 
-class Trial(hypotheses.Trial):
+class Trial(evidence.Trial):
     """Voyages in question, against a campaign."""
 
     def __init__(self, campaign: Campaign, record: Record, fixed: Sequence[str] = ()) -> None:
         super().__init__(campaign.reference, record, fixed)
         self.campaign = campaign
-        knots = structure.at_knots(segments.cut(record, self.rows), self.grid)
+        knots = segment_nodes.at_knots(segments.cut(record, self.rows), self.grid)
         known = len(campaign.reference.columns.unit)
         self.unseen = discrepancy.of(
             record.profile, campaign.reference.unrest.push, known, discrepancy.UNSEEN, knots
@@ -322,10 +328,10 @@ class Trial(hypotheses.Trial):
         free = left[len(of) :, len(of) :] + remainder.size**-2.0 * np.eye(len(family))
         return float(across @ np.linalg.solve(free, across) / own) if own > 0.0 else 1.0
 
-    def intermittent(self, point: Point, base: Found) -> unnamed.Pulses:
+    def intermittent(self, point: Point, base: Found) -> unrecorded_thruster.Pulses:
         """A force that comes and goes at one place along the ship; its gain over raised noise, of
         which what is usual pushes at one place too."""
-        return unnamed.pulses(self, point, base, self.usual_push)
+        return unrecorded_thruster.pulses(self, point, base, self.usual_push)
 
     @cached_property
     def usual_push(self) -> np.ndarray | None:

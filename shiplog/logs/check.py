@@ -6,7 +6,7 @@ from pathlib import Path
 
 import polars as pl
 
-from shiplog.findings import Finding, VoyageReport
+from shiplog.logs.health_report import Finding, VoyageReport
 
 from . import faults
 from .read import Reading, read

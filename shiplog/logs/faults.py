@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import polars as pl
 
-from shiplog.findings import Finding
+from shiplog.logs.health_report import Finding
 
 from .container import Loss
 from .tables import Order

@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.findings import Finding
+from shiplog.logs.health_report import Finding
 
 from . import container, faults, rerun_route, salvage
 from .sample import sample

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from shiplog.causes.base import Cause
+from shiplog.models.causes.base import Cause
 from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG, named, total
 

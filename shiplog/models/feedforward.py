@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.base import kinematics
-from shiplog.windows import Windows
+from shiplog.voyages.windows import Windows
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from shiplog.config import Config
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.training import network_training
 from shiplog.training.network_gradient import Batch
 from shiplog.training.network_training import Checkpoint, Progress
+from shiplog.training.run_config import Config
 
 
 @dataclass(frozen=True)

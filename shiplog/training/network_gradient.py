@@ -16,7 +16,7 @@ from torch import Tensor
 from shiplog import channels
 from shiplog.models.feedforward import Scaling, Shape, exogenous
 from shiplog.training import kernel
-from shiplog.windows import Windows
+from shiplog.voyages.windows import Windows
 
 FIRST, SECOND, LEAST = 0.9, 0.999, 1e-8  # β₁, β₂ and ε of Adam, its authors' and torch's
 

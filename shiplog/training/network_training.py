@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from shiplog import seeds
-from shiplog.config import Fast, Paper
+from shiplog import random_streams
 from shiplog.models.feedforward import FeedForward
 from shiplog.training import network_gradient
 from shiplog.training.network_gradient import Batch
+from shiplog.training.run_config import Fast, Paper
 
 HISTORY = ("epoch", "training", "validation", "smoothed")
 OUT_OF_REACH = 1e30  # the value of a rollout that diverges: the line search shortens its step
@@ -68,7 +68,7 @@ def paper(
     moments = [torch.zeros_like(w) for w in [*weights, *weights]]
     scale = (model.scaling, model.shape)
     rate, decay = settings.learning_rate, 2.0 * settings.regularisation
-    stream = seeds.generator(seed, "batches")
+    stream = random_streams.generator(seed, "batches")
     if resume is None:
         start = network_gradient.loss_only(weights, validation, *scale)
         progress = Progress(0, weights, [w.clone() for w in weights], start, start, start)
@@ -158,7 +158,7 @@ def fast(
     progress.history.append((0, math.nan, start, start))
     count = training.velocity.shape[1]
     if count > settings.most_windows:
-        order = torch.randperm(count, generator=seeds.generator(seed, "windows"))
+        order = torch.randperm(count, generator=random_streams.generator(seed, "windows"))
         training = training.pick(order[: settings.most_windows].sort().values)
     _warm_start(weights, training, scale, settings, seed)
     penalty = settings.regularisation
@@ -243,7 +243,7 @@ def _warm_start(
     pieces = shortened(training, settings.warm_steps)
     count = pieces.velocity.shape[1]
     moments = [torch.zeros_like(w) for w in [*weights, *weights]]
-    stream = seeds.generator(seed, "warm start")
+    stream = random_streams.generator(seed, "warm start")
     total = settings.warm_epochs * settings.warm_subsets
     step = 0
     for _ in range(settings.warm_epochs):

@@ -8,7 +8,7 @@ from shiplog.diagnosis import decide as deciding
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.unnamed import Pulses
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)

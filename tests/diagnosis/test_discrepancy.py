@@ -9,7 +9,7 @@ import straight
 from shiplog import profile as profiles
 from shiplog.diagnosis import discrepancy
 from shiplog.diagnosis.discrepancy import SEEN, UNSEEN, WAVES
-from shiplog.structure import Knots
+from shiplog.diagnosis.segment_nodes import Knots
 
 PUSH = np.array([0.08, 0.05, 0.03])
 TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw

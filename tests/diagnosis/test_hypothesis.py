@@ -6,10 +6,10 @@ from itertools import combinations
 import pytest
 from straight import CAUSES, One
 
-from shiplog import causes
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import Priors, form_error, name_of
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.models import causes
 
 FAMILIES = ("motion", "wind", "position")
 KINDS = (NOMINAL, RAISED, INTERMITTENT, *FAMILIES)

@@ -8,9 +8,8 @@ import pytest
 import straight
 from straight import CAUSES, SETTING, UNREST
 
-from shiplog import evidence, segments, unnamed
-from shiplog.diagnosis import intermittent
-from shiplog.unnamed import Pulses
+from shiplog.diagnosis import intermittent, likelihood, segments, unrecorded_thruster
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 COUNT = 24
 LEVER = 0.3  # lengths ahead of midship at which the force acts
@@ -19,7 +18,7 @@ ACROSS, TURNING = np.array([0.0, 0.01, 0.0]), np.array([0.0, 0.0, 0.004])  # of 
 
 @pytest.fixture
 def reference(monkeypatch):
-    monkeypatch.setattr(unnamed, "accelerations", lambda *_: (ACROSS, TURNING))
+    monkeypatch.setattr(unrecorded_thruster, "accelerations", lambda *_: (ACROSS, TURNING))
     model = SimpleNamespace(stand_in=None)
     return SimpleNamespace(model=model, setting=SETTING, coefficients={}, counts=1.0)
 
@@ -39,10 +38,10 @@ def passed(force: float):
 def test_pushes_at_one_place_are_found_there(reference):
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unnamed.pulses_of(linear, none, reference, UNREST, weight)
+    found = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight)
     assert found.gain > 30.0
     assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.05)
-    quiet = unnamed.pulses_of(passed(0.0), none, reference, UNREST, weight)
+    quiet = unrecorded_thruster.pulses_of(passed(0.0), none, reference, UNREST, weight)
     assert quiet.gain < 3.0
 
 
@@ -55,7 +54,7 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
     pushed = drawn @ np.linalg.cholesky(more.kernel(knots)).T
     linear = straight.passed(record, straight.columns_of(()), pushed=pushed, seed=5)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    assert unnamed.pulses_of(linear, none, reference, UNREST, weight).gain < 0.0
+    assert unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight).gain < 0.0
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
@@ -68,8 +67,10 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
               for v in (linear.e, linear.z, linear.j)]  # fmt: skip
     away = replace(linear, cut=replace(linear.cut, used=used), lost=lost,
                    e=zeroed[0], z=zeroed[1], j=zeroed[2])  # fmt: skip
-    found = unnamed.pulses_of(away, none, reference, UNREST, np.where(lost, 0.0, 1.0))
-    without = unnamed.pulses_of(linear.pick(~lost), none, reference, UNREST, np.ones(COUNT - 1))
+    found = unrecorded_thruster.pulses_of(away, none, reference, UNREST, np.where(lost, 0.0, 1.0))
+    without = unrecorded_thruster.pulses_of(
+        linear.pick(~lost), none, reference, UNREST, np.ones(COUNT - 1)
+    )
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
 
 
@@ -77,14 +78,14 @@ def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
     """Bursts at one place: a force at that place unless they are usual there."""
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unnamed.pulses_of(linear, none, reference, UNREST, weight)
+    found = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight)
     usual = found.force * found.unit
-    again = unnamed.pulses_of(linear, none, reference, UNREST, weight, usual)
+    again = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight, usual)
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
     # beside a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
-    other = unnamed.pulses_of(linear, none, reference, UNREST, weight, elsewhere)
+    other = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight, elsewhere)
     assert other.gain > 20.0
 
 
@@ -99,12 +100,12 @@ def asked(monkeypatch):
     said = {}
 
     def pulses_of(linear, d, reference, unrest, weight):
-        left = evidence.weighed(linear, unrest).dd[:, 0, 0]
+        left = likelihood.weighed(linear, unrest).dd[:, 0, 0]
         said.update(left=left, weight=weight)
         assert not d.any()
         return Pulses(0.0, said.get("gain", 7.0), 0.3, 2.0, UNIT)
 
-    monkeypatch.setattr(unnamed, "pulses_of", pulses_of)
+    monkeypatch.setattr(unrecorded_thruster, "pulses_of", pulses_of)
     return said
 
 
@@ -131,6 +132,6 @@ def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
         made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
         intermittent.usual_push(made, segments.grid(record))
         left[bool(own.any())] = asked["left"]
-        before = evidence.weighed(given, straight.UNREST).dd[:, 0, 0]
+        before = likelihood.weighed(given, straight.UNREST).dd[:, 0, 0]
         assert not own.any() or before.min() > 3.0 * left[True].max()
     assert left[True] == pytest.approx(left[False], rel=0.1)

@@ -7,11 +7,16 @@ import pytest
 import straight
 from straight import CAUSES, SETTING, UNREST
 
-from shiplog import evidence, reference
-from shiplog.diagnosis import discrepancy, nominal_campaign, voyage_effects
+from shiplog.diagnosis import (
+    discrepancy,
+    likelihood,
+    nominal_campaign,
+    nominal_reference,
+    voyage_effects,
+)
 from shiplog.diagnosis.nominal_campaign import FEWEST, parts_of, prior
+from shiplog.diagnosis.nominal_reference import Settled, Start
 from shiplog.diagnosis.voyage_effects import VoyageEffects
-from shiplog.reference import Settled, Start
 
 
 def cuts(seed: int) -> np.ndarray:
@@ -111,7 +116,7 @@ def test_products_of_parts_are_those_of_the_whole():
     columns = straight.columns_of(CAUSES[:2])
     record = straight.sailed(6)
     given = straight.passed(record, columns)
-    modes = evidence.modes(evidence.weighed(given, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(given, UNREST), UNREST)
     weight = np.linspace(0.2, 1.0, 6)
     unit = columns.unit
     rows = [np.arange(2), np.arange(2, 6)]
@@ -156,7 +161,7 @@ START = Start(np.zeros(2), np.array([0.3, 2.0]), np.full(2, -9.0), np.full(2, 9.
 @pytest.fixture(scope="module")
 def learned(model):
     """Characteristics and campaign of 24 segments in two voyages, with `drag` in all of them."""
-    columns = reference.columns_of(model, SETTING, START)
+    columns = nominal_reference.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     numbers = np.zeros(len(columns.unit))
     numbers[columns.of["drag"]] = 0.5
@@ -234,7 +239,7 @@ def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
 def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, monkeypatch):
     """A cause that only the trial can have, such as a second place's: no deviation was learned."""
     found, _ = learned
-    columns = reference.columns_of(model, SETTING, START)
+    columns = nominal_reference.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     given = straight.passed(record, columns, told=0.3)
     monkeypatch.setattr(nominal_campaign, "read", lambda *_: (given.cut, None, None))

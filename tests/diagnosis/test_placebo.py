@@ -7,9 +7,9 @@ import pytest
 import straight
 from straight import CAUSES
 
+from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.placebo import placebos
 from shiplog.diagnosis.trial import SIZES
-from shiplog.reference import marginal
 
 SHARE = 0.5
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import weighed
 
-from shiplog import causes
 from shiplog import profile as profiles
-from shiplog.causes import Setting
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import name_of
 from shiplog.diagnosis.posterior import best_with, of_one_device, posterior, share_of_causes
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.models import causes
+from shiplog.models.causes import Setting
 
 DRAG, LOAD = ("drag",), ("load",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)

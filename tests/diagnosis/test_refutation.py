@@ -7,7 +7,7 @@ import weighed
 
 from shiplog.diagnosis.refutation import judged
 from shiplog.diagnosis.trial import NOMINAL
-from shiplog.gain import Gain
+from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 BETTER, WORSE = (0.1, 0.3), (-0.4, -0.02)

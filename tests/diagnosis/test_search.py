@@ -11,10 +11,10 @@ from straight import CAUSES
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
+from shiplog.diagnosis.evidence import Point
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
-from shiplog.hypotheses import Point
-from shiplog.unnamed import Pulses
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 TOLD = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2

@@ -10,12 +10,12 @@ import straight
 from scipy.stats import multivariate_normal, norm
 from straight import CAUSES, UNREST
 
-from shiplog.columns import HELD
 from shiplog.diagnosis import nominal_campaign
 from shiplog.diagnosis import trial as trials
 from shiplog.diagnosis.discrepancy import EVEN
+from shiplog.diagnosis.evidence import Trial as Former
+from shiplog.diagnosis.parameter_layout import HELD
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.hypotheses import Trial as Former
 
 SHARE = 0.5  # of itself that the trial counts
 DRAG = 1.5  # three realistic sizes, in the trial

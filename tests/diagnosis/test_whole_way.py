@@ -16,40 +16,40 @@ import pytest
 import sailing
 
 from pipelines import diagnose as pipeline
-from pipelines.diagnosis.held_out import HeldOut
+from pipelines.experiments.simulated_ship import Laws, cases, sensors
 from pipelines.identify import identify_run
-from pipelines.known_ship import Laws, cases, sensors
 from pipelines.prepare import ingest_logs
-from pipelines.split import choose_physical_split
-from shiplog import (
-    advise,
-    conventions,
-    evidence,
-    linearise,
-    reading,
-    record,
-    segments,
-    timescale,
-    unnamed,
-)  # fmt: skip
-from shiplog import decision as decisions
 from shiplog import profile as profiles
-from shiplog.config import Config, Physics
-from shiplog.diagnosis import placebo, search
+from shiplog.diagnosis import (  # fmt: skip
+    likelihood,
+    linearisation,
+    measurement_correction,
+    next_manoeuvre,
+    placebo,
+    search,
+    segments,
+    sign_conventions,
+    unrecorded_thruster,
+)
+from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.decide import decide
+from shiplog.diagnosis.evidence import Found
+from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.relinearisation import settle, within
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError
-from shiplog.hypotheses import Found
-from shiplog.ingest import ingest
-from shiplog.settling import settle, within
-from shiplog.store import Store
+from shiplog.training.run_config import Config, Physics
+from shiplog.voyages import recording, timescale  # fmt: skip
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.split import choose_physical_split
+from shiplog.voyages.store import Store
 
 SEED = 7101
 PROFILE = profiles.load("esso-vectwin")
 NOMINAL = ("nominal_1", "nominal_3", "nominal_5", "nominal_6")  # 3400 s
 TIDE = """
 import jax.numpy as jnp
-from shiplog.causes import Cause, Parameter
+from shiplog.models.causes import Cause, Parameter
 
 
 class Tide(Cause):
@@ -137,7 +137,7 @@ def trials(sea, tmp_path_factory):
             case = hidden(cause, **changes)
             folder = tmp_path_factory.mktemp("trial")
             made = [ingest(log(case, leg, folder), PROFILE) for leg in case.trial]
-            read = record.read([v.table for v in made], [v.name for v in made], PROFILE)
+            read = recording.read([v.table for v in made], [v.name for v in made], PROFILE)
             kept[key] = replace(read, timescale=sea.done.trial.record.timescale)
         return kept[key]
 
@@ -302,8 +302,8 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
     """Each is its own inverse: turned back, the model is as good as it was. Its current is in it:
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
-    (turned,) = [w for s, w in conventions.other(PROFILE, cut) if said in s]
-    found, loss = conventions.best(model, turned)
+    (turned,) = [w for s, w in sign_conventions.other(PROFILE, cut) if said in s]
+    found, loss = sign_conventions.best(model, turned)
     assert said in found
     assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
     told = HeldOut(turned, model, sea.done.trial).lost(None)
@@ -338,13 +338,19 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     hull, and the ship swing both ways to tell a gyro's scale from its bias."""
     trial = sea.done.trial
     grams = dict(
-        zip((m.said(1.0) for m in advise.MANOEUVRES), advise.sailed(trial, {}), strict=True)
+        zip(
+            (m.said(1.0) for m in next_manoeuvre.MANOEUVRES),
+            next_manoeuvre.sailed(trial, {}),
+            strict=True,
+        )
     )
     by = {c.label: c for c in sea.campaign.reference.model.causes}
 
     def worth(label, numbers, other):
         one = replace(sea.done.decision.named[0], cause=by[label], numbers=np.array(numbers))
-        return {w.split(",")[0]: advise.apart(trial, g, one, other) for w, g in grams.items()}
+        return {
+            w.split(",")[0]: next_manoeuvre.apart(trial, g, one, other) for w, g in grams.items()
+        }
 
     lag = worth("rudder_lag", [2.0], "rudder_delay")
     assert lag["a drifting stop"] == pytest.approx(0.0, abs=1e-3)
@@ -361,14 +367,14 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     drawn with it: sway and yaw rate pushed together."""
     rng = np.random.default_rng(5)
     ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
-    unit = unnamed.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
+    unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
     knots, count = 16, 300
     unrest = replace(afloat.UNREST, pulse=1.7 * unit)
     z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it seen, as well as a knot can be
     drawn = np.zeros((count, 6 + 3 * knots, 1))
     drawn[:, 6:, 0] = rng.multivariate_normal(np.zeros(3 * knots), unrest.kernel(knots), count)
     sure = 1e12
-    weighed = evidence.Weighed(
+    weighed = likelihood.Weighed(
         sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
     )
     trial = SimpleNamespace(
@@ -385,13 +391,13 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
         np.zeros((count, 1, 1)), np.zeros(count), 0.2,
     )  # fmt: skip
-    path = linearise.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
-    linear = linearise.Linear(
+    path = linearisation.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
+    linear = linearisation.Linear(
         cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * knots)),
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip
-    monkeypatch.setattr(evidence, "weighed", lambda *_: weighed)
-    found = unnamed.pulses(trial, SimpleNamespace(linear=linear), None)
+    monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
+    found = unrecorded_thruster.pulses(trial, SimpleNamespace(linear=linear), None)
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0
@@ -537,9 +543,11 @@ def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     numbers = {"clock_offset:gnss": np.array([1.4])}
     late = trial.at(numbers)
     ref = sea.campaign.reference
-    cut, moved, shown = reading.read(ref.model, ref.setting, trial.record, trial.rows, numbers)
+    cut, moved, shown = measurement_correction.read(
+        ref.model, ref.setting, trial.record, trial.rows, numbers
+    )
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-    fresh = linearise.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
+    fresh = linearisation.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
     columns = ref.columns.of["antenna_offset"]
     assert late.linear.j[..., columns] == pytest.approx(fresh.j[..., columns], abs=1e-5)
 
@@ -552,9 +560,9 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     column -= ref.columns.base
     noise = np.zeros_like(seen.state)
     noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(seen))
-    quiet = reading.read(ref.model, ref.setting, seen, rows)[2][..., 1, column]
+    quiet = measurement_correction.read(ref.model, ref.setting, seen, rows)[2][..., 1, column]
     noisy = replace(seen, state=seen.state + noise)
-    loud = reading.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
+    loud = measurement_correction.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
     assert (loud - quiet).std() < 0.4 * quiet.std()
     change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / timescale.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
@@ -566,12 +574,14 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     in it, a step would be a spike, and a rudder recorded in steps would tell of no lag."""
     seen, ref = sea.done.trial.record, sea.campaign.reference
     (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
-    time = reading.STEP * lag.sizes(ref.setting)[0]
+    time = measurement_correction.STEP * lag.sizes(ref.setting)[0]
     column = ref.columns.of["rudder_lag"][0] - ref.columns.base
     step = np.zeros_like(seen.actuator)
     step[1000:, 0] = 0.2
     stepped = replace(seen, actuator=step)
-    moved = reading.read(ref.model, ref.setting, stepped, np.array([900]))[1][0, :, 0, column]
+    moved = measurement_correction.read(ref.model, ref.setting, stepped, np.array([900]))[1][
+        0, :, 0, column
+    ]
     # straight from row to row: the step is half a row before
     t = (900 - 1000 + 0.5 + timescale.NODE_ROWS * np.arange(len(moved))) * seen.step
     assert np.abs(moved[t < -0.15]).max() == 0.0

@@ -9,7 +9,7 @@ from test_cli import call
 
 from pipelines.paper import choose_voyages
 from shiplog.exceptions import StoreError
-from shiplog.paper import sets
+from shiplog.report.paper import sets
 
 FEW = ("--window", 20, "--width", 8, "--seeds", 2, "--epochs", 2)
 DATA = ("ref", "sli2", "jit2", "d-ref")

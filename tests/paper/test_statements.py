@@ -5,7 +5,7 @@ import math
 import polars as pl
 import pytest
 
-from shiplog.paper import statements
+from shiplog.report.paper import statements
 
 
 def losses(**sets):

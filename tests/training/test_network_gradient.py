@@ -13,7 +13,7 @@ from small_networks import by_autograd, network, windows
 from shiplog import channels
 from shiplog.models.feedforward import FeedForward, Scaling, Shape, exogenous, scaling
 from shiplog.training import kernel, network_gradient
-from shiplog.windows import Windows
+from shiplog.voyages.windows import Windows
 
 
 def bodies():

@@ -6,11 +6,11 @@ import pytest
 import torch
 from small_networks import by_autograd, network, windows
 
-from shiplog import seeds
-from shiplog.config import Config, Fast, Paper, Split
+from shiplog import random_streams
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient
 from shiplog.training.network_training import fast, paper, shortened
+from shiplog.training.run_config import Config, Fast, Paper, Split
 
 SHAPE = Shape(3, width=12, depth=2)
 
@@ -26,7 +26,7 @@ def plainly(model, learnt, epochs, settings, seed):
     """Sec. 4.3 as it is written: the L2 term in the loss, autograd, one random split an epoch."""
     model = copy.deepcopy(model)
     adam = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
-    stream = seeds.generator(seed, "batches")
+    stream = random_streams.generator(seed, "batches")
     for _ in range(epochs):
         for rows in torch.tensor_split(torch.randperm(len(learnt), generator=stream), 3):
             adam.zero_grad()

@@ -9,7 +9,7 @@
     cases      nominal and trial campaign, and the key
 
 Two families of forms must not win because one pen wrote both: laws, exponents and noise times here
-are taken from other sources than those of `shiplog.causes`, and a test compares them.
+are taken from other sources than those of `shiplog.models.causes`, and a test compares them.
 """
 
 from __future__ import annotations

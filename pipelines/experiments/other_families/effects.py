@@ -2,7 +2,8 @@
 
 Sizes are in units of the ship: U its harbour speed, L its length, L/U its time, m U²/L its force.
 Each range names where it comes from; "equipment" means what yards and users report of it, without
-one source. The middles of the ranges are not the priors of `shiplog.causes`, and a test says so.
+one source. The middles of the ranges are not the priors of
+`shiplog.models.causes`, and a test says so.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from jax import Array
 
 from shiplog.models.mmg.estimate import GRAVITY
 from shiplog.models.mmg.geometry import Geometry
-from shiplog.models.mmg.smooth import speed
+from shiplog.models.mmg.safe_root import speed
 
 
 def hull(p: Mapping[str, Array], g: Geometry, u: Array, v: Array, r: Array) -> Array:

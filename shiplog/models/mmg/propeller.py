@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from shiplog.models.mmg.geometry import Geometry, Propeller
-from shiplog.models.mmg.smooth import speed
+from shiplog.models.mmg.safe_root import speed
 
 PITCH_RATIO = 0.7151  # of the screw whose side force the A and B with n > 0 were measured on
 BREAKS = (-0.35, -0.06)  # J_s where the astern side force changes its branch (Hachii)

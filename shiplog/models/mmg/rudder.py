@@ -10,7 +10,7 @@ from jax import Array
 
 from shiplog.models.mmg.geometry import Geometry, Propeller, Rudder
 from shiplog.models.mmg.propeller import slipstream
-from shiplog.models.mmg.smooth import root
+from shiplog.models.mmg.safe_root import root
 
 
 def ahead_inflow(

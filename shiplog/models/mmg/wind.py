@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from shiplog.models.mmg.geometry import AIR, Geometry
-from shiplog.models.mmg.smooth import root
+from shiplog.models.mmg.safe_root import root
 
 
 def apparent(true_wind: Array, heading: Array, u: Array, v: Array) -> tuple[Array, Array]:

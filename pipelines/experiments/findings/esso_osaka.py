@@ -1,0 +1,110 @@
+"""The 3 m Esso Osaka: its sensors, its published model, its own identified one, its wind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipelines.experiments.esso_osaka import TWIN, trials_store
+from pipelines.experiments.extrapolation import physics
+from pipelines.experiments.findings.said import diagnosed, variant
+from pipelines.identify import identify_run
+from pipelines.prepare import expand, ingest_logs
+from shiplog.report import tables
+from shiplog.training.run_config import Config, Split
+from shiplog.voyages import sensor_consistency
+from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.store import Store
+
+MANOEUVRES = ("berthing", "random", "turn", "zigzag")
+COLUMNS = {  # kind and channel of an estimate → its column
+    ("clock_offset", "yaw_rate"): "yaw rate late, s",
+    ("yaw_rate_scale", "yaw_rate"): "yaw rate scale",
+    ("clock_offset", "velocity"): "velocity late, s",
+}
+
+
+def sensors(folder: Path, out: Path) -> str:
+    """A row a voyage: what its instruments say of each other, in brackets where it may be none."""
+    store = trials_store(folder, out)
+    said = {name: _estimates(store, name) for name in trials(store)}
+    rows = [
+        (name, *(_cell(found.get(key)) for key in COLUMNS)) for name, found in said.items()
+    ]  # fmt: skip
+    lines = [tables.table(("voyage", *COLUMNS.values()), rows), ""]
+    for key, column in COLUMNS.items():
+        for kind in MANOEUVRES:
+            values = [f[key].value for n, f in said.items() if n.startswith(kind) and key in f]
+            if values:
+                lines.append(
+                    f"{column}, {kind}: {min(values):.3f} to {max(values):.3f} in {len(values)}"
+                )
+    lines += [
+        f"also {name}: {e.kind} of {e.channel} {_cell(e)} {e.unit}"
+        for name, found in said.items()
+        for key, e in found.items()
+        if e.notable and key not in COLUMNS
+    ]
+    return "\n".join(lines)
+
+
+def trials(store: Store, *patterns: str) -> list[str]:
+    """Voyages without the one that is the beginning of another."""
+    return [n for n in store.select(list(patterns) or None) if n != TWIN]
+
+
+def _estimates(store: Store, name: str) -> dict[tuple[str, str], Estimate]:
+    found = sensor_consistency.estimates(store.tables([name])[0].collect(), store.profile([name]))
+    return {(e.kind, e.channel): e for e in found}
+
+
+def _cell(e: Estimate | None) -> str:
+    """Value and 90 % interval; in brackets where it is not said, since it may be none."""
+    if e is None:
+        return "-"
+    digits = 2 if e.unit == "s" else 3
+    text = f"{e.value:.{digits}f} ({e.low:.{digits}f} to {e.high:.{digits}f})"
+    return text if e.notable else f"[{text}]"
+
+
+def published(folder: Path, out: Path) -> str:
+    """The published MMG against all voyages, and against the random ones alone."""
+    store = trials_store(folder, out)
+    run = physics(store, out / "published", split(store), fit=False)
+    return "\n\n".join(
+        diagnosed(run, store, trials(store, *patterns), out / f"published-{what}", what)
+        for what, patterns in (("all", ()), ("random", ("random_*",)))
+    )
+
+
+def refitted(folder: Path, out: Path) -> str:
+    """The model identified from the very voyages that are then diagnosed."""
+    store = trials_store(folder, out)
+    run = physics(store, out / "refitted", split(store))
+    return diagnosed(run, store, trials(store, "random_*"), out / "refitted-random", "random")
+
+
+def split(store: Store) -> Split:
+    return Split(training=tuple(trials(store)), validation=())
+
+
+def wind(folder: Path, out: Path) -> str:
+    """The published MMG without its wind: no wind known at all, then offered as an input."""
+    store = trials_store(folder, out)
+    calm = Store(out / "calm")
+    if not calm.entries():
+        path = variant("esso-osaka", out / "esso-calm.toml", _without_wind)
+        ingest_logs(expand([out / "logs"]), str(path), calm)
+    said = []
+    for what, there in (("withheld", calm), ("offered", store)):
+        run = out / f"no-wind-{what}"
+        if not run.exists():
+            off = {"fit": False, "without": ("wind",)}
+            config = Config.model_validate({"model": "mmg", "split": split(there), "physics": off})
+            identify_run(config, there, run)
+        names = trials(there, "random_*")
+        said.append(diagnosed(run, there, names, out / f"no-wind-random-{what}", what))
+    return "\n\n".join(said)
+
+
+def _without_wind(profile: dict) -> None:
+    del profile["sensors"]["wind"]

@@ -1,0 +1,217 @@
+"""The goals' table: shares of cases with their intervals, and what is asked of each, at home and on
+ships of other families."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+from pipelines.experiments.hidden_effects.parameters import ABSORBED, OTHER_FORM, SURVIVE
+from pipelines.experiments.hidden_effects.score import FAILED, Answer, calibration, clopper_pearson
+from shiplog.report import tables
+
+Test = Callable[[Answer], bool]
+Limits = tuple[float | None, float | None]  # at least, at most
+FREE: Limits = (None, None)
+FULL, SMALL = 1.0, 0.3
+SURE = 0.9
+NOT_MEASURED = "not measured"
+
+
+def full(answer: Answer) -> bool:
+    return answer.size > FULL - 1e-9
+
+
+def small(answer: Answer) -> bool:
+    return answer.size > SMALL - 1e-9 and not full(answer)
+
+
+def tiny(answer: Answer) -> bool:
+    return not full(answer) and not small(answer)
+
+
+def physics(answer: Answer) -> bool:
+    return answer.planned.model == "mmg"
+
+
+def among(kind: str, sized: Test = lambda answer: True, seconds: int | None = 7000) -> Test:
+    def test(answer: Answer) -> bool:
+        there = seconds is None or answer.planned.seconds == seconds
+        return there and physics(answer) and answer.kind == kind and sized(answer)
+
+    return test
+
+
+def _network(causes: Sequence[str]) -> Test:
+    return lambda answer: not physics(answer) and set(answer.hidden) <= set(causes)
+
+
+def right(answer: Answer) -> bool:
+    return answer.right
+
+
+def alarmed(answer: Answer) -> bool:
+    """Anything but `none`: a name, unknown, undecided, coverage, external, or no verdict at all."""
+    return answer.word != "none"
+
+
+def outside_found(answer: Answer) -> bool:
+    """Unknown with the right family, or undecided with it first or second."""
+    return answer.word in ("unknown", "undecided") and answer.found
+
+
+def outside_its_group(answer: Answer) -> bool:
+    """Something is named that is not there, and all that is there is in no group that is said."""
+    return answer.misnamed and not answer.found
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """A share of cases, and the limits asked of it at home and abroad."""
+
+    what: str
+    among: Test
+    hit: Test
+    home: Limits = FREE
+    abroad: Limits = FREE
+
+    def hits(self, answers: Iterable[Answer]) -> list[bool]:
+        """A case without a verdict counts: it is neither right nor `none`."""
+        return [self.hit(answer) for answer in answers if self.among(answer)]
+
+
+ONE = among("one", full)
+RATES = (
+    Rate("named but wrong, any size", physics, lambda answer: answer.misnamed,
+         (None, 0.015), (None, 0.03)),
+    Rate("named but wrong, and the truth not in the group it says", physics, outside_its_group),
+    Rate("nothing hidden: any alarm", among("none", seconds=None), alarmed,
+         (None, 0.03), (None, 0.05)),
+    Rate("nothing hidden: a cause named", among("none", seconds=None),
+         lambda answer: bool(answer.named)),
+    Rate("one cause, size 1, 7000 s: named right", ONE, right, (0.96, None), (0.75, None)),
+    Rate("the same: right in the group it says, or undecided and among the first two", ONE,
+         lambda answer: answer.found, (0.98, None), (0.90, None)),
+    Rate("one cause, size 0.3 to 1, 7000 s", among("one", small), right, (0.90, None)),
+    Rate("one cause, size below 0.3, 7000 s", among("one", tiny), right),
+    Rate("one cause, size 1, 500 s", among("one", full, 500), right, (0.88, None)),
+    Rate("outside, size 1: unknown or undecided, right family", among("outside", full),
+         outside_found, (0.95, None), (0.80, None)),
+    Rate("outside, size below 1", among("outside", lambda answer: not full(answer)),
+         outside_found),
+    Rate("two at once, size 1: both, no third", among("two", full), right, (0.90, None)),
+    Rate("two at once, size below 1", among("two", lambda answer: not full(answer)), right),
+    Rate("traceback, or no verdict in time", physics, lambda answer: answer.word == FAILED,
+         (None, 0.0), (None, 0.0)),
+)  # fmt: skip
+NETWORK = (
+    Rate("network on affected data: what it cannot take in", _network(SURVIVE), right,
+         (0.90, None)),
+    Rate("network on affected data: what it has taken in, named", _network(ABSORBED),
+         lambda answer: not answer.misnamed and bool(answer.named), (None, 0.0)),
+    Rate("network on affected data: named but wrong", lambda answer: not physics(answer),
+         lambda answer: answer.misnamed, (None, 0.02)),
+)  # fmt: skip
+INTERVALS = "90 % intervals that hold the truth"
+CALIBRATION = "expected calibration error, 10 bins"
+CERTAIN = f"said with {SURE} and more: right"
+LIMITS: dict[str, tuple[Limits, Limits]] = {  # what is not a share of cases: home, abroad
+    INTERVALS: ((0.85, 0.95), (0.80, 0.95)),
+    CALIBRATION: ((None, 0.04), (None, 0.06)),
+    CERTAIN: ((0.97, None), (0.95, None)),
+}
+
+
+def intervals(answers: Iterable[Answer]) -> list[bool]:
+    """Of causes that were named; those whose form differs in the simulator have no goal."""
+    compared = chain.from_iterable(answer.compared.items() for answer in answers)
+    return [hit for name, one in compared if name not in OTHER_FORM for hit in one.covered]
+
+
+def beliefs(answers: Iterable[Answer]) -> list[tuple[float, bool]]:
+    """Probability of the answer and whether it is right, of those that give one."""
+    return [answer.belief for answer in answers if answer.belief is not None]
+
+
+def certain(answers: Iterable[Answer]) -> list[bool]:
+    return [hit for probability, hit in beliefs(answers) if probability >= SURE]
+
+
+# --- cells ----------------------------------------------------------------------------------------
+
+
+def percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %".replace(".0 %", " %")
+
+
+def asked(limits: Limits) -> str:
+    signed = zip((">=", "<="), limits, strict=True)
+    return " and ".join(f"{sign} {percent(limit)}" for sign, limit in signed if limit is not None)
+
+
+def met(share: float, limits: Limits) -> str:
+    """yes or no; empty where nothing is asked."""
+    least, most = limits
+    if least is None and most is None:
+        return ""
+    return "yes" if (least or 0.0) <= share <= (1.0 if most is None else most) else "no"
+
+
+def cell(hits: Sequence[bool]) -> str:
+    """Share, count and Clopper-Pearson interval at 90 %; empty without cases."""
+    if not hits:
+        return ""
+    low, high = clopper_pearson(sum(hits), len(hits))
+    ends = f"[{100.0 * low:.1f}, {100.0 * high:.1f}]"
+    return f"{percent(sum(hits) / len(hits))} ({sum(hits)}/{len(hits)}) {ends}"
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+Figure = tuple[float, str]  # the number that is held against the limits, and its cell
+
+
+def figures(answers: Sequence[Answer]) -> dict[str, Figure]:
+    """Row of the goals' table → what was measured; rows without a case are left out."""
+    shares = {rate.what: rate.hits(answers) for rate in RATES}
+    shares |= {INTERVALS: intervals(answers), CERTAIN: certain(answers)}
+    found = {what: (sum(h) / len(h), cell(h)) for what, h in shares.items() if h}
+    if pairs := beliefs(answers):
+        error = calibration(pairs)
+        found[CALIBRATION] = (error, f"{percent(error)} ({len(pairs)})")
+    return found
+
+
+ROWS: dict[str, tuple[Limits, Limits]] = {
+    **{rate.what: (rate.home, rate.abroad) for rate in RATES[:-1]},
+    **LIMITS,
+    RATES[-1].what: (RATES[-1].home, RATES[-1].abroad),
+}
+
+
+def table(home: Sequence[Answer], abroad: Sequence[Answer]) -> str:
+    """The goals' table of one program: measured, asked and met, at home and abroad."""
+    measured = (figures(home), figures(abroad))
+    rows = []
+    for what, limits in ROWS.items():
+        if not any(what in figures_ for figures_ in measured):
+            continue
+        cells = []
+        for found, limit in zip(measured, limits, strict=True):
+            share, text = found.get(what, (None, NOT_MEASURED if asked(limit) else ""))
+            cells += [text, asked(limit), "" if share is None else met(share, limit)]
+        rows.append((what, *cells))
+    return tables.table(("", "home", "goal", "met", "abroad", "goal", "met"), rows)
+
+
+def by_method(answers: Mapping[str, Sequence[Answer]], abroad: bool) -> str:
+    """The same rows with a column a method, of one place."""
+    measured = {method: figures(given) for method, given in answers.items()}
+    each = measured.values()
+    rows = [
+        (what, asked(limits[abroad]), *(found[what][1] if what in found else "" for found in each))
+        for what, limits in ROWS.items()
+        if any(what in found for found in each)
+    ]
+    return tables.table(("", "goal", *measured), rows)

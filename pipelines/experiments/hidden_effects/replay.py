@@ -1,0 +1,82 @@
+"""Cases that were kept, diagnosed again by the program as it is now, into a folder of their own.
+
+Logs, store and model stay those of the first run and are only read. Its keys are copied, unopened,
+once the new verdicts are sealed; nothing of its verdicts is used.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import shutil
+from pathlib import Path
+
+from pipelines.experiments.hidden_effects import plan as plans
+from pipelines.experiments.hidden_effects import run
+from pipelines.experiments.hidden_effects.plan import Plan, Planned
+from pipelines.experiments.hidden_effects.program import identity, name
+from pipelines.experiments.hidden_effects.run import Settings
+from shiplog.exceptions import ShiplogError
+
+log = logging.getLogger(__name__)
+
+MADE = ("logs", "ingest", "train")  # steps of the first run that a replay stands on
+
+
+def folder_of(source: Path) -> Path:
+    """Where a replay of `source` goes unless told otherwise: beside it, named after the commit."""
+    return source.with_name(f"{source.name}-{name(identity()).replace(' ', '-')}")
+
+
+def replay(source: Path, out: Path, settings: Settings) -> Plan:
+    """The plan of what was replayed. Raises ShiplogError where no case of `source` was kept."""
+    if source.resolve() == out.resolve():
+        raise ShiplogError(
+            f"{out} cannot hold its own replay.", hint="choose another folder with --out."
+        )
+    before = plans.load(source)
+    cases = tuple(one for one in before.cases if run.kept(source, one))
+    if not cases:
+        raise ShiplogError(
+            f"{source} has no case with store and base.", hint="run the suite with --keep first."
+        )
+    log.info("%d of %d cases were kept", len(cases), len(before.cases))
+    plan = plans.save(out, Plan(before.suite, before.first_seed, cases))
+
+    def again(planned: Planned) -> str | None:
+        return _case(source, out, planned, settings)
+
+    todo = [[one] for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
+    run.in_turn(todo, again, settings.jobs)
+    return plan
+
+
+def _left(out: Path, planned: Planned, settings: Settings) -> bool:
+    folder = plans.case_folder(out, planned)
+    asked = (folder / "rivals.sha256").exists() or not settings.rivals
+    return not (run.finished(folder) and asked)
+
+
+def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
+    """What was said, for the log; None where somebody stopped it."""
+    first = plans.case_folder(source, planned).resolve()
+    folder = plans.case_folder(out, planned).resolve()
+    store, base = first / "store", run.base_of(source, planned)
+    said = []
+    if not run.finished(folder):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        done = run.step("diagnose", run.diagnosing(settings, base, store, folder), folder, settings)
+        if done["rc"] in run.STOPPED:
+            return None
+        steps = json.loads((first / "steps.json").read_text(encoding="utf-8"))
+        made = [one for one in steps if one["step"] in MADE]
+        said.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")
+    if settings.rivals and not (folder / "rivals.sha256").exists():
+        said.append(run.ask_rivals(folder, base, store, settings))
+    if None in said:
+        return None
+    if not settings.keep:
+        shutil.rmtree(folder / "d", ignore_errors=True)
+    shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
+    return "; ".join(said)

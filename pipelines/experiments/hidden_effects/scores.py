@@ -1,0 +1,184 @@
+"""Scores that the literature of fault diagnosis uses, of one method's answers.
+
+Alarms and isolation as in the benchmarks of fault detection; the repair utility of the DX
+competition; the logarithmic score of probability forecasts.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import statistics
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+
+from pipelines.experiments.hidden_effects.goals import alarmed, cell
+from pipelines.experiments.hidden_effects.parameters import NAMES
+from pipelines.experiments.hidden_effects.score import FAILED, Answer
+from shiplog.report import tables
+
+OUTSIDE = "outside the catalogue"  # a component of its own, beside the names
+COMPONENTS = len(NAMES) + 1
+FLOOR = 0.01  # least probability that the log score takes: a ranking lists nothing below it
+KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside": "outside"}
+
+
+# --- alarms and isolation -------------------------------------------------------------------------
+
+
+def alarms_on_effects(answers: Sequence[Answer]) -> list[bool]:
+    """Detection rate: of the cases with something hidden, those that anything was said of. A case
+    without a verdict is not detected."""
+    return [alarmed(a) and a.word != FAILED for a in answers if a.kind != "none"]
+
+
+def alarms_on_clean(answers: Sequence[Answer]) -> list[bool]:
+    """False alarm rate: of the clean campaigns, those that were not called `none`. `undecided` is
+    an alarm, and so is a case without a verdict."""
+    return [alarmed(a) for a in answers if a.kind == "none"]
+
+
+def isolation(answers: Sequence[Answer]) -> float | None:
+    """FIA: mean probability of the true cause among those detected; None where none was.
+
+    Of two causes at once the mean of both, of what is outside the catalogue that of `unknown` with
+    the right family. A verdict without probabilities is sure of what it says.
+    """
+    shares = [
+        statistics.mean(_given(one, label) for label in one.truths)
+        for one in answers
+        if one.kind != "none" and alarmed(one) and one.word != FAILED
+    ]
+    return statistics.mean(shares) if shares else None
+
+
+def right_among_alarms(answers: Sequence[Answer]) -> list[bool]:
+    """Of all alarms, also those on clean campaigns, those that say all that is hidden and no
+    more."""
+    return [a.right for a in answers if alarmed(a) and a.word != FAILED]
+
+
+def _given(one: Answer, label: str) -> float:
+    """Probability of a label; of a verdict that gives none, 1 for what it says and 0 otherwise."""
+    found = one.probability(label)
+    return found if found is not None else float(label in _said(one))
+
+
+def _said(one: Answer) -> tuple[str, ...]:
+    if one.word == "unknown":
+        return (f"unknown:{one.family}",)
+    return one.named or ((one.word,) if one.word == "none" else ())
+
+
+# --- the group score of the DX competition --------------------------------------------------------
+
+
+def repair_utility(
+    said: Collection[str], true: Collection[str], components: int = COMPONENTS
+) -> float:
+    """m_utl of one diagnosis: 1 less the share of the components that a repair tests in vain.
+
+        m_utl = 1 - n (N + 1) / (f (n + 1)) - n' (N' + 1) / (f (n' + 1))
+
+    f components; n true ones that are not said, to be found among the N = f - |said| that are not
+    said; n' that are said and not true, to be found among the N' = |said|. n (N + 1) / (n + 1) is
+    the expected number of tests, in random order, until the last of n among N is found. 1 where
+    said is true, 0 where all that is not true is said. Kurtoglu et al. 2009; Feldman et al. 2010,
+    "Empirical evaluation of diagnostic algorithm performance using a generic framework", metric
+    "system repair utility".
+    """
+    missed, false = len(set(true) - set(said)), len(set(said) - set(true))
+    tests = _tests(missed, components - len(set(said))) + _tests(false, len(set(said)))
+    return 1.0 - tests / components
+
+
+def _tests(wanted: int, among: int) -> float:
+    return wanted * (among + 1) / (wanted + 1)
+
+
+def group_utility(one: Answer) -> float:
+    """m_utl of a verdict: the weighted mean over the diagnoses that it leaves open.
+
+    A named verdict leaves one of {name + indistinguishable_from} for each of its names, all equally
+    likely; `undecided` leaves its ranking, as likely as that says; `none`, `coverage` and
+    `external` say that no component is at fault; a case without a verdict has no utility.
+    """
+    if one.word == FAILED:
+        return 0.0
+    true = (OUTSIDE,) if one.kind == "outside" else one.sought
+    open_ = candidates(one)
+    total = sum(open_.values())
+    return sum(w * repair_utility(said, true) for said, w in open_.items()) / total
+
+
+def candidates(one: Answer) -> dict[frozenset[str], float]:
+    """Sets of faulty components that the verdict leaves open, with their weights."""
+    if one.word == "unknown":
+        return {frozenset({OUTSIDE}): 1.0}
+    if one.word == "undecided":
+        found: dict[frozenset[str], float] = {}
+        for entry in one.verdict.get("ranking") or ():
+            said = _component(entry["name"])
+            found[said] = found.get(said, 0.0) + float(entry.get("probability") or 0.0)
+        return found if sum(found.values()) > 0.0 else {frozenset(): 1.0}
+    return {frozenset(said): 1.0 for said in itertools.product(*one.groups)}
+
+
+def _component(label: str) -> frozenset[str]:
+    if label == "none":
+        return frozenset()
+    name = label.partition(":")[0]
+    return frozenset({OUTSIDE if name == "unknown" else name})
+
+
+# --- probabilities --------------------------------------------------------------------------------
+
+
+def log_score(one: Answer) -> float:
+    """ln of the probability that the verdict gave to the truth, at least ln FLOOR (Good 1952).
+
+    Of two causes at once the product of both. 0 is the best; a case without a verdict has the
+    floor.
+    """
+    if one.word == FAILED:
+        return math.log(FLOOR)
+    return math.log(max(math.prod(_given(one, label) for label in one.truths), FLOOR))
+
+
+def prevalence(answers: Sequence[Answer]) -> str:
+    """Which cases the means are over: they depend on it."""
+    counts = Counter(one.kind for one in answers)
+    parts = [f"{KINDS[k]} {counts[k]}/{len(answers)}" for k in KINDS if counts[k]]
+    return ", ".join(parts)
+
+
+# --- the table ------------------------------------------------------------------------------------
+
+
+def table(answers: Mapping[str, Sequence[Answer]]) -> str:
+    """A row a score, a column a method."""
+    rows = {
+        "alarms on effects": alarms_on_effects,
+        "alarms on clean campaigns": alarms_on_clean,
+        "right among alarms": right_among_alarms,
+    }
+    lines = [(what, *(cell(of(given)) for given in answers.values())) for what, of in rows.items()]
+    means = {
+        "FIA, mean probability of the true cause among those detected": isolation,
+        "m_utl, cases with an effect": lambda given: _mean(
+            [group_utility(a) for a in given if a.kind != "none"]
+        ),
+        "m_utl, all cases": lambda given: _mean([group_utility(a) for a in given]),
+        f"log score, nats, at least ln {FLOOR}": lambda given: _mean([log_score(a) for a in given]),
+    }
+    for what, of in means.items():
+        lines.append((what, *(_number(of(given)) for given in answers.values())))
+    return tables.table(("", *answers), lines)
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return statistics.mean(values) if values else None
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"

@@ -1,0 +1,135 @@
+"""The suites: which seeds, and what is hidden in each. All of a case follows from its seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+import numpy as np
+
+from pipelines.experiments.hidden_effects.parameters import ABSORBED, SURVIVE
+from pipelines.experiments.hidden_effects.plan import Plan, Planned
+from pipelines.experiments.simulated_ship.cases import CATALOGUE, OUTSIDE
+from shiplog.exceptions import ShiplogError
+
+Rule = Callable[[int, int], str]  # seed, number in the row → cause
+
+
+def _pair(seed: int, number: int) -> str:
+    """Two different names of the catalogue, drawn evenly by the seed; no pair is left out."""
+    names = tuple(CATALOGUE)
+    drawn = np.random.default_rng([seed, *b"two at once"]).choice(len(names), 2, replace=False)
+    return "+".join(names[i] for i in sorted(drawn))
+
+
+STRIDE = 8  # has no factor in common with the 21 causes
+RULES: dict[str, Rule] = {
+    "none": lambda seed, number: "none",
+    # each equally often, and of every kind some before a row is half done
+    "one": lambda seed, number: tuple(CATALOGUE)[STRIDE * number % len(CATALOGUE)],
+    "two": _pair,
+    "outside": lambda seed, number: tuple(OUTSIDE)[number % len(OUTSIDE)],
+}
+GOALS: tuple[tuple[str, float | None, int], ...] = (  # rule, size, seconds of the trial
+    ("one", 1.0, 7000),
+    ("one", 0.3, 7000),
+    ("one", 1.0, 500),
+    ("none", None, 7000),
+    ("outside", 1.0, 7000),
+    ("two", 1.0, 7000),
+)
+SUITES = {  # name → (first seed, cases; of `goals`: of each row)
+    "fixed": (1001, 12),  # the first twelve after 1000, and none, one, two, outside all occur
+    "brief": (1001, 12),  # the same ships and effects in campaigns of 3000 s: minutes
+    "nightly": (30000, 200),  # never tuned on: shift the block monthly
+    "goals": (20000, 20),
+    "network": (25000, len(SURVIVE) + len(ABSORBED)),
+    "abroad": (70000, 100),
+}
+# Ships whose equations are not the home ship's, in turn.
+FAMILIES = ("abkowitz", "linear_dp", "catamaran", "azimuth_ferry", "shipmmg")
+SHARES: tuple[tuple[str, float | None, int], ...] = (  # rule, size, cases of twenty
+    ("one", 1.0, 6), ("none", None, 5), ("outside", 1.0, 5), ("one", 0.3, 2), ("two", 1.0, 2),
+)  # fmt: skip
+
+
+def plan(suite: str, first_seed: int | None = None, count: int | None = None) -> Plan:
+    """The rows of `goals` share their seeds: the same ships, weather and noise in each."""
+    first, number = SUITES[suite]
+    first = first if first_seed is None else first_seed
+    number = number if count is None else count
+    seeds = range(first, first + number)
+    if suite == "abroad":
+        return Plan(suite, first, abroad(seeds))
+    if suite == "network":
+        causes = (*SURVIVE, *ABSORBED)
+        return Plan(suite, first, tuple(
+            Planned(str(s), s, causes[(s - first) % len(causes)], 1.0, 7000, "feedforward")
+            for s in seeds
+        ))  # fmt: skip
+    if suite != "goals":
+        seconds = 3000 if suite == "brief" else 7000
+        return Plan(suite, first, tuple(Planned(str(s), s, None, None, seconds) for s in seeds))
+    return Plan(suite, first, tuple(
+        Planned(f"{seed}-{row}", seed, RULES[rule](seed, seed - first), size, seconds)
+        for seed in seeds
+        for row, (rule, size, seconds) in enumerate(GOALS, 1)
+    ))  # fmt: skip
+
+
+def abroad(seeds: Sequence[int]) -> tuple[Planned, ...]:
+    """Cases of other families, a seed each; its label, the seed, does not say the row.
+
+    Every twenty cases, counted from the first seed, have the shares of `SHARES`, and every hundred
+    have them within each family. Which case has which row is drawn by the first seed. Raises
+    ShiplogError where the simulator of these families is not installed.
+    """
+    offered, outside = _simulator()
+    rows = [(rule, size) for rule, size, cases in SHARES for _ in range(cases)]
+    order = np.random.default_rng([seeds[0], *b"abroad"]).permutation(len(rows))
+    step = len(rows) // len(FAMILIES)
+    met: dict[tuple[str, str, float | None], int] = {}  # cases so far of family, rule and size
+    cases = []
+    for number, seed in enumerate(seeds):
+        turn, which = divmod(number, len(FAMILIES))
+        family = FAMILIES[which]
+        rule, size = rows[order[(turn + which * step) % len(rows)]]
+        count = met[family, rule, size] = met.get((family, rule, size), -1) + 1
+        causes = _in_turn(seeds[0], family, rule, size, offered(family), outside)
+        turned = [causes[(count + i) % len(causes)] for i in range(len(causes))]
+        own = set(offered(family, seed))  # this ship may lack what another one has
+        fitting = (one for one in turned if own.issuperset(one.split("+")))
+        cause = "none" if rule == "none" else next(fitting, turned[0])
+        cases.append(Planned(str(seed), seed, cause, size, 7000, family=family))
+    return tuple(cases)
+
+
+def _in_turn(
+    first: int, family: str, rule: str, size: float | None, offered: Sequence[str],
+    outside: Sequence[str],
+) -> list[str]:  # fmt: skip
+    """What this row hides on this family, in an order drawn once; all of it before any twice."""
+    if rule == "outside":  # where a family cannot hide all of them it says which
+        names = [name for name in outside if name in offered] or list(outside)
+    else:
+        names = [name for name in offered if name not in outside]
+    if rule == "two":  # `thrust_loss` and `thrust_loss:unit` are one name
+        names = [
+            f"{a}+{b}" for i, a in enumerate(names) for b in names[i + 1 :]
+            if a.partition(":")[0] != b.partition(":")[0]
+        ]  # fmt: skip
+    drawn = np.random.default_rng([first, *f"{family} {rule} {size}".encode()])
+    return [names[i] for i in drawn.permutation(len(names))]
+
+
+def _simulator() -> tuple[Callable[..., tuple[str, ...]], tuple[str, ...]]:
+    """(Family, seed) → causes that this ship can hide, and what of them is in no catalogue."""
+    try:
+        simulator = import_module("pipelines.experiments.other_families")
+        return simulator.offered, tuple(simulator.OUTSIDE)
+    except (ImportError, AttributeError) as error:
+        raise ShiplogError(
+            "The simulator of other families, pipelines.experiments.other_families, is not here "
+            f"({error}).",
+            hint="run the suite `abroad` from a checkout that has it.",
+        ) from error

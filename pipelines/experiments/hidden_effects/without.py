@@ -1,0 +1,199 @@
+"""The program with one part of its decision taken out, to see what that part is for.
+
+python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
+    as `shiplog diagnose RUN ...`, without that part
+python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
+    the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/,
+    and a table: how many are right and how many are misnamed
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from pipelines.experiments.hidden_effects import replay, score
+from pipelines.experiments.hidden_effects.run import Settings
+from shiplog import cli
+from shiplog.diagnosis import (
+    baseline_check,
+    discrepancy,
+    nominal_cache,
+    nominal_campaign,
+    placebo,
+    posterior,
+    refutation,
+    thresholds,
+    trial_voyages,
+    voyage_effects,
+)
+from shiplog.diagnosis.trial import Trial
+from shiplog.report import tables
+
+WHOLE = "nothing"  # the decision as it is
+
+
+def _no_placebo(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
+    stack.enter_context(patch.object(Trial, "usual_push", None))
+
+
+def _no_form_error(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(thresholds, "FORM_ERROR", 0.0))
+
+
+def _no_discrepancy(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(discrepancy, "SEEN", ()))
+    _learned_anew(stack)
+
+
+def _voyages_alike(stack: ExitStack) -> None:
+    """No part of a campaign differs from another."""
+    learned = nominal_cache.characteristics
+
+    def alike(*given):
+        found = learned(*given)
+        least = dict.fromkeys(found.deviation, voyage_effects.LEAST)
+        return replace(found, deviation=least)
+
+    stack.enter_context(patch.object(nominal_cache, "characteristics", alike))
+
+
+def _whole_share(stack: ExitStack) -> None:
+    """A trial counts all of itself."""
+    learned = nominal_cache.characteristics
+
+    def whole(*given):
+        return replace(learned(*given), share=1.0)
+
+    stack.enter_context(patch.object(nominal_cache, "characteristics", whole))
+
+
+def _no_robust_weights(stack: ExitStack) -> None:
+    def plain(square, kept):
+        return np.where(kept, 1.0, 0.0)
+
+    for module in (nominal_campaign, sys.modules[Trial.__module__]):
+        stack.enter_context(patch.object(module, "robust_weights", plain))
+    _learned_anew(stack)
+
+
+def _no_refutation(stack: ExitStack) -> None:
+    judged = refutation.judged
+
+    def unjudged(search, held):
+        decision, found, _, refuted = judged(search, None)
+        gain = held.gain(decision) if held is not None and decision.named else None
+        return decision, found, gain, refuted
+
+    stack.enter_context(patch.object(refutation, "judged", unjudged))
+
+
+def _no_baseline(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(baseline_check, "lacking", lambda *given: ""))
+
+
+def _no_practical_size(stack: ExitStack) -> None:
+    stack.enter_context(patch.object(posterior, "practical", lambda search, one: one.causes))
+
+
+def _no_share_of_causes(stack: ExitStack) -> None:
+    """A cause is named however small a share of the error it explains."""
+    stack.enter_context(patch.object(thresholds, "MOST", 0.0))
+    _no_imitation(stack)  # which asks for that number the other way round
+
+
+def _no_imitation(stack: ExitStack) -> None:
+    """A cause is named though the remainder beside it could do most of what it does."""
+    stack.enter_context(patch.object(Trial, "imitated", lambda *given: 0.0))
+
+
+def _fixed_time_scale(stack: ExitStack) -> None:
+    """Segments of 30 s whatever the ship."""
+
+    def as_they_are(run, nominal, recorded):
+        return nominal, recorded
+
+    stack.enter_context(patch.object(trial_voyages, "in_ship_time", as_they_are))
+
+
+def _learned_anew(stack: ExitStack) -> None:
+    """What is kept in the cache was learned with the part."""
+
+    def learned(*given):
+        return nominal_campaign.characteristics(*given)
+
+    stack.enter_context(patch.object(nominal_cache, "characteristics", learned))
+
+
+PARTS: Mapping[str, Callable[[ExitStack], None]] = {
+    WHOLE: lambda stack: None,
+    "placebo": _no_placebo,
+    "form-error": _no_form_error,
+    "discrepancy": _no_discrepancy,
+    "voyage-effects": _voyages_alike,
+    "share-of-trial": _whole_share,
+    "robust-weights": _no_robust_weights,
+    "refutation": _no_refutation,
+    "baseline": _no_baseline,
+    "practical-size": _no_practical_size,
+    "share-of-causes": _no_share_of_causes,
+    "imitation": _no_imitation,
+    "time-scale": _fixed_time_scale,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] in PARTS:
+        with ExitStack() as stack:
+            PARTS[given[0]](stack)
+            sys.argv = ["shiplog", *given[1:]]
+            cli.main()
+        return 0
+    parser = argparse.ArgumentParser(
+        prog="python -m pipelines.experiments.hidden_effects.without",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--ablate", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
+    asked = parser.parse_args(given)
+    print(table(asked.ablate, asked.only, asked.jobs))
+    return 0
+
+
+def table(source: Path, parts: Sequence[str], jobs: int) -> str:
+    """One line a part: cases, right, misnamed, and how many answers differ from the whole's."""
+    rows, whole = [], {}
+    for part in parts:
+        out = source.with_name(f"{source.name}-without") / part
+        command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
+        replay.replay(source, out, Settings(jobs=jobs, shiplog=command))
+        answers = {a.planned.label: a for a in score.read(out).answers}
+        if part == WHOLE:
+            whole = {label: _said(a) for label, a in answers.items()}
+        other = sum(label in whole and _said(a) != whole[label] for label, a in answers.items())
+        rows.append((
+            part, len(answers), sum(a.right for a in answers.values()),
+            sum(a.misnamed for a in answers.values()), other,
+        ))  # fmt: skip
+    head = ("without", "cases", "right", "misnamed", "other answer than as it is")
+    return f"{shlex.join(sys.argv)}\n\n{tables.table(head, rows)}"
+
+
+def _said(answer: score.Answer) -> tuple:
+    return answer.word, answer.named, answer.family
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""The table of all data sets, and a sentence on whether to believe each answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipelines.experiments.measured_ships.judgements import JUDGEMENTS
+from pipelines.experiments.measured_ships.ships import DATA_SETS
+from pipelines.experiments.measured_ships.way import Way
+from shiplog.report import tables
+from shiplog.voyages.one_hertz import WINDOW
+
+HEAD = """# Measured ships, from their files to a verdict
+
+    python -m pipelines.experiments.measured_ships DATA --out measured \\
+        --markdown docs/measured_ships.md
+
+Each data set goes the way of its owner: a profile (shipped, or drafted and mended where it says
+CHECK), `convert`, `ingest`, `train --model mmg`, `evaluate`, `diagnose` on the voyages that were
+not trained on. It ends with a verdict, or with the first thing that these data cannot give. None of
+the data are part of this repository. L is the paper's loss; the baselines hold the velocity, and
+fit a quadratic by least squares to the training voyages.
+"""
+
+
+def text(ways: Sequence[Way]) -> str:
+    """The page: a table, and each data set's answer below it."""
+    head = (
+        "ship", "voyages", "usable, s", "windows of 100 s", "L on windows of, s", "L", "hold",
+        "least squares", "verdict", "explained", "CPU, s",
+    )  # fmt: skip
+    lines = [
+        HEAD,
+        tables.table(head, [_row(one) for one in ways]),
+        "",
+    ]
+    for one in ways:
+        lines += [f"## {DATA_SETS[one.name].ship}\n", f"> {_answer(one)}\n"]
+        lines += [f"{JUDGEMENTS[one.name]}\n"] if one.name in JUDGEMENTS else []
+    return "\n".join(lines)
+
+
+def _row(one: Way) -> tuple[object, ...]:
+    evaluated, verdict = one.answers.get("evaluate"), one.answers.get("diagnose")
+    usable = sum(v["usable_s"] or 0 for v in one.voyages)
+    windows = sum(v["windows"] or 0 for v in one.voyages)
+    losses: tuple[object, ...] = ("-", "-", "-", "-")
+    if evaluated:
+        floors = evaluated["floors"]
+        given = DATA_SETS[one.name].train
+        window = given[given.index("--window") + 1] if "--window" in given else str(WINDOW)
+        each = (evaluated["loss"], floors["hold"], floors["least_squares"])
+        losses = (window, *(_number(x) for x in each))
+    said, explained = "-", "-"
+    if verdict:
+        named = ", ".join(dict.fromkeys(c["name"] for c in verdict["causes"]))
+        family = (verdict.get("structure") or {}).get("family")
+        said = named or ": ".join(filter(None, (verdict["verdict"], family)))
+        explained = f"{verdict.get('explained') or 0.0:.0%}"
+    elif one.stopped:
+        said = "ends before"
+    counted = (len(one.voyages), usable, windows) if one.voyages else ("-", "-", "-")
+    return (DATA_SETS[one.name].ship, *counted, *losses, said, explained, f"{one.cpu_s:.0f}")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"
+
+
+def _answer(one: Way) -> str:
+    verdict = one.answers.get("diagnose")
+    return verdict["sentence"] if verdict and not one.stopped else one.stopped

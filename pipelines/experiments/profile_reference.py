@@ -1,0 +1,193 @@
+"""The reference of the profile format, docs/profile.md, from the code that reads profiles.
+
+python -m pipelines.experiments.profile_reference --markdown docs/profile.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import types
+import typing
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic.fields import FieldInfo
+
+from shiplog import profile, units
+from shiplog.profile import KINDS, LABELS, TABLE_CHANNELS, Section
+from shiplog.report import tables
+
+HEAD = """# The ship profile
+
+A profile is a TOML file. It says which topic and field of a log is which channel of the ship, in
+which unit, and where it is measured. `shiplog profile LOG` drafts one from a log or a table; look
+over every line that says CHECK. A key that is not listed here is refused, with the nearest one that
+is.
+
+    [ship]
+    name = "my ship"
+    length_m = 12.0
+
+    [sensors.position]
+    kind = "geodetic"
+    topic = "/gnss/fix"
+    fields = ["latitude", "longitude"]
+    unit = "deg"
+    lever_arm_m = [3.2, 0.0]
+
+    [sensors.velocity]
+    kind = "sog_cog"
+    topic = "/gnss/velocity"
+    fields = ["sog_mps", "cog_deg"]
+    units = ["m/s", "deg"]
+    lever_arm_m = [3.2, 0.0]
+
+    [sensors.heading]
+    topic = "/gyro"
+    field = "heading_deg"
+    unit = "deg"
+
+    [[actuators]]
+    name = "rudder"
+    kind = "rudder"
+    topic = "/rudder/main"
+    field = "angle_deg"
+    unit = "deg"
+    limits = [-35.0, 35.0]
+
+Position, velocity and heading are needed; yaw rate and wind are not. Without actuators a log can
+be ingested and its sensors checked, and no model can be trained. Axes: x0 to the north, y0 to the
+east, x ahead, y to starboard, angles clockwise; a positive rudder turns the bow to starboard; the
+wind's angle is where it blows from, clockwise from the bow.
+"""
+
+MEANT = {  # each kind of a sensor in words
+    "geodetic": "latitude and longitude", "local": "x0 and y0, metres north and east of a datum",
+    "sog_cog": "speed over ground, and course over ground clockwise from north",
+    "body": "ahead and to starboard", "ned": "to the north and to the east",
+    "enu": "to the east and to the north", "angle": "clockwise from north",
+    "quaternion_enu": "z and w of a quaternion whose yaw counts from east towards north",
+    "quaternion_ned": "z and w of a quaternion whose yaw counts from north towards east",
+    "rate": "positive where the bow turns to starboard",
+    "from_bow": "apparent wind: speed, and where it blows from, clockwise from the bow",
+}  # fmt: skip
+
+
+def text() -> str:
+    """The whole page."""
+    source = set(profile.Source.model_fields)
+    actuator = [name for name in profile.Actuator.model_fields if name not in source]
+    sensor = [name for name in profile.Sensor.model_fields if name not in source]
+    return "\n".join(
+        (
+            HEAD,
+            "## [ship]\n",
+            "What is left out is estimated where it is needed, and said.\n",
+            _keys(profile.Ship),
+            "\n## [sensors.*] and [[actuators]]\n",
+            "These keys say where the values stand in a log. `field` or `fields` is needed.\n",
+            _keys(profile.Source),
+            "\n### Only of sensors\n",
+            _keys(profile.Sensor, sensor),
+            "\n### Kinds of sensors\n",
+            _kinds(),
+            "\n### Only of actuators\n",
+            "One section each, in the order in which a model takes them.\n",
+            _keys(profile.Actuator, actuator),
+            "\n## [site]\n",
+            "What a chart shows; all optional.\n",
+            _keys(profile.Site),
+            "\n## [table]\n",
+            "For `shiplog convert`: what the columns of a table hold. A key is a column's name; "
+            '`"column" = "channel"`\nis short for a column in SI units.\n',
+            _keys(profile.Column),
+            "\n### Channels of a table\n",
+            _channels(),
+            "\n## Units\n",
+            "Factors to SI; shafts are in rev/s.\n",
+            _units(),
+            "\n## Shipped profiles\n",
+            ", ".join(f"`{name}`" for name in profile.shipped())
+            + ": in `shiplog/profiles/`, to start from.",
+            "",
+        )
+    )
+
+
+def _keys(section: type[Section], names: Sequence[str] = ()) -> str:
+    fields = section.model_fields
+    rows = [(f"`{n}`", *_key(fields[n])) for n in names or fields]
+    return tables.table(("key", "value", "left out", "what it is"), rows)
+
+
+def _key(field: FieldInfo) -> tuple[str, str, str]:
+    if field.is_required():
+        left_out = "needed"
+    elif field.default is None or field.default == ():
+        left_out = "-"
+    else:
+        left_out = f"`{_toml(field.default)}`"
+    return _value(field.annotation), left_out, field.description or ""
+
+
+def _value(kind: object) -> str:
+    """A type in a user's words."""
+    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        return _value(inside[0])
+    if origin is typing.Literal:
+        return " or ".join(f"`{_toml(value)}`" for value in inside)
+    if origin in (types.UnionType, typing.Union):
+        each = dict.fromkeys(_value(one) for one in inside if one is not type(None))
+        return " or ".join(each)
+    if origin is tuple:
+        of = "list" if inside[-1] is Ellipsis else "pair"
+        first, *rest = _value(inside[0]).split(" ")
+        return " ".join((of, "of", f"{first}s", *rest))
+    return {str: "text", float: "number", int: "number"}.get(typing.cast(type, kind), str(kind))
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(list(value)) if isinstance(value, tuple) else str(value)
+
+
+def _kinds() -> str:
+    rows = [
+        (f"`{sensor}`", f"`{_toml(kind)}`", str(profile.WIDTH[kind]), MEANT[kind])
+        for sensor, kinds in KINDS.items()
+        for kind in kinds
+    ]
+    return tables.table(("sensor", "kind", "fields", "what they are"), rows)
+
+
+def _channels() -> str:
+    rows = [
+        (" and ".join(f"`{c}`" for c in names), f"`{sensor}` of kind `{_toml(kind)}`")
+        for (sensor, kind), names in TABLE_CHANNELS.items()
+    ]
+    rows += [(f"`{name}`", what) for name, what in LABELS.items()]
+    rows.append(("an actuator's name", "that actuator"))
+    return tables.table(("channel", "what it is for"), rows)
+
+
+def _units() -> str:
+    rows = [(f"`{unit}`", f"{factor:.7g}") for unit, factor in units.TO_SI.items()]
+    return tables.table(("unit", "factor"), rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--markdown", type=Path, metavar="PATH", help="write it there")
+    path = parser.parse_args().markdown
+    if path is None:
+        print(text())
+    else:
+        path.write_text(text(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

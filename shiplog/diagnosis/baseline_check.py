@@ -1,0 +1,51 @@
+"""Whether a plain regression describes the ship far better than its physical model does."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.trial_voyages import windows_of
+from shiplog.profile import Profile
+from shiplog.simulation import baselines
+from shiplog.simulation.error_reduction import parts
+from shiplog.simulation.rollout import rollout
+from shiplog.simulation.sensitivities import series
+from shiplog.training.run_folder import Run
+from shiplog.voyages.store import Store
+
+WORDS = ("surge", "sway", "yaw")
+
+
+def lacking(run: Run, store: Store, profile: Profile) -> str:
+    """Why the run's physics cannot tell causes that change forces; empty where it can.
+
+    Quadratic least squares is fitted to all nominal voyages but one in turn, and rolled out on
+    that one, while the physics have seen all of them: the comparison favours the physics.
+    """
+    if not run.config.physical:
+        return ""
+    cut = windows_of(run, store, run.made_on, profile)
+    voyages = [] if cut is None else cut.plan["voyage"].to_list()
+    names = list(dict.fromkeys(voyages))
+    if cut is None or len(names) < 2:
+        return ""
+    simulator = run.extended(run.config.seeds[0])
+    measured, steps = cut.state.double().numpy(), series(cut).steps
+    own = parts(simulator.states(cut, simulator.theta) - measured, steps)
+    plain = np.empty_like(own)
+    for name in names:
+        out = torch.tensor([v == name for v in voyages])
+        fitted = baselines.least_squares(cut.pick(torch.nonzero(~out)[:, 0]))
+        left = cut.pick(torch.nonzero(out)[:, 0])
+        states = rollout(fitted, left.state[:, 0], left.actuator, left.wind, left.dt)
+        plain[out.numpy()] = parts((states - left.state).double().numpy(), series(left).steps)
+    share = plain.sum(1).mean() / max(own.sum(1).mean(), 1e-12)
+    if share >= thresholds.BASELINE:
+        return ""
+    worst = int(np.argmax(own.mean(0) - plain.mean(0)))
+    return (
+        f"the model does not describe this ship's {WORDS[worst]} force: a plain regression has "
+        f"{share:.0%} of its error"
+    )

@@ -1,0 +1,137 @@
+"""Where a model is wrong: by channel, where it never was, where no force of its own explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import polars as pl
+
+from pipelines.prepare import seconds
+from shiplog.diagnosis import (
+    external_forces,
+    omitted_inputs,
+    residual_acceleration,
+    unrecorded_thruster,
+)
+from shiplog.diagnosis import trial as diagnosis_trial
+from shiplog.diagnosis.evidence import Point, Trial
+from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.profile import Profile
+from shiplog.report import verdict as verdicts
+from shiplog.report.verdict import Interval
+from shiplog.simulation import coverage as covering
+from shiplog.simulation import error_breakdown
+from shiplog.simulation.extended_simulator import campaign
+from shiplog.simulation.sensitivities import series
+from shiplog.training.run_folder import Run
+from shiplog.voyages import one_hertz
+from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
+
+UNCOVERED = 0.5  # share of a window's seconds outside the training data
+PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
+PULSE_APART = 2.5  # knots that one pulse may pause for
+
+
+def pushed(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
+    """Stretches that no force of the ship explains; the trial judges no hypothesis on them."""
+    ref = trial.reference
+    base, _ = trial.scan(point, (), trial.fixed)
+    if isinstance(trial, diagnosis_trial.Trial):
+        whole = trial.of_parts(whole, point, base)
+    found = external_forces.find(
+        *trial.left(whole, trial.solved(point, base)), trial.unrest.louder(base.louder),
+        trial.record,
+        ref.model.stand_in, np.array(list(ref.coefficients.values())),
+    )  # fmt: skip
+    out = np.zeros(len(trial.rows), dtype=bool)
+    of = np.array(trial.record.names)[trial.record.voyage[trial.rows]]
+    begin = trial.record.time[trial.rows]
+    for stretch in found:
+        inside = (begin < stretch.end_s) & (begin + trial.grid.seconds > stretch.start_s)
+        out |= inside & (of == stretch.voyage)
+    trial.leave_out(out)
+    return [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
+
+
+def by_channel(held: HeldOut) -> list[dict]:
+    """Shares of the error of the windows, as the contract's `wrong`."""
+    shares, _ = campaign(held.trial.record)
+    share = [shares.get(v, (1.0, 1.0))[0] for v in held.voyages]
+    plan = held.cut.plan.with_columns(share=pl.Series(share))
+    error = held.states_before - held.measured
+    found = error_breakdown.explain(error, series(held.cut), plan, held.trial.record.profile)
+    return [c.as_json() for c in found.channels]
+
+
+def depends_on(trial: Trial, decision: Decision, whole: Linear) -> list[dict]:
+    """What the model cannot see and the residual depends on."""
+    found = residual_acceleration.posterior(
+        *trial.left(whole, trial.solved(decision.first, decision.nothing)),
+        trial.unrest.louder(decision.nothing.louder), trial.record,
+    )  # fmt: skip
+    knots = residual_acceleration.table(found, trial.record)
+    rows = omitted_inputs.table(
+        knots, trial.record.profile, np.random.default_rng(0), knot=trial.grid.knot
+    )
+    return [verdicts.unseen_json(row) for row in rows]
+
+
+def uncovered(
+    run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
+) -> list[Interval]:
+    """Windows that the training data never came near."""
+    rows = one_hertz.with_elapsed(seconds(store, names, profile))
+    seen = covering.of(run.training(), profile.actuator_names, profile.has_wind)
+    numbered = cut.plan.select(
+        "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
+        "elapsed",
+    )  # fmt: skip
+    size = run.config.window
+    whole = numbered.hstack(seen.table(rows, numbered, size))
+    found = []
+    for row in whole.filter(pl.col("coverage") < UNCOVERED).to_dicts():
+        within = rows.filter(
+            (pl.col("voyage") == row["voyage"])
+            & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)
+        )
+        why = covering.reason(row, within) or "unlike anything in the training data"
+        found.append(
+            Interval(
+                row["voyage"], float(row["elapsed"]), float(row["elapsed"] + size), "coverage",
+                f"Only {row['coverage']:.0%} of these seconds lie where the model was made: {why}.",
+            )
+        )  # fmt: skip
+    return found
+
+
+def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
+    """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
+    force, sd = unrecorded_thruster.pulse_force(trial, decision.point, decision.base, found)
+    strongest = float(np.quantile(np.abs(force), 0.98))
+    times: list[dict] = []
+    for i, row in enumerate(trial.rows):
+        name = trial.record.names[trial.record.voyage[row]]
+        begin = float(trial.record.time[row])
+        for k in np.flatnonzero(np.abs(force[i, :-1]) >= PULSE_SURE * strongest):
+            at, value = begin + trial.grid.knot * float(k), float(force[i, k])
+            one = {"voyage": name, "start_s": at, "end_s": at, "force_N": value,
+                   "sd_N": float(sd[i, k])}  # fmt: skip
+            if times and _joined(times[-1], one, PULSE_APART * trial.grid.knot):
+                last = times[-1]
+                last["end_s"] = at
+                if abs(value) > abs(last["force_N"]):
+                    last |= {"force_N": value, "sd_N": one["sd_N"]}
+            else:
+                times.append(one)
+    return times
+
+
+def _joined(last: dict, one: dict, pause: float) -> bool:
+    """Whether it goes on, the same way, after at most a short pause."""
+    near = one["start_s"] - last["end_s"] < pause
+    return last["voyage"] == one["voyage"] and near and last["force_N"] * one["force_N"] > 0

@@ -1,0 +1,191 @@
+"""What causes are worth on windows whose voyage had no part in their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+
+from shiplog.diagnosis import sign_conventions
+from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.network_base import Own
+from shiplog.diagnosis.result import Decision
+from shiplog.models.causes import constants_of
+from shiplog.simulation.error_reduction import Gain, gain, parts
+from shiplog.simulation.extended_simulator import ExtendedSimulator
+from shiplog.simulation.sensitivities import series
+from shiplog.voyages.windows import Windows
+
+LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
+
+Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """A trial's windows, and the model as it stands."""
+
+    cut: Windows
+    before: ExtendedSimulator
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        return self.cut.state.double().numpy()
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        return series(self.cut).steps
+
+    @cached_property
+    def voyages(self) -> list[str]:
+        """Of each window."""
+        return self.cut.plan["voyage"].to_list()
+
+    @cached_property
+    def states_before(self) -> np.ndarray:
+        return self.before.states(self.cut, self.before.theta)
+
+    def parts(self, states: np.ndarray) -> np.ndarray:
+        """L of each window by channel [N, 3]."""
+        return parts(states - self.measured, self.steps)
+
+    @cached_property
+    def losses_before(self) -> np.ndarray:
+        """[N, 3] by channel."""
+        return self.parts(self.states_before)
+
+
+@dataclass(frozen=True)
+class HeldOut(Rollouts):
+    """The same with the trial whose causes are judged on them; `own` of a network, whose causes
+    another model found."""
+
+    trial: Trial
+    own: Own | None = None
+
+    def states_after(self, decision: Decision) -> np.ndarray:
+        """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
+        states = np.empty(tuple(self.cut.state.shape))
+        needed = self._constants(decision)
+        for voyage, half, rows in self._folds():
+            numbers, coefficients = self._without(decision, voyage, half)
+            simulator = self.before.with_causes(
+                [n.cause for n in decision.named], numbers, None, needed, coefficients
+            )
+            states[rows.numpy()] = simulator.states(self.cut.pick(rows), simulator.theta)
+        return states
+
+    def gain(self, decision: Decision) -> Gain:
+        after = self.parts(self.states_after(decision))
+        return gain(self.losses_before, after, self.voyages)
+
+    def adapted(self, decision: Decision) -> Gain:
+        """What the model's own coefficients take off alone, fitted again with nothing named."""
+        return self.gain(replace(decision, named=(), point=decision.first, base=decision.nothing))
+
+    def extended(self, decision: Decision) -> ExtendedSimulator:
+        """The model with what is named in it, with numbers from all voyages."""
+        named, beside = decision.named, None
+        if decision.adapted:
+            trial, seen = self.simulated(decision)
+            beside = trial.coefficients(seen.point, seen.base)
+        return self.before.with_causes(
+            [n.cause for n in named], {n.cause.label: n.numbers for n in named},
+            {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
+        )  # fmt: skip
+
+    def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
+        """The model that is simulated on the trial's segments, with what is named in it."""
+        return (self.trial, decision) if self.own is None else self.own.beside(decision)
+
+    def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
+        """The same with the model's own coefficients fitted again beside what is named, where that
+        makes the error less."""
+        beside = replace(decision, adapted=True)
+        again = self.gain(beside)
+        return (beside, again) if again.after < found.after else (decision, found)
+
+    def simulated_with(self, decision: Decision) -> tuple[Decision, Gain | None]:
+        """What others named in this model, and what it is worth there."""
+        plain = replace(decision, adapted=False)
+        if not decision.named:
+            return plain, None
+        found = self.gain(plain)
+        return self.better(plain, found) if self.trial.reference.adapts else (plain, found)
+
+    def worth(self, rest: Decision, decision: Decision) -> Gain:
+        """What a decision takes off beside one with a cause less."""
+        return gain(
+            self.parts(self.states_after(rest)), self.parts(self.states_after(decision)),
+            self.voyages,
+        )  # fmt: skip
+
+    def lost(self, found: Gain | None) -> str:
+        """Why no name would be believed: a sign turned round does far more for the rollouts than
+        all that was named, or they are worse than a ship that keeps its velocities, with what was
+        named in them too. Empty where neither holds."""
+        own = float(self.losses_before.sum(1).mean())
+        after = own if found is None else min(own, found.after)
+        hold = float(self.parts(self.measured[:, :1]).sum(1).mean())
+        other, turned = sign_conventions.best(self.before, self.cut)
+        if turned < min(TURNED * after, hold):
+            return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
+        if own <= LOST * hold or after <= hold:
+            return ""
+        return (
+            f"The model is worse than one that keeps its velocities (L {own:.0f}, that one "
+            f"{hold:.0f})"
+        )
+
+    def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
+        return constants_of((n.cause for n in decision.named), self.trial.reference.setting)
+
+    @property
+    def left_out(self) -> str:
+        """What of each window the numbers have not seen."""
+        return "its half of the voyage" if self._halved else "its voyage"
+
+    @property
+    def _halved(self) -> bool:
+        """Whether halves of voyages are left out: of one alone."""
+        return len(set(self.voyages)) == 1
+
+    def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
+        """(voyage, half of it, window rows) that are left out: whole voyages, or halves of one."""
+        elapsed = self.cut.plan["elapsed"].to_numpy()
+        for name in dict.fromkeys(self.voyages):
+            own = np.array([n == name for n in self.voyages])
+            if not self._halved:
+                yield name, None, torch.tensor(np.flatnonzero(own))
+                continue
+            first, last = elapsed[own].min(), elapsed[own].max()
+            middle = 0.5 * (first + last + float(self.cut.dt[0].sum()))
+            for late in (False, True):
+                rows = torch.tensor(np.flatnonzero(own & ((elapsed >= middle) == late)))
+                if len(rows):
+                    yield name, (middle, late), rows
+
+    def _without(
+        self, decision: Decision, voyage: str, half: Half
+    ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+        """Numbers of the named causes from all else alone, and the coefficients beside them where
+        the model adapts."""
+        recorded, segment = self.trial.record, decision.point.linear.cut
+        index = recorded.names.index(voyage) if voyage in recorded.names else -1
+        out = segment.voyage == index
+        if half is not None:
+            middle, late = half
+            out &= (recorded.time[segment.rows] >= middle) == late
+        included = tuple(decision.base.numbers)
+        numbers, coefficients = {}, None
+        if included or decision.adapted:
+            numbers, beside = self.trial.without(decision.point, included, decision.louder, out)
+            if self.own is not None and decision.adapted:
+                trial, seen = self.own.beside(decision)
+                _, beside = trial.without(seen.point, tuple(seen.base.numbers), seen.louder, out)
+            coefficients = beside if decision.adapted else None
+        return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

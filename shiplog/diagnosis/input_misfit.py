@@ -1,0 +1,92 @@
+"""What a ship's MMG gets wrong of a network's inputs: a smooth function of them, the same on all
+voyages.
+
+It lasts as long as the ship does the same, so that no unrest of seconds stands for it: left out, a
+few hundred nats of it go to the cause that looks most like it. It stands beside every hypothesis
+(Kennedy & O'Hagan 2001: the discrepancy as a function of the inputs); what depends on heading,
+place or time it cannot explain. And it is what the network is bent by where it is fitted again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from shiplog.diagnosis import segment_nodes
+from shiplog.diagnosis.likelihood import Modes
+from shiplog.diagnosis.segment_nodes import Knots
+from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.models.compiled_network import Network
+
+SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary unrest
+SUMS = 200  # of the features in a channel, of which others hardly differ where ships go
+FELT = 1.0  # least that voyages say of a weight, in units of what was known of it
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """The network's smooth features, and the sums of them that these voyages say something of.
+
+    axes   [3, F, W]  weights of the features of each channel, in m/s² and rad/s²
+    """
+
+    network: Network
+    axes: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return self.axes.shape[-1]
+
+    def pushed(self, cut: Cut, g: Grid) -> np.ndarray:
+        """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
+        waves = _features(self.network, segment_nodes.at_knots(cut, g))
+        return np.concatenate([waves @ axes for axes in self.axes], axis=1)
+
+    def bends(self, weights: np.ndarray) -> np.ndarray:
+        """[F, 3] weights [W] as `Network.bend` takes them."""
+        return (self.axes @ weights).T
+
+
+def of(
+    network: Network, cut: Cut, g: Grid, modes: Modes, known: np.ndarray,
+    unit: np.ndarray, push: np.ndarray,
+) -> Misfit:  # fmt: skip
+    """Of the size that is likeliest beside numbers [C] in `unit`s [C], of which so much is `known`
+    before any data.
+
+    cut    of the voyages that `modes` are of
+    push   [3] unit of size
+    """
+    waves = _features(network, segment_nodes.at_knots(cut, g))
+    sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
+    count = sums.shape[1]
+    axes = np.zeros((3, len(sums), 3 * count))
+    for channel, size in enumerate(push):
+        axes[channel][:, channel * count : (channel + 1) * count] = size * sums
+    whole = Misfit(network, axes)
+    by = np.concatenate(([1.0], unit, np.ones(3 * count)))
+    total = modes.beside(whole.pushed(cut, g)).total(np.ones(len(cut)))
+    total = total * np.outer(by, by)
+    size = max(SIZES, key=lambda one: _likelihood(total, known, one))
+    told = total[1 + len(known) :, 1 + len(known) :]
+    felt, turned = np.linalg.eigh(size**2 * told)
+    return Misfit(network, axes @ (size * turned[:, felt > FELT]))
+
+
+def _features(network: Network, knots: Knots) -> np.ndarray:
+    """[S, J, F]"""
+    actuator, wind = knots.driven[..., :-3], knots.driven[..., -2:]
+    return np.asarray(network.features(*map(jnp.asarray, (knots.state, actuator, wind))))
+
+
+def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:
+    """Log marginal likelihood of a campaign's products beside weights of one size, up to what no
+    size changes."""
+    count = len(total) - 1 - len(known)
+    by = np.concatenate((np.ones(1 + len(known)), np.full(count, size)))
+    scaled = total * np.outer(by, by)
+    both = scaled[1:, 1:] + np.diag(np.concatenate((known, np.ones(count))))
+    found = scaled[1:, 0] @ np.linalg.solve(both, scaled[1:, 0])
+    return 0.5 * float(found - np.linalg.slogdet(both)[1])

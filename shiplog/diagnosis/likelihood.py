@@ -1,0 +1,371 @@
+"""What the segments say of every hypothesis at once: algebra on one pass of sensitivities.
+
+    e_s = Z_s z_s + J_s d + ε,  ε ~ N(0, R),  z = (start, acceleration at the knots)
+
+The start is free, the acceleration is what no model of this ship explains: an Ornstein-Uhlenbeck
+process whose size is learned where the model was made (Kennedy & O'Hagan 2001). Both are
+eliminated segment by segment; what is left of all data is one small matrix over [e | J]. An
+instrument's noise lasts from one observation to the next: taken for white, it would make causes
+that it looks like, and intervals that are too narrow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shiplog.diagnosis.linearisation import Linear
+from shiplog.voyages.timescale import BIN, KNOT
+
+SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
+FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
+LEAP = 16.0  # steps at once, at most
+ENOUGH = 8  # unbroken segments, fewer of which do not show it
+LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
+
+
+@dataclass(frozen=True)
+class Unrest:
+    """Sizes of what is random.
+
+    noise   [6]  of one observation (a mean over `bin` s), channels.STATE; of its variance a share
+                 `coloured` [6] lasts, and fades within `fade` [6] s
+    push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
+    time         s over which that stays
+    start   [6]  how free the initial state is
+    pulse   [3]  acceleration of one force that nobody records, and `pulse_time` [s]
+    bin, knot    s of one observation, and between the knots of the acceleration
+    """
+
+    noise: np.ndarray
+    push: np.ndarray
+    time: float
+    start: np.ndarray
+    pulse: np.ndarray | None = None
+    pulse_time: float = 12.0
+    coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    fade: np.ndarray = field(default_factory=lambda: np.ones(6))
+    bin: float = BIN
+    knot: float = KNOT
+
+    def kernel(self, knots: int) -> np.ndarray:
+        """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
+        apart = self.knot * np.arange(knots)
+        whole = np.kron(np.diag(self.push**2), _decay(apart, self.time))
+        if self.pulse is not None:
+            whole += np.kron(np.outer(self.pulse, self.pulse), _decay(apart, self.pulse_time))
+        return whole
+
+    def louder(self, factor: float) -> Unrest:
+        return replace(self, push=self.push * factor)
+
+    def precision(self, knots: int) -> np.ndarray:
+        """Of z [Z, Z]."""
+        size = 6 + 3 * knots
+        whole = np.zeros((size, size))
+        whole[:6, :6] = np.diag(self.start**-2.0)
+        whole[6:, 6:] = np.linalg.inv(self.kernel(knots))
+        return whole
+
+
+def _decay(at: np.ndarray, time: float) -> np.ndarray:
+    """Correlation [J, J] of an Ornstein-Uhlenbeck process at knots at these times [J]."""
+    return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(len(at))
+
+
+def _correlation(share: float, fade: float, at: np.ndarray) -> np.ndarray:
+    """[B, B] of noise at these times [B] of which a share lasts, as an Ornstein-Uhlenbeck process
+    does."""
+    apart = np.abs(np.subtract.outer(at, at))
+    return (1.0 - share) * np.eye(len(at)) + share * np.exp(-apart / fade)
+
+
+class _Whitening:
+    """Observations in units in which their noise is white and of unit size."""
+
+    def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
+        """used   [S, B, 6] bool: what was not seen is nothing"""
+        bins = used.shape[1]
+        at = unrest.bin * np.arange(bins)
+        self.by: list[np.ndarray] = []  # [S, B, B] of each channel
+        self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
+        for channel in range(6):
+            patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
+            correlation = _correlation(unrest.coloured[channel], unrest.fade[channel], at)
+            roots = np.zeros((len(patterns), bins, bins))
+            for root, pattern in zip(roots, patterns, strict=True):
+                seen = np.ix_(pattern, pattern)
+                root[seen] = np.linalg.inv(np.linalg.cholesky(correlation[seen]))
+            each = roots[of.reshape(-1)]
+            seen = np.diagonal(each, axis1=1, axis2=2)[used[..., channel]]
+            self.logdet -= 2.0 * float(np.log(seen).sum())
+            self.by.append(each / unrest.noise[channel])
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """[S, B, 6, n] → [S, 6 B, n]"""
+        return np.concatenate([by @ values[:, :, c] for c, by in enumerate(self.by)], axis=1)
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Products of one pass under one noise R; what depends on the push alone comes after.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J]
+    zd      [S, Z, 1 + C]
+    zz      [S, Z, Z]
+    logdet  of R, over the observations used
+    """
+
+    dd: np.ndarray
+    zd: np.ndarray
+    zz: np.ndarray
+    logdet: float
+    knots: int
+
+
+def weighed(linear: Linear, unrest: Unrest) -> Weighed:
+    white = _Whitening(linear.cut.used, unrest)
+    d = white(np.concatenate((linear.e[..., None], linear.j), -1))
+    z = white(linear.z)
+    zt = np.swapaxes(z, 1, 2)
+    knots = (z.shape[-1] - 6) // 3
+    return Weighed(np.swapaxes(d, 1, 2) @ d, zt @ d, zt @ z, white.logdet, knots)
+
+
+@dataclass(frozen=True)
+class Gram:
+    """[e | J]ᵀ C⁻¹ [e | J] of every segment [S, 1 + C, 1 + C], and log |C| of all, restricted to
+    what no start explains."""
+
+    each: np.ndarray
+    logdet: float
+
+    def scaled(self, unit: np.ndarray) -> Gram:
+        """Of numbers in these units [C]: matrices of numbers that differ by 1e6 do not invert."""
+        by = np.concatenate(([1.0], unit))
+        return Gram(self.each * np.outer(by, by), self.logdet)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """A pass without its starts, in axes in which the acceleration at the knots is independent by
+    what was known of it and by what the data say: of any size λ of it, the rest is a division.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J], the start eliminated
+    md      [S, 3J, 1 + C]     of the modes with [e | J]
+    felt    [S, 3J]            what the data say of each mode, in units of what was known
+    axes    [S, 3J, 3J]        from accelerations at the knots to modes
+    logdet  of noise and start
+    pushed  [S, 3J, W]         modes of columns more, each of which bends the observations as an
+                               acceleration at the knots does
+    """
+
+    dd: np.ndarray
+    md: np.ndarray
+    felt: np.ndarray
+    axes: np.ndarray
+    logdet: float
+    pushed: np.ndarray
+
+    def beside(self, pushed: np.ndarray) -> Modes:
+        """With W columns more, of accelerations [S, 3J, W] at the knots."""
+        return replace(self, pushed=np.concatenate((self.pushed, self.axes @ pushed), -1))
+
+    def total(self, weight: np.ndarray, louder: float = 1.0) -> np.ndarray:
+        """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
+        them."""
+        part = np.sqrt(weight[:, None] / (self.felt + louder**-2.0))[..., None]
+        flat = (self.md * part).reshape(-1, self.md.shape[-1])
+        total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
+        if not self.pushed.shape[-1]:
+            return total
+        # what such a column bends, less what the unrest explains of it
+        more = (self.pushed * part).reshape(-1, self.pushed.shape[-1])
+        across = louder**-2.0 * (more.T @ flat)
+        more *= np.sqrt(self.felt).reshape(-1, 1) / louder
+        return np.block([[total, across.T], [across, more.T @ more]])
+
+    def gram(self, louder: float = 1.0) -> Gram:
+        bent = self.felt[..., None] * self.pushed
+        across = np.swapaxes(self.md, 1, 2) @ self.pushed
+        dd = np.block([
+            [self.dd, across],
+            [np.swapaxes(across, 1, 2), np.swapaxes(self.pushed, 1, 2) @ bent],
+        ])  # fmt: skip
+        md = np.concatenate((self.md, bent), -1)
+        part = md / (self.felt + louder**-2.0)[..., None]
+        return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(louder))
+
+    def log_volume(self, louder: float = 1.0) -> float:
+        """log |C| of all segments, by itself."""
+        return self.logdet + float(np.log1p(louder**2 * self.felt).sum())
+
+
+@dataclass(frozen=True)
+class Startless:
+    """A pass without its starts, whatever is known of the acceleration at the knots.
+
+    dd      [S, 1 + C, 1 + C]  of [e | J]
+    kd      [S, 3J, 1 + C]
+    kk      [S, 3J, 3J]
+    logdet  of noise and start
+    """
+
+    dd: np.ndarray
+    kd: np.ndarray
+    kk: np.ndarray
+    logdet: float
+
+    def square(self, unrest: Unrest) -> tuple[np.ndarray, float]:
+        """Of a pass of e alone eᵀ C⁻¹ e of every segment [S], and log |C| of all: a Cholesky root
+        ends with the one, and the rest of its diagonal is the other."""
+        knots = self.kk.shape[-1]
+        kernel = unrest.kernel(knots // 3)
+        bordered = np.empty((len(self.kk), knots + 1, knots + 1))
+        bordered[:, :knots, :knots] = self.kk + np.linalg.inv(kernel)
+        bordered[:, :knots, knots:], bordered[:, knots:, knots:] = self.kd, self.dd
+        bordered[:, knots, :knots] = self.kd[..., 0]
+        root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
+        of_kernel = len(self.kk) * np.linalg.slogdet(kernel)[1]
+        volume = of_kernel + 2.0 * float(np.log(root[:, :knots]).sum())
+        return root[:, knots] ** 2, self.logdet + volume
+
+
+def startless(weighed: Weighed, unrest: Unrest) -> Startless:
+    """Start eliminated. Raises np.linalg.LinAlgError where the path ran away."""
+    if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
+        raise np.linalg.LinAlgError("a path that ran away has no products")
+    known = np.diag(unrest.start**-2.0)
+    start = weighed.zz[:, :6, :6] + known
+    # in units of each number of the start, or its columns are too unlike to invert
+    unit = np.diagonal(start, axis1=1, axis2=2) ** -0.5
+    start = start * unit[:, :, None] * unit[:, None, :]
+    columns = np.concatenate((weighed.zz[:, :6, 6:], weighed.zd[:, :6]), -1) * unit[..., None]
+    solved = np.linalg.solve(start, columns)
+    count = weighed.zz.shape[-1] - 6
+    by_knots, by_numbers = np.swapaxes(columns[..., :count], 1, 2), columns[..., count:]
+    return Startless(
+        weighed.dd - np.swapaxes(by_numbers, 1, 2) @ solved[..., count:],
+        weighed.zd[:, 6:] - by_knots @ solved[..., count:],
+        weighed.zz[:, 6:, 6:] - by_knots @ solved[..., :count],
+        weighed.logdet + _of_start(weighed, known),
+    )
+
+
+def modes(weighed: Weighed, unrest: Unrest) -> Modes:
+    """Start eliminated, acceleration along its principal axes (Woodbury). Raises
+    np.linalg.LinAlgError where the path ran away."""
+    left = startless(weighed, unrest)
+    root = np.linalg.cholesky(unrest.kernel(weighed.knots))
+    felt, axes = np.linalg.eigh(root.T @ left.kk @ root)
+    across = np.swapaxes(axes, 1, 2)
+    return Modes(
+        left.dd, across @ (root.T @ left.kd), np.maximum(felt, 0.0),
+        across @ np.linalg.inv(root), left.logdet, np.zeros((*felt.shape, 0)),
+    )  # fmt: skip
+
+
+def _of_start(weighed: Weighed, known: np.ndarray) -> float:
+    # Restricted likelihood (Patterson & Thompson 1971): how far a model lets a start be felt is
+    # no evidence, and a ship with less damping would be punished for it, segment by segment.
+    felt = weighed.zz[:, :6, :6]
+    of = np.linalg.slogdet(felt + known)[1] - np.linalg.slogdet(felt + 1e-9 * known)[1]
+    return float(of.sum())
+
+
+def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Unrest:
+    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977), each
+    round three steps of it of which the first two say how far the third may leap (SQUAREM,
+    Varadhan & Roland 2008). How the noise is coloured is asked once, at the end.
+
+    d   [C] the numbers of the columns
+    """
+    left = (linear.e - linear.j @ d)[..., None]
+    products = _by_channel(linear, left, unrest)
+    seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
+    knots = (linear.z.shape[-1] - 6) // 3
+    inverse = np.linalg.inv(_decay(unrest.knot * np.arange(knots), unrest.time))
+    least = np.log(np.concatenate((LEAST, np.full(3, 1e-12))))
+
+    def at(sizes: np.ndarray) -> Unrest:
+        return replace(unrest, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
+
+    def step(sizes: np.ndarray) -> np.ndarray:
+        """Logarithms of noise and push [9] after one step."""
+        now = at(sizes)
+        whole = np.tensordot(now.noise**-2.0, products, 1)
+        covariance = np.linalg.inv(whole[:, 1:, 1:] + now.precision(knots))
+        gap = covariance @ whole[:, 1:, :1]
+        gap = np.concatenate((np.ones((len(gap), 1, 1)), -gap), 1)  # of [e | Z], what z leaves
+        second = gap @ np.swapaxes(gap, 1, 2)
+        second[:, 1:, 1:] += covariance
+        noise = products.reshape(6, -1) @ second.reshape(-1) / seen
+        pushed = second[:, 7:, 7:].mean(0).reshape(3, knots, 3, knots)
+        push = np.einsum("ij,cicj->c", inverse, pushed) / knots
+        return np.maximum(0.5 * np.log(np.concatenate((noise, push))), least)
+
+    sizes = np.log(np.concatenate((unrest.noise, unrest.push)))
+    for _ in range(rounds):
+        one = step(sizes)
+        two = step(one)
+        first, second = one - sizes, two - one
+        bend = float(np.linalg.norm(second - first))
+        leap = float(np.clip(np.linalg.norm(first) / max(bend, 1e-12), 1.0, LEAP))
+        sizes = step(sizes + 2.0 * leap * first + leap**2 * (second - first))
+    return _coloured(linear, left, at(sizes))
+
+
+def _by_channel(linear: Linear, left: np.ndarray, unrest: Unrest) -> np.ndarray:
+    """Products [6, S, 1 + Z, 1 + Z] of [error | Z] in each channel alone, were its noise of unit
+    size: what its size is changes but their weight."""
+    by = _Whitening(linear.cut.used, replace(unrest, noise=np.ones(6))).by
+    both = np.concatenate((left, linear.z), -1)
+    white = (each @ both[:, :, channel] for channel, each in enumerate(by))
+    return np.stack([np.swapaxes(values, 1, 2) @ values for values in white])
+
+
+def _posterior(z: np.ndarray, left: np.ndarray, unrest: Unrest) -> tuple[np.ndarray, np.ndarray]:
+    """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
+    zt = np.swapaxes(z, 1, 2)
+    covariance = np.linalg.inv(zt @ z + unrest.precision((z.shape[-1] - 6) // 3))
+    return covariance @ (zt @ left), covariance
+
+
+def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
+    """With the colour that is likeliest for each channel's noise, of its second moments where all
+    was seen; its size goes with that."""
+    used = linear.cut.used
+    whole = used.all((1, 2))
+    if whole.sum() < ENOUGH:
+        return unrest
+    z, error = linear.z[whole], left[whole]
+    white = _Whitening(used[whole], unrest)
+    mean, covariance = _posterior(white(z), white(error), unrest)
+    bins = used.shape[1]
+    noise, coloured, fade = unrest.noise.copy(), unrest.coloured.copy(), unrest.fade.copy()
+    for channel in range(6):
+        columns = z[:, :, channel]
+        gap = error[:, :, channel] - columns @ mean
+        second = gap[..., 0].T @ gap[..., 0]
+        second += (columns @ covariance @ np.swapaxes(columns, 1, 2)).sum(0)
+        best = np.inf
+        for share in SHARES:
+            for time in FADES if share > 0.0 else FADES[:1]:
+                correlation = _correlation(share, time, unrest.bin * np.arange(bins))
+                variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))
+                cost = np.linalg.slogdet(correlation)[1] + bins * np.log(variance)
+                if cost < best:
+                    best, coloured[channel], fade[channel] = cost, share, time
+                    noise[channel] = np.sqrt(variance)
+    return replace(unrest, noise=np.maximum(noise, LEAST), coloured=coloured, fade=fade)
+
+
+def starts_and_knots(
+    linear: Linear, d: np.ndarray, unrest: Unrest
+) -> tuple[np.ndarray, np.ndarray]:
+    """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
+    white = _Whitening(linear.cut.used, unrest)
+    left = white((linear.e - linear.j @ d)[..., None])
+    z, covariance = _posterior(white(linear.z), left, unrest)
+    return z[..., 0], covariance

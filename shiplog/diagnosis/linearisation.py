@@ -1,0 +1,403 @@
+"""Short rollouts along the measured path, and how everything that could be wrong bends them.
+
+A free rollout of a minute loses the path of a ship that turns easily, and its derivatives are
+then of another voyage. So each segment of 30 s is first pulled onto what was measured, by its
+initial state and a slowly varying acceleration; around that path the simulation is linear in all
+that follows: y ≈ y* + Z (z - z*) + J d.
+
+Of a model that training cut into several steps a second, so is the time between two nodes. A
+segment in which the model runs away all the same is left out and counted (`Linear.lost`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from shiplog.diagnosis import variational_equations
+from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.jit_cache import traced
+from shiplog.simulation.sensitivities import Physical, rate
+
+jax.config.update("jax_enable_x64", True)
+
+CHUNK = 64  # segments at a time
+LEAST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
+KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
+FAR = 10.0  # times what a path may be off its measurement, beyond which the model has run away
+
+
+class Smooth(Physical, Protocol):
+    """Equations that are linearised along a path."""
+
+    @property
+    def smooth(self) -> float:
+        """s within which their derivatives may be taken to go straight; 0 where none do."""
+        ...
+
+
+# --- integration: two-step Adams-Bashforth, one evaluation a step ---------------------------------
+
+
+def finer(model: Smooth, step: float) -> int:
+    """Steps between two nodes with which the integration is as stable as in training.
+
+    On the negative real axis the explicit Euler method is stable for |λ| h up to 2, two-step
+    Adams-Bashforth up to 1 (Hairer, Nørsett & Wanner 1993, Sec. III.1 and V.1): of a model that
+    training cut into n steps a second, |λ| may reach 2n, and a step must not exceed 1/(2n).
+    """
+    return max(1, math.ceil(2.0 * model.substeps * step - 1e-9))
+
+
+def _between(values: np.ndarray, many: int) -> np.ndarray:
+    """Of values [S, K, ...] at nodes those at [S, (K - 1) many + 1, ...], straight in between."""
+    if many == 1:
+        return values
+    part = np.arange(many).reshape(1, 1, many, *[1] * (values.ndim - 2)) / many
+    left, right = values[:, :-1, None], values[:, 1:, None]
+    fine = (len(values), (values.shape[1] - 1) * many, *values.shape[2:])
+    inside = (left + part * (right - left)).reshape(fine)
+    return np.concatenate((inside, values[:, -1:]), axis=1)
+
+
+def _ab2(values: Array, before: Array, first) -> Array:
+    return jnp.where(first, values, 1.5 * values - 0.5 * before)
+
+
+@traced
+def _path(model, theta, start, push, driven, step):
+    """States [S, K, 6] at the nodes, accelerations `push` [S, K, 3] added."""
+
+    def advance(carry, along):
+        state, before, first = carry
+        now, extra = along
+        slope = rate(model, theta, state, now[..., :-2], now[..., -2:])
+        slope = slope.at[..., jnp.array([1, 3, 5])].add(extra)
+        state_next = state + step * _ab2(slope, before, first)
+        return (state_next, slope, False), state
+
+    along = (jnp.moveaxis(driven, 1, 0), jnp.moveaxis(push, 1, 0))
+    _, states = jax.lax.scan(advance, (start, jnp.zeros_like(start), True), along)
+    return jnp.moveaxis(states, 0, 1)
+
+
+@traced
+def _slopes(model, theta, states, driven):
+    """∂ν̇ by state [3, 6, S K], by what drives [3, D, S K] and by θ [3, P, S K].
+
+    In single precision, in half the time: six digits of a slope are more than a linearisation has,
+    and what it is about is simulated in double. Sample by sample last, each with a θ of its own,
+    and one row of ν̇ after another: that is what a compiler makes straight loops of.
+    """
+    model, theta, states, driven = jax.tree.map(
+        lambda values: jnp.asarray(values, jnp.float32), (model, theta, states, driven)
+    )
+    states, driven = (values.reshape(-1, values.shape[-1]).T for values in (states, driven))
+    count = states.shape[1]
+    by = (states, driven, jnp.broadcast_to(theta[:, None], (len(theta), count)))
+
+    def one(state, now, values):
+        return model.acceleration(values, state, now[:-2], now[-2:])
+
+    _, back = jax.vjp(jax.vmap(one, in_axes=1, out_axes=1), *by)
+    rows = jnp.broadcast_to(jnp.eye(3, dtype=jnp.float32)[..., None], (3, 3, count))
+    return jax.lax.map(back, rows)
+
+
+# --- in numpy: one record, in flat memory ---------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where each segment was linearised: start [S, 6] and knots [S, 3, J] of acceleration."""
+
+    start: np.ndarray
+    push: np.ndarray
+
+    def at_nodes(self, g: Grid) -> np.ndarray:
+        return np.einsum("scj,kj->skc", self.push, g.weights)
+
+    @property
+    def known(self) -> np.ndarray:
+        """[S, 6 + 3J] what a linearisation puts back: the start is free, and its own value its
+        mean."""
+        return np.concatenate((np.zeros_like(self.start), self.push.reshape(len(self.push), -1)), 1)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Segments linearised: residual = Z z + J d + noise.
+
+    e   [S, B, 6]       measured less simulated, with the path's own z put back
+    z   [S, B, 6, Z]    by initial state (6) and knots (3J)
+    j   [S, B, 6, C]    by θ
+    lost [S]            bool: the model runs away there; rows of zeros, nothing of it is used
+    """
+
+    cut: Cut
+    path: Path
+    e: np.ndarray
+    z: np.ndarray
+    j: np.ndarray
+    lost: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if len(self.lost) != len(self.cut):
+            object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
+
+    @property
+    def said(self) -> str:
+        """How many segments were left out; empty where none was."""
+        if not self.lost.any():
+            return ""
+        return (
+            f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
+            "the model runs away there."
+        )
+
+    def pick(self, keep: np.ndarray) -> Linear:
+        """Some of the segments."""
+        path = Path(self.path.start[keep], self.path.push[keep])
+        parts = (getattr(self, name)[keep] for name in ("e", "z", "j", "lost"))
+        return Linear(self.cut.pick(keep), path, *parts)
+
+    def less(self, pushed: np.ndarray) -> Linear:
+        """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
+        return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
+
+    def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
+        """Without what the numbers [S, C + W] of each segment do, SI: C of the columns of `j`, then
+        W that push [S, 3J, W] at the knots."""
+        count = self.j.shape[-1]
+        e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
+        return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))
+
+    def beside(self, other: Linear) -> Linear:
+        """These segments and others of the same record."""
+        path = Path(*(_both(self.path, other.path, name) for name in ("start", "push")))
+        parts = (_both(self, other, name) for name in ("e", "z", "j", "lost"))
+        return Linear(self.cut.beside(other.cut), path, *parts)
+
+
+def _both(one: object, other: object, name: str) -> np.ndarray:
+    return np.concatenate((getattr(one, name), getattr(other, name)))
+
+
+@dataclass(frozen=True)
+class Wide:
+    """How freely a path may be pulled: noise of one observation [6], of the start [6], and of
+    the acceleration's knots [3]."""
+
+    noise: np.ndarray
+    start: np.ndarray
+    push: np.ndarray
+
+
+def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
+    """From the measured path itself: its acceleration less the model's."""
+    y = segments.y
+    centre = (np.arange(g.bins) + 0.5) * g.bin
+    knots = np.arange(g.knots) * g.knot
+    velocity = y[..., [1, 3, 5]]
+    change = np.diff(velocity, axis=1) / g.bin
+    at = 0.5 * (centre[1:] + centre[:-1])
+    accelerated = resampled(at, change, knots)
+    states = resampled(centre, y, knots)
+    per = round(g.knot / (g.step * g.every))
+    said = accelerations(model, theta, states, segments.driven[:, ::per])
+    start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
+    return Path(start, np.moveaxis(accelerated - said, -1, 1))
+
+
+def accelerations(
+    model: Smooth, theta: np.ndarray, states: np.ndarray, driven: np.ndarray
+) -> np.ndarray:
+    """ν̇ [S, n, 3] at states [S, n, 6]."""
+    said = np.empty((*states.shape[:2], 3))
+    for part, filled in _chunks(len(states)):
+        found = _accelerations(model, theta, filled(states), filled(driven))
+        said[part] = np.asarray(found)[: len(said[part])]
+    return said
+
+
+@traced
+def _accelerations(model, theta, states, driven):
+    return model.acceleration(theta, states, driven[..., :-2], driven[..., -2:])
+
+
+def resampled(at: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Linear in between, constant beyond; values [S, n, c] at times [n]."""
+    right = np.clip(np.searchsorted(at, wanted), 1, len(at) - 1)
+    part = np.clip((wanted - at[right - 1]) / (at[right] - at[right - 1]), 0.0, 1.0)
+    left = values[:, right - 1]
+    return left + part[:, None] * (values[:, right] - left)
+
+
+def pulled(
+    model: Smooth,
+    theta: np.ndarray,
+    segments: Cut,
+    g: Grid,
+    wide: Wide,
+    path: Path | None = None,
+    rounds: int = 2,
+) -> Path:
+    """Each segment's path onto what was measured: Gauss-Newton in start and knots."""
+    path = path or first_path(model, theta, segments, g)
+    for _ in range(rounds):
+        y, z = _run(model, theta, segments, path, g)
+        path = _closer(path, segments.y - y, z, segments.used, wide)
+    return path
+
+
+def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
+    """Where a linearisation expects a path to be pulled once θ has moved by d [C], by one step of
+    Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there."""
+    gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
+    return _closer(linear.path, gap, linear.z, linear.cut.used, wide)
+
+
+def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
+    """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
+    that ran away stays where it was."""
+    count, _, _, size = z.shape
+    away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
+    if away.any():
+        gap, z, used = gap.copy(), z.copy(), used & ~away[:, None, None]
+        gap[away], z[away] = 0.0, 0.0
+    prior = np.concatenate((wide.start, np.repeat(wide.push, path.push.shape[-1])))
+    weight = np.where(used, 1.0 / wide.noise, 0.0)
+    scaled = (z * weight[..., None]).reshape(count, -1, size)
+    # the start is free about where it stands, the knots about zero
+    turned = np.swapaxes(scaled, 1, 2)
+    normal = turned @ scaled + np.diag(prior**-2.0)
+    pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - path.known * prior**-2.0
+    step = np.linalg.solve(normal, pull[..., None])[..., 0]
+    step[away] = 0.0
+    return Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(path.push.shape))
+
+
+def linear(
+    model: Smooth,
+    theta: np.ndarray,
+    segments: Cut,
+    g: Grid,
+    path: Path,
+    moved: np.ndarray,
+    shown: np.ndarray,
+    wide: Wide | None = None,
+) -> Linear:
+    """Around a path, by all of θ, of which the last Q are causes' numbers.
+
+    moved   [S, K, D, Q]  how those change what drives, where a cause reads otherwise
+    shown   [S, B, 6, Q]  how they change what was measured
+    wide    how freely the path was pulled: what is FAR times that from its measurement has run
+            away; FAR times what the segments span where it is not given
+    """
+    y, columns = _run(model, theta, segments, path, g, moved)
+    lost = _lost(segments, y, columns, wide)
+    if lost.any():
+        used = segments.used & ~lost[:, None, None]
+        segments = replace(segments, used=used)
+        y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
+        columns[lost], shown = 0.0, np.where(lost[:, None, None, None], 0.0, shown)
+    size = 6 + 3 * g.knots
+    read = moved.shape[-1]
+    z, j = columns[..., :size].copy(), columns[..., size:].copy()
+    j[..., len(theta) - read :] -= shown
+    e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
+    return Linear(segments, path, e, z, j, lost)
+
+
+def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
+    """[S] bool: where path or columns are not finite, or the path is nowhere near its measurement.
+
+    Only bins that were seen count, and channels of one kind (both of position, both of velocity)
+    have one width: that of `wide`, or the root mean square of what all segments span.
+    """
+    if wide is None:
+        span = np.ptp(segments.y, axis=1)[:, KIND].max(-1)
+        width = np.sqrt((span**2).mean(0))
+    else:
+        width = np.hypot(wide.start, wide.noise)[KIND].max(-1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        off = np.where(segments.used, np.abs(segments.y - y), 0.0).max(1)
+        near = (off <= FAR * np.maximum(width, LEAST)).all(-1)
+    return ~(near & np.isfinite(y).all((1, 2)) & np.isfinite(columns).all((1, 2, 3)))
+
+
+def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
+    """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
+    up: one compilation serves all."""
+    for at in range(0, count, CHUNK):
+        part = slice(at, min(at + CHUNK, count))
+
+        def filled(values: np.ndarray, part: slice = part) -> np.ndarray:
+            own = values[part]
+            lack = CHUNK - len(own)
+            return np.concatenate((own, np.repeat(own[-1:], lack, axis=0))) if lack else own
+
+        yield part, filled
+
+
+def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarray]:
+    """`_slopes` at every node, by segments: [S, K, 3, 6 or D or P; P only where `coefficients` are
+    asked for]. Those of a model that is smooth and takes long (a network) are worked out as often
+    as they change, and go straight between."""
+    nodes = states.shape[1]
+    stride = max(round(model.smooth / step), 1)
+    at = np.unique(np.append(np.arange(0, nodes, stride), nodes - 1))
+    # one compilation serves both: it takes longer than all that it saves to leave θ out
+    *found, by_theta = _slopes(model, theta, states[:, at], driven[:, at])
+    found.append(by_theta if coefficients else np.zeros((3, 0, by_theta.shape[-1]), np.float32))
+    right = np.clip(np.searchsorted(at, np.arange(nodes)), 1, len(at) - 1)
+    part = ((np.arange(nodes) - at[right - 1]) / (at[right] - at[right - 1])).astype(np.float32)
+    every = []
+    for values in found:
+        values = np.asarray(values).reshape(*values.shape[:2], len(states), len(at))
+        if stride > 1:
+            left = values[..., right - 1]
+            values = left + part * (values[..., right] - left)
+        every.append(np.moveaxis(values, (2, 3), (0, 1)))
+    return every
+
+
+def _run(model, theta, segments, path, g, moved=None):
+    """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
+    model runs away."""
+    with np.errstate(all="ignore"):
+        return _every(model, theta, segments, path, g, moved)
+
+
+def _every(model, theta, segments, path, g, moved):
+    many = finer(model, segments.step)
+    step = segments.step / many
+    push, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
+    per = many * (g.nodes - 1) // g.bins
+    ys, columns = [], []
+    for part, filled in _chunks(len(segments)):
+        driven = _between(filled(segments.driven), many)
+        states = np.asarray(
+            _path(model, theta, filled(path.start), _between(filled(push), many), driven, step)
+        )
+        keep = slice(part.stop - part.start)
+        by_state, by_driven, by_theta = _along(
+            model, theta, states, driven, step, coefficients=moved is not None
+        )
+        states = states[keep]
+        how = np.zeros((*driven[keep].shape, 0)) if moved is None else _between(moved[part], many)
+        pairs = 0.5 * (states[:, 1:] + states[:, :-1])
+        ys.append(pairs.reshape(len(states), g.bins, per, 6).mean(2))
+        columns.append(
+            variational_equations.columns(
+                states, by_state, by_driven, by_theta, how, hats, step, g.bins
+            )
+        )
+    return np.concatenate(ys), np.concatenate(columns)

@@ -1,0 +1,72 @@
+"""What causes read otherwise than it was recorded, and how their numbers change it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shiplog.diagnosis import segments
+from shiplog.diagnosis.parameter_layout import Columns
+from shiplog.diagnosis.segments import Cut
+from shiplog.models.causes import Cause, Setting
+from shiplog.models.extended import Extended
+from shiplog.voyages.recording import Record
+
+SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
+STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
+
+
+def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
+    """The record as those causes' numbers have it, in the catalogue's order."""
+    for cause in causes:
+        values = numbers.get(cause.label)
+        if values is not None and np.any(values != 0.0):
+            record = cause.read(record, values)
+    return record
+
+
+def read(
+    model: Extended,
+    setting: Setting,
+    record: Record,
+    rows: np.ndarray,
+    numbers: Mapping[str, np.ndarray] | None = None,
+) -> tuple[Cut, np.ndarray, np.ndarray]:
+    """Segments as read with `numbers`, and how each cause's numbers change them there: a clock's
+    by the motion averaged over seconds, as its noise tells nothing of a clock."""
+    given = dict(numbers or {})
+    sizes = {c.label: c.sizes(setting) for c in model.causes}
+    columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
+    base = segments.cut(corrected(model.causes, record, given), rows)
+    moved = np.zeros((*base.driven.shape, len(columns.unit)))
+    shown = np.zeros((*base.y.shape, len(columns.unit)))
+    before = record  # as the causes before this one have it
+    for place, cause in enumerate(model.causes):
+        if not cause.reads:
+            continue
+        here = given.get(cause.label, np.zeros(cause.count))
+        low, high = cause.bounds(setting)
+        moving = before.smoothed(SMOOTH) if cause.shifts else before
+        for i, column in enumerate(columns.of[cause.label]):
+            step = np.zeros(cause.count)
+            step[i] = STEP * sizes[cause.label][i]
+            # not beyond what it may be: a lag that is negative sharpens steps and noise
+            ends = np.minimum(here + step, high), np.maximum(here - step, low)
+            apart = ends[0][i] - ends[1][i]
+            more, less = (
+                corrected(model.causes[place + 1 :], cause.read(moving, end), given) for end in ends
+            )
+            # of what both share nothing changes
+            if more.actuator is not less.actuator:
+                change = segments.at_nodes(record, rows, more.actuator - less.actuator)
+                moved[..., : change.shape[-1], column] = change / apart
+            if more.wind is not less.wind or more.state is not less.state:
+                change = segments.at_nodes(record, rows, more.true_wind - less.true_wind)
+                moved[..., -2:, column] = change / apart
+            if more.state is not less.state:
+                between = replace(more, state=more.state - less.state)
+                shown[..., column] = segments.measured(between, rows)[0] / apart
+        before = corrected((cause,), before, given)
+    return base, moved, shown

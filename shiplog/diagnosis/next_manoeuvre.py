@@ -1,0 +1,206 @@
+"""The manoeuvre that would tell two causes apart, and what it would say: simulated before it is
+sailed.
+
+Evidence to come is the information of a manoeuvre's simulation, coefficients and what is usual
+eliminated: of a cause's numbers as they were found, what another cause could not imitate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis import likelihood, linearisation, segments
+from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.measurement_correction import read
+from shiplog.diagnosis.result import Named
+from shiplog.simulation.sensitivities import Series, rollout
+from shiplog.voyages.recording import Record
+
+SECONDS = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time
+STEP = 0.5  # s of the simulation
+HARD = np.radians(35.0)  # farther no rudder is laid, and no thruster turned
+FAR = 1e3  # m, m/s: a simulation beyond has left the pond
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """Thrust and steering at times t [n], as shares of what the voyages used; starts at rest.
+
+    words   with a place for every one of `times` [s]: both are of a three-metre ship, as t is
+    """
+
+    words: str
+    drive: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    times: tuple[float, ...] = ()
+
+    def said(self, factor: float) -> str:
+        """The words, for a ship whose time scale is `factor` times that of a three-metre ship."""
+        return self.words.format(*(f"{factor * time:.0f} s" for time in self.times))
+
+
+def _still(t: np.ndarray, share: float) -> np.ndarray:
+    return np.full(len(t), share)
+
+
+def _in_turn(t: np.ndarray, half: float) -> np.ndarray:
+    """1 and -1, so many seconds each."""
+    return np.where((t // half) % 2 < 1, 1.0, -1.0)
+
+
+MANOEUVRES = (
+    Manoeuvre(
+        "one slow full turn to either side", lambda t: (_still(t, 0.6), 0.4 * _in_turn(t, 150.0))
+    ),
+    Manoeuvre(
+        "a zigzag, {} to either side", lambda t: (_still(t, 0.8), 0.8 * _in_turn(t, 30.0)), (30.0,)
+    ),
+    Manoeuvre(
+        "doublets of {} at constant revolutions",
+        lambda t: (_still(t, 0.7), _in_turn(t, 3.0)),
+        (3.0,),
+    ),
+    Manoeuvre(
+        "full power and no power in turn, {} each, on a straight course",
+        lambda t: (0.5 + 0.5 * _in_turn(t, 60.0), _still(t, 0.0)),
+        (60.0,),
+    ),
+    Manoeuvre(
+        "bursts of full power from rest, {} every {}",
+        lambda t: (np.where(t % 60.0 < 10.0, 1.0, 0.0), _still(t, 0.0)),
+        (10.0, 60.0),
+    ),
+    Manoeuvre(
+        "the same course out and back",
+        lambda t: (_still(t, 0.7), np.where((t > 110.0) & (t < 150.0), 0.9, 0.0)),
+    ),
+    Manoeuvre("a drifting stop", lambda t: (np.where(t < 40.0, 0.7, 0.0), _still(t, 0.0))),
+)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to sail next, for how long [s], and the evidence expected of it [nats]."""
+
+    words: str
+    seconds: float
+    nats: float
+
+
+def advice(
+    trial: Trial, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
+) -> dict[str, Advice]:
+    """Label → what would tell it best from all that these data cannot tell it from.
+
+    fixed   numbers of the causes that the model has already
+    """
+    alike = {n.cause.label: n for n in named if n.alike}
+    if not alike:
+        return {}
+    said, factor = sailed(trial, fixed), trial.record.timescale.factor
+    found = {}
+    for label, one in alike.items():
+        worth = {
+            m.said(factor): min(apart(trial, gram, one, other) for other in one.alike)
+            for m, gram in zip(MANOEUVRES, said, strict=True)
+            if gram is not None
+        }
+        if worth:
+            best = max(worth, key=lambda words: worth[words])
+            found[label] = Advice(best, factor * SECONDS, worth[best])
+    return found
+
+
+def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
+    """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units."""
+    columns = trial.reference.columns
+    own, rival = columns.of[one.cause.label], columns.of[other]
+    g = gram[1:, 1:]
+    left = g - g @ np.linalg.solve(g + trial.reference.information, g)
+    p = one.numbers / columns.unit[own]
+    imitated = left[np.ix_(rival, own)] @ p
+    free = left[np.ix_(rival, rival)] + np.eye(len(rival))
+    return 0.5 * float(p @ left[np.ix_(own, own)] @ p - imitated @ np.linalg.solve(free, imitated))
+
+
+def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
+    """[1 + C, 1 + C] of each manoeuvre, in units; None where the model runs away in it."""
+    ref = trial.reference
+    numbers = dict(fixed)
+    whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
+    recorded, kept = simulated(trial, whole)
+    rows = segments.begins(recorded)
+    cut, moved, shown = read(ref.model, ref.setting, recorded, rows, numbers)
+    grid = segments.grid(recorded)
+    path = linearisation.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
+    linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, shown)
+    modes = likelihood.modes(likelihood.weighed(linear, ref.unrest), ref.unrest)
+    if ref.misfit is not None:
+        modes = modes.beside(ref.misfit.pushed(cut, grid))
+    each = modes.gram().scaled(ref.columns.unit).each
+    found: list[np.ndarray | None] = []
+    for i in range(len(MANOEUVRES)):
+        own = each[cut.voyage == i]
+        found.append(own.sum(0) if kept[i] and len(own) else None)
+    return found
+
+
+def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
+    """All manoeuvres in the trial's mean wind, a voyage each; which stayed in the pond [M]."""
+    record, model = trial.record, trial.reference.model
+    factor = record.timescale.factor
+    time = np.arange(0.0, factor * SECONDS + STEP, STEP)
+    actuator = np.stack([driven(record, m, time / factor) for m in MANOEUVRES])
+    count, rows = actuator.shape[:2]
+    wind = np.broadcast_to(record.true_wind[record.seen].mean(0), (count, rows, 2))
+    share = np.full((count, rows, 1), record.share[-1])
+    series = Series(
+        np.zeros((count, rows, 6)), np.concatenate((actuator, share), -1), np.array(wind),
+        np.full((count, rows - 1), STEP), np.ones(count),
+    )  # fmt: skip
+    with np.errstate(all="ignore"):
+        states = rollout(model, theta, series)
+    kept = np.abs(states).max((1, 2)) < FAR
+    states = np.where(kept[:, None, None], states, 0.0)
+    fine = np.arange(0.0, factor * SECONDS, record.step)
+
+    def between(values: np.ndarray) -> np.ndarray:
+        every = [np.interp(fine, time, column) for one in values for column in one.T]
+        return np.moveaxis(np.reshape(every, (count, -1, len(fine))), 1, 2).reshape(
+            count * len(fine), -1
+        )
+
+    state, blowing = between(states), between(series.wind)
+    c, s = np.cos(state[:, 4]), np.sin(state[:, 4])
+    felt = np.stack((
+        c * blowing[:, 0] + s * blowing[:, 1] + state[:, 1],
+        c * blowing[:, 1] - s * blowing[:, 0] + state[:, 3],
+    ), -1)  # fmt: skip
+    whole = count * len(fine)
+    return Record(
+        profile=record.profile,
+        names=tuple(m.words for m in MANOEUVRES),
+        voyage=np.repeat(np.arange(count), len(fine)),
+        time=np.tile(fine, count),
+        share=np.full(whole, record.share[-1]),
+        starts=np.tile(np.arange(len(fine)) == 0, count),
+        seen=np.ones(whole, dtype=bool),
+        state=state,
+        actuator=between(actuator),
+        wind=felt,
+        step=record.step,
+        timescale=record.timescale,
+    ), kept
+
+
+def driven(record: Record, manoeuvre: Manoeuvre, time: np.ndarray) -> np.ndarray:
+    """[n, A] SI: shares of what each actuator was seen to do, nineteen times of twenty."""
+    thrust, steering = manoeuvre.drive(time)
+    usual = np.quantile(np.abs(record.actuator[record.seen]), 0.95, axis=0)
+    columns = []
+    for actuator, most in zip(record.profile.actuators, usual, strict=True):
+        steers = actuator.kind in ("rudder", "azimuth")
+        columns.append(steering * min(float(most), HARD) if steers else thrust * most)
+    return np.stack(columns, -1)

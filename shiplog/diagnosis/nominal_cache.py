@@ -1,0 +1,126 @@
+"""Where the campaign that a model was made on settles: worked out once, kept in the user's cache.
+
+All that it depends on is in its key, this program's source with it: nothing here is ever stale.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import zipfile
+from collections.abc import Iterable
+from dataclasses import astuple
+from pathlib import Path as File
+
+import jax
+import numpy as np
+
+from shiplog import disk_cache
+from shiplog.diagnosis import nominal_campaign, nominal_reference
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Path
+from shiplog.diagnosis.nominal_campaign import Characteristics
+from shiplog.diagnosis.nominal_reference import Settled, Start
+from shiplog.models.causes import Setting
+from shiplog.models.extended import Extended
+from shiplog.voyages.recording import Record
+
+UNREST = ("noise", "push", "start", "coloured", "fade")
+TIMES = ("time", "bin", "knot")
+
+log = logging.getLogger(__name__)
+
+
+def settled(model: Extended, setting: Setting, start: Start, record: Record) -> Settled:
+    """`reference.settled`, worked out once for a model and a campaign."""
+    kept = disk_cache.folder() / "settled" / f"{_key(model, setting, start, record)}.npz"
+    known = _read(kept)
+    if known is not None:
+        return _settled(known)
+    log.info("where the nominal voyages settle: worked out once for a model and kept")
+    found = nominal_reference.settled(model, setting, start, record)
+    _keep(kept, {"theta": found.theta, "start": found.path.start, "push": found.path.push}
+          | _unrest(found.unrest))  # fmt: skip
+    return found
+
+
+def characteristics(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
+) -> Characteristics:
+    """`nominal_campaign.characteristics`, worked out once for a model and a campaign."""
+    key = _key(model, setting, start, record)
+    kept = disk_cache.folder() / "settled" / f"{key}.characteristics.npz"
+    known = _read(kept)
+    if known is not None:
+        given = {k: dict(zip(known[f"{k}_names"].tolist(), known[f"{k}_values"].tolist(),
+                             strict=True)) for k in ("deviation", "size")}  # fmt: skip
+        return Characteristics(
+            _known_unrest(known), given["deviation"], given["size"],
+            float(known["share"]), float(known["noise"]), known["weight"],
+        )  # fmt: skip
+    found = nominal_campaign.characteristics(model, setting, start, record, at)
+    arrays = _unrest(found.unrest) | {"share": found.share, "noise": found.noise,
+                                      "weight": found.weight}  # fmt: skip
+    for name in ("deviation", "size"):
+        values = getattr(found, name)
+        arrays |= {f"{name}_names": np.array(list(values)),
+                   f"{name}_values": np.array(list(values.values()))}  # fmt: skip
+    _keep(kept, arrays)
+    return found
+
+
+def _read(kept: File) -> dict | None:
+    """Arrays of a file; None where it is not there, or broken: then all is worked out again."""
+    try:
+        with np.load(kept, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _unrest(unrest: Unrest) -> dict:
+    whole = {f"unrest_{name}": getattr(unrest, name) for name in UNREST}
+    return whole | {name: getattr(unrest, name) for name in TIMES}
+
+
+def _known_unrest(arrays: dict) -> Unrest:
+    times = {n: float(arrays[n]) for n in TIMES}
+    return Unrest(**times, **{n: arrays[f"unrest_{n}"] for n in UNREST})
+
+
+def _settled(arrays: dict) -> Settled:
+    return Settled(arrays["theta"], Path(arrays["start"], arrays["push"]), _known_unrest(arrays))
+
+
+def _keep(kept: File, arrays: dict) -> None:
+    """Whole or not at all; a cache that cannot be written is no fault."""
+    partial = kept.with_name(f"{kept.stem}.{os.getpid()}.partial")
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, **arrays)
+        partial.replace(kept)
+    except OSError as error:
+        log.info("not kept: %s", error)
+
+
+def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:
+    leaves, shape = jax.tree.flatten(model)
+    digest = hashlib.sha256(disk_cache.source())
+    for word in (
+        shape,
+        setting.scale,
+        setting.profile,
+        record.names,
+        record.step,
+        record.timescale,
+    ):
+        digest.update(repr(word).encode())
+    arrays: Iterable = (
+        *leaves, *astuple(start), record.voyage, record.time, record.share, record.starts,
+        record.seen, record.state, record.actuator, record.wind,
+    )  # fmt: skip
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

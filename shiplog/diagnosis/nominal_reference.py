@@ -1,0 +1,348 @@
+"""The campaign that the model was made on, as the diagnosis sees it: what is usual for this ship.
+
+Coefficients and the numbers of every cause are learned here together, each held to its plausible
+spread. What the model gets wrong everywhere then stands in them already; a diagnosis asks only
+for what changed. One campaign makes the next one's coefficients look surer than they are, so what
+it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from shiplog.diagnosis import input_misfit, likelihood, linearisation, segments
+from shiplog.diagnosis.input_misfit import Misfit
+from shiplog.diagnosis.likelihood import Modes, Unrest
+from shiplog.diagnosis.linearisation import Linear, Path, Wide
+from shiplog.diagnosis.measurement_correction import read
+from shiplog.diagnosis.parameter_layout import HELD, Columns
+from shiplog.models.causes import Cause, Setting, constants_of
+from shiplog.models.compiled_network import Network
+from shiplog.models.extended import Extended
+from shiplog.models.mmg.model import MMG
+from shiplog.voyages.recording import Record
+
+ROUNDS = 6  # of moving the coefficients to where they are linearised
+FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
+NEAR = 5.0  # nats, for which they are not moved on
+ON_THE_WAY, AT_REST = 2, 3  # rounds in which the sizes of noise and unrest are learnt
+FREE = 2.0  # times the unrest that a path's knots may be pulled by
+KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
+CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
+VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
+CAREFUL_KAPPA = 11.0  # of too few voyages
+UNREST_TIME = 4.0  # s, of a three-metre ship
+GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
+
+
+@dataclass(frozen=True)
+class Start:
+    """Coefficients of the base [P] as the run has them, how far off they may be, and their range.
+
+    The run's own values hold them, and not what was known before any data: what these say nothing
+    of stays, and all is linear about where the ship is.
+    """
+
+    values: np.ndarray
+    spread: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclass(frozen=True)
+class Reference:
+    """θ that all is linearised about, and what the nominal campaign says around it.
+
+    information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
+                 latter is the run's own coefficients'
+    nominal      that campaign, and its `modes` under the usual unrest; None where the model was
+                 made on the very data that are diagnosed
+    freedom      degrees of it with which κ is known: the sizes of covariances hang on it
+    adapts       whether it has learned of what is wrong there, so that a cause takes another fit
+    learned      whether it stands for a network that has, and that no voyage is held out to
+    misfit       what is wrong of such a network's inputs
+    counts       for how much of itself a trial counts: what is wrong there each voyage has its own
+                 of
+    """
+
+    model: Extended
+    setting: Setting
+    theta: np.ndarray
+    columns: Columns
+    unrest: Unrest
+    wide: Wide
+    information: np.ndarray
+    pull: np.ndarray
+    anchor: np.ndarray
+    kappa: float
+    nominal: Linear | None
+    modes: Modes | None
+    freedom: float
+    adapts: bool = False
+    learned: bool = False
+    misfit: Misfit | None = None
+    counts: float = 1.0
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """[C] what is usual, in units."""
+        return np.linalg.solve(self.information, self.pull)
+
+    @cached_property
+    def usual(self) -> np.ndarray:
+        """[P] coefficients."""
+        base = self.columns.base
+        return self.theta + self.mean[:base] * self.columns.unit[:base]
+
+    def held(self, louder: float, pulse: np.ndarray | None = None) -> Wide:
+        """How far a path may be pulled where the unrest is so much louder than usual, and by a
+        force that comes and goes."""
+        push = louder * self.unrest.push
+        if pulse is not None:
+            push = np.hypot(push, pulse)
+        return Wide(self.unrest.noise, self.wide.start, FREE * push)
+
+    @property
+    def coefficients(self) -> dict[str, np.ndarray]:
+        """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
+        own = isinstance(self.model.base, MMG)
+        values = self.theta if own else np.asarray(self.model.stand_in_values)
+        return dict(zip(self.model.stand_in.names, values, strict=True))
+
+
+def wide_of(setting: Setting) -> Wide:
+    """How far a path may be pulled, from what a ship of this size and speed does in seconds."""
+    speed, length = setting.scale["speed"], setting.scale["length"]
+    turn = speed / length
+    at, going, angle, turning = 0.3 * length, speed, 0.3, turn
+    said = setting.profile.sensors.noise
+    unsaid = {  # for a sensor whose accuracy nobody states
+        "position": 0.005 * length, "velocity": 0.03 * speed,
+        "heading": 0.003, "yaw_rate": 0.03 * turn,
+    }  # fmt: skip
+    of = {name: said(name) or least for name, least in unsaid.items()}
+    noise = np.array([of[n] for n in ("position", "velocity") * 2 + ("heading", "yaw_rate")])
+    return Wide(
+        noise, np.array([at, going, at, going, angle, turning]),
+        np.array([0.1 * speed, 0.1 * speed, 0.1 * turn]),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where a campaign is linearised, and how unrestful it is there.
+
+    theta  [P] coefficients; path of each segment; unrest
+    """
+
+    theta: np.ndarray
+    path: Path
+    unrest: Unrest
+
+
+def settled(
+    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS
+) -> Settled:
+    """Coefficients moved to where they are linearised, all causes' numbers beside them; without
+    rounds they stay where they are."""
+    columns = columns_of(model, setting, start)
+    wide, g = wide_of(setting), segments.grid(record)
+    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    base, unit = columns.base, columns.unit
+    theta = np.clip(start.values, start.low, start.high)
+    of = record.timescale
+    unrest = Unrest(
+        wide.noise, 0.04 * wide.push, UNREST_TIME * of.factor, wide.start, bin=of.bin, knot=of.knot
+    )
+    path = linear = None
+    whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
+    for round_ in range(rounds + 1):
+        if linear is None:
+            path = linearisation.pulled(model, whole, cut, g, hold)
+        else:
+            before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
+            path = linearisation.ahead(linear, whole - before, hold)
+        held = anchored(start, theta, columns)
+        linear = linearisation.linear(model, whole, cut, g, path, moved, shown)
+        found, _ = solved(linear, unrest, columns, held)
+        unrest = likelihood.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)
+        hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
+        found, gain = solved(linear, unrest, columns, held)
+        far = float(np.abs(found[:base]).max(initial=0.0))
+        if round_ == rounds or (gain < NEAR and far < FARTHEST):
+            unrest = likelihood.learnt(linear, found * unit, unrest, rounds=AT_REST)
+            break
+        moved_to = theta + (found * unit)[:base] * min(1.0, FARTHEST / far)
+        edge = 1e-6 * (start.high - start.low)
+        edge = np.where(np.isfinite(edge), edge, 0.0)
+        theta = np.clip(moved_to, start.low + edge, start.high - edge)
+    assert path is not None
+    return Settled(theta, path, unrest)
+
+
+def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
+    """[C] how the run's own coefficients pull on those that stand elsewhere, in units.
+
+    Forces and masses share a scale: held to where they last stood, and not to the run's, masses
+    halve in a few rounds, and a load is found to weigh less than it does.
+    """
+    pull = np.zeros(len(columns.unit))
+    pull[: columns.base] = (start.values - theta) / columns.unit[: columns.base]
+    return pull
+
+
+def solved(
+    linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """[C] numbers, in units, that the campaign itself and what was known of them ask for; nats
+    that it brings to move the base's there, were all linear (half a Newton decrement)."""
+    base, by = columns.base, np.concatenate(([1.0], columns.unit))
+    modes = likelihood.modes(likelihood.weighed(linear, unrest), unrest)
+    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
+    inverse = np.linalg.inv(total[1:, 1:] + np.diag(columns.known))
+    found = inverse @ (total[1:, 0] + held)
+    return found, 0.5 * float(found[:base] @ np.linalg.solve(inverse[:base, :base], found[:base]))
+
+
+def learn(
+    model: Extended,
+    setting: Setting,
+    start: Start,
+    record: Record,
+    at: Settled | None = None,
+    kappa: float | None = None,
+    least: float = CAMPAIGN,
+    inputs: Network | None = None,
+) -> Reference:
+    """From the nominal campaign, linearised `at` where it settles. κ is chosen on its own voyages
+    unless given, and not below `least`. `inputs`: a network, of whose inputs the model gets
+    something wrong."""
+    at = at or settled(model, setting, start, record)
+    columns = columns_of(model, setting, start)
+    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
+    g = segments.grid(record)
+    linear = linearisation.linear(model, whole, cut, g, at.path, moved, shown)
+    modes = likelihood.modes(likelihood.weighed(linear, at.unrest), at.unrest)
+    held = anchored(start, at.theta, columns)
+    wrong = None
+    if inputs is not None:
+        wrong = input_misfit.of(
+            inputs, linear.cut, g, modes, columns.known, columns.unit, at.unrest.push
+        )  # fmt: skip
+        modes = modes.beside(wrong.pushed(linear.cut, g))
+        columns = columns.with_misfit(wrong.count)
+        held = np.concatenate((held, np.zeros(wrong.count)))
+    voyage = linear.cut.voyage
+    names = np.unique(voyage)
+    by = np.concatenate(([1.0], columns.unit))
+    each = np.stack([modes.total((voyage == v).astype(float)) for v in names]) * np.outer(by, by)
+    chosen = kappa or inflation(each, columns.known, held, least)
+    information, pull = usual(each.sum(0), chosen, columns.known, held)
+    return Reference(
+        model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
+        chosen, linear, modes, freedom(len(names)), misfit=wrong,
+    )  # fmt: skip
+
+
+def freedom(voyages: int) -> float:
+    """Degrees of it that so many voyages leave to what they have in common."""
+    return float(max(voyages - 1, 2))
+
+
+def usual(
+    total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
+    beside what is `known` and `held` without them."""
+    return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
+
+
+def columns_of(model: Extended, setting: Setting, start: Start) -> Columns:
+    sizes = [cause.sizes(setting) for cause in model.causes]
+    return Columns(len(start.values), model.causes, np.concatenate((start.spread, *sizes)))
+
+
+def inflation(
+    each: np.ndarray, known: np.ndarray, held: np.ndarray, least: float = CAMPAIGN
+) -> float:
+    """κ that predicts each voyage best from the others; not below `least`, and careful with fewer
+    than three.
+
+    each [V, 1 + C, 1 + C] products of a voyage; what is known before any data, information and
+    pull, `known` and `held` [C]: all in units
+    """
+    if len(each) < 3:
+        return CAREFUL_KAPPA
+    total = each.sum(0)
+    said, tried = [], [kappa for kappa in KAPPAS if kappa >= least]
+    for kappa in tried:
+        score = 0.0
+        for left in each:
+            score += marginal(left, *usual(total - left, kappa, known, held))
+        said.append(score)
+    return tried[int(np.argmax(said))]
+
+
+def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
+    """Log likelihood of [e | J] with its numbers integrated out, up to what no number changes."""
+    both = gram[1:, 1:] + information
+    towards = gram[1:, 0] + pull
+    square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
+    square -= towards @ np.linalg.solve(both, towards)
+    return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])
+
+
+def assume(
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool,
+    inputs: Network | None = None,
+) -> Reference:  # fmt: skip
+    """Where no campaign shows what is usual: the unrest is as large as it is on these voyages.
+
+    given    coefficients as somebody gave them, held to a tenth of their plausible spread; else a
+             fit to these voyages made them, and they are as free as they plausibly are
+    inputs   a network that learned from these voyages
+    """
+    if given:
+        start = replace(start, spread=GIVEN * start.spread)
+    at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
+    kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
+    whole = learn(model, setting, start, record, at, kappa, least, inputs)
+    columns = whole.columns
+    information = np.diag(columns.known.copy())
+    causes = slice(columns.base, columns.linearised)
+    # no cause has a usual size where nothing was usual
+    information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD
+    return replace(
+        whole, information=information, pull=whole.anchor, nominal=None, modes=None,
+        adapts=not given, learned=inputs is not None,
+        counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if inputs is not None else 1.0,
+    )  # fmt: skip
+
+
+def beside(reference: Reference, causes: Sequence[Cause]) -> Reference:
+    """One that `assume` made, with these causes in its model and no others."""
+    setting, columns = reference.setting, reference.columns
+    sizes = [cause.sizes(setting) for cause in causes]
+    first, last = columns.base, columns.linearised
+    more = sum(len(size) for size in sizes)
+
+    def widened(values: np.ndarray, own: float) -> np.ndarray:
+        return np.concatenate((values[:first], np.full(more, own), values[last:]))
+
+    constants = {**constants_of(causes, setting), **reference.model.constants}
+    return replace(
+        reference,
+        model=replace(reference.model, causes=tuple(causes), constants=constants),
+        columns=Columns(
+            first, tuple(causes),
+            np.concatenate((columns.unit[:first], *sizes, columns.unit[last:])), columns.misfit,
+        ),
+        information=np.diag(widened(np.diag(reference.information), HELD)),
+        pull=widened(reference.pull, 0.0),
+        anchor=widened(reference.anchor, 0.0),
+    )  # fmt: skip

@@ -1,0 +1,108 @@
+"""What is named, linearised again where it was found, with a path of its own, until it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from shiplog.diagnosis.evidence import Found, Point, Trial
+from shiplog.diagnosis.linearisation import Path
+
+ROUNDS = 10  # of linearising again, at most: a map whose ends are held takes nine
+AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
+FALLS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
+SHORTER = 3  # times that a step is halved where the fit runs away
+REST = 0.02  # of a number's size: it rests
+HOPE = 4.0  # times what the last round of linearising brought may still come
+
+
+def settle(
+    trial: Trial,
+    included: Sequence[str],
+    numbers: Mapping[str, np.ndarray],
+    path: Path | None,
+    beat: float = -np.inf,
+    lowest: float = -np.inf,
+) -> tuple[Point, Found]:
+    """These causes together, linearised where they are until they rest (from where they did
+    before, if they have); or until it is plain that their evidence will not `beat` what
+    another has. A step after which it is below the `lowest` that it can be at rest, where that is
+    known, or then falls far, went too far."""
+    point, louder, lately, before = None, 1.0, None, np.inf
+    near: Path | Point | None = path
+    key = (tuple(included), trial.pulse)
+    if key in trial.rested:
+        numbers, near, louder = trial.rested[key]
+        lately = louder
+    stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
+    shorter = 0
+    for _ in range(ROUNDS):
+        try:
+            point = trial.at(numbers, near, louder)
+            if np.abs(point.linear.e).max() > AWAY:
+                raise np.linalg.LinAlgError("a path that ran away")
+            base, _ = trial.scan(point, (), included, lately)
+            if base.evidence < lowest:
+                raise np.linalg.LinAlgError("a step too far")
+        except np.linalg.LinAlgError:  # the fit ran away, and its path with it
+            if shorter == SHORTER:
+                assert trial.first is not None
+                return trial.first, Found("+".join(included), -np.inf, louder, numbers)
+            shorter += 1
+            if stood is None:
+                numbers = {**numbers, included[-1]: 0.5 * numbers[included[-1]]}
+            else:
+                numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
+            continue
+        near, stood = point, numbers
+        if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
+            lowest = max(lowest, base.evidence - FALLS)
+        louder = lately = base.louder
+        if not all(np.isfinite(values).all() for values in base.numbers.values()):
+            base = replace(base, evidence=-np.inf)  # the fit ran away
+            break
+        moved = _within_bounds(trial, base.numbers, base.covariance)
+        far = trial.apart(moved, numbers)
+        numbers = moved
+        lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
+        if far < REST:
+            trial.rested[key] = (numbers, point.path, louder)
+            break
+        if lost and np.isfinite(before):
+            break
+        before = base.evidence
+    assert point is not None
+    return point, replace(base, name="+".join(included), numbers=numbers)
+
+
+def _within_bounds(
+    trial: Trial, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
+) -> dict[str, np.ndarray]:
+    """Numbers of a hypothesis as its causes allow them."""
+    by = {cause.label: cause for cause in trial.reference.model.causes}
+    if not numbers:
+        return {}
+    assert covariance is not None
+    bounds = [by[name].bounds(trial.reference.setting) for name in numbers]
+    low, high = (np.concatenate(of) for of in zip(*bounds, strict=True))
+    found = within(np.concatenate(list(numbers.values())), covariance, low, high)
+    ends = np.cumsum([len(values) for values in numbers.values()])[:-1]
+    return dict(zip(numbers, np.split(found, ends), strict=True))
+
+
+def within(
+    mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """[Q] a Gaussian's likeliest numbers between bounds: what is held at one moves the others."""
+    if ((mean >= low) & (mean <= high)).all():
+        return mean
+    unit = np.sqrt(np.diagonal(covariance))
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(unit, unit)))
+    except np.linalg.LinAlgError:  # no covariance any more: each by itself
+        return np.clip(mean, low, high)
+    found = lsq_linear(root, root @ (mean / unit), (low / unit, high / unit), method="bvls").x
+    return np.clip(found * unit, low, high)

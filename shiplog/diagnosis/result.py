@@ -1,0 +1,122 @@
+"""What a trial was found to say: the causes that are named, or a structure, or nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from shiplog.diagnosis.evidence import Found, Point, Told, Trial
+from shiplog.diagnosis.relinearisation import settle
+from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.models.causes import Cause, Shown
+
+PULSES = "side_thrust"
+LEAST = 5.0  # nats from which on a cause would show in these data
+
+
+@dataclass(frozen=True)
+class Named:
+    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual.
+
+    alike    those that it explains hardly more than
+    beaten   label → nats by which it explains more than that one instead of it
+    freedom  degrees of it with which the covariance's size is known
+    """
+
+    cause: Cause
+    evidence: float
+    probability: float
+    numbers: np.ndarray
+    covariance: np.ndarray
+    alike: tuple[str, ...] = ()
+    beaten: Mapping[str, float] = field(default_factory=dict)
+    freedom: float = math.inf
+
+    @property
+    def shown(self) -> dict[str, Shown]:
+        return self.cause.told(self.numbers, self.covariance, self.freedom)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is left and has no name."""
+
+    family: str
+    evidence: float
+    acts_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the trial says, before anything was held out.
+
+    verdict    named, none or unknown
+    named      in the order they were found
+    pulses     the unrecorded thruster, where it is one of the causes
+    rejected   label → why not
+    traces     there, but too small to matter
+    ranking    label or family → probability, of the first step
+    louder     λ that is left
+    point, base      the trial linearised with what is named, and that hypothesis
+    first, nothing   the same with nothing named
+    told       label → what these data would tell of each cause, were it there
+    adapted    whether the model's own coefficients are fitted again beside what is named
+    """
+
+    verdict: str
+    named: tuple[Named, ...]
+    structure: Structure | None
+    pulses: Pulses | None
+    traces: tuple[Named, ...]
+    rejected: Mapping[str, str]
+    ranking: Mapping[str, float]
+    louder: float
+    point: Point
+    base: Found
+    first: Point
+    nothing: Found
+    told: Mapping[str, Told] = field(default_factory=dict)
+    adapted: bool = False
+
+
+def without(trial: Trial, decision: Decision, one: Named) -> Decision:
+    """The same verdict with one cause less, the others fitted again."""
+    named = tuple(n for n in decision.named if n is not one)
+    labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
+    if labels:
+        numbers = {n: decision.base.numbers[n] for n in labels}
+        point, base = settle(trial, labels, numbers, decision.point.path)
+        if base.covariance is None:  # the fit ran away: nothing is left of them
+            labels, named = (), ()
+    if not labels:
+        point, base = decision.first, decision.nothing
+    again, at = [], 0
+    by = {n.cause.label: n for n in named}
+    for label in labels:
+        count = len(base.numbers[label])
+        part = slice(at, at + count)
+        at += count
+        if label in by:
+            assert base.covariance is not None
+            again.append(
+                replace(
+                    by[label],
+                    numbers=np.asarray(base.numbers[label]),
+                    covariance=base.covariance[part, part],
+                )
+            )
+    verdict = "named" if again or decision.pulses else "none"
+    return replace(
+        decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
+    )
+
+
+def untold(decision: Decision) -> Decision:
+    """Of a model that simulates nothing: its error goes with the motion, and has no name."""
+    return replace(
+        decision, verdict="unknown", named=(), pulses=None, traces=(),
+        structure=Structure("motion", 0.0, ()),
+    )  # fmt: skip

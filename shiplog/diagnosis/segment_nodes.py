@@ -1,0 +1,45 @@
+"""What went on at the knots of segments, and what pushes there, channel by channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shiplog.diagnosis.linearisation import resampled
+from shiplog.diagnosis.segments import Cut, Grid
+
+
+@dataclass(frozen=True)
+class Knots:
+    """What went on at the knots of S segments.
+
+    state   [S, J, 6]
+    driven  [S, J, A + 3]  actuators, share of the campaign, true wind
+    """
+
+    state: np.ndarray
+    driven: np.ndarray
+
+
+def at_knots(segments: Cut, g: Grid) -> Knots:
+    centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
+    every = round(g.knot / (g.step * g.every))
+    state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
+    return Knots(state, segments.driven[:, ::every])
+
+
+def in_each_channel(waves: np.ndarray) -> np.ndarray:
+    """[S, J, F] → [S, J, 3, 3F]."""
+    count = waves.shape[-1]
+    out = np.zeros((*waves.shape[:2], 3, 3 * count))
+    for channel in range(3):
+        out[..., channel, channel * count : (channel + 1) * count] = waves
+    return out
+
+
+def pushed(features: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `push` [3] is the
+    unit of size."""
+    scaled = np.moveaxis(features * push[:, None], 2, 1)
+    return scaled.reshape(len(scaled), -1, scaled.shape[-1])

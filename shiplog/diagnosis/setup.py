@@ -1,0 +1,64 @@
+"""Store and run to a trial: nominal campaign, testable causes, voyages in question."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from shiplog.diagnosis import nominal_cache, nominal_campaign
+from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.trial_voyages import model_of, setting_of
+from shiplog.models import causes as catalogue
+from shiplog.models.causes import Cause
+from shiplog.training.run_folder import Run
+from shiplog.voyages.recording import Record
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A trial, and label → why a cause cannot be tested on it."""
+
+    trial: Trial
+    untested: Mapping[str, str]
+
+
+def trial_of(
+    run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
+    lacking: str = "",
+) -> Setup:  # fmt: skip
+    """Of a network the ship's MMG is asked, fitted to the voyages that the network was trained on.
+
+    own       causes of the user's
+    nominal   the voyages that the run was made on, before these; None where there are none
+    lacking   why the model cannot tell causes that change forces; empty where it can
+    """
+    setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
+    extension = run.extension
+    held = {} if extension is None else {c.label: c for c in extension.causes}
+    fitted = "" if nominal is not None or run.given else _fitted(run)
+    wanted = [c for c in (*catalogue.CATALOGUE, *own)
+              if c.label not in held]  # fmt: skip
+    chosen, untested = catalogue.testable(setting, wanted, fitted)
+    if lacking:
+        untested |= {c.label: lacking for c in chosen if c.kind != "sensor"}
+        chosen = [c for c in chosen if c.kind == "sensor"]
+    every: list[Cause] = [*held.values(), *(c for c in chosen if c.label not in held)]
+    model, start = model_of(run, every, setting)
+    if nominal is None:
+        inputs = None if run.config.physical else run.base()[0]
+        campaign = nominal_campaign.assumed(model, setting, start, recorded, run.given, inputs)
+    else:
+        # where the coefficients converge depends on the nominal voyages alone: it can be kept
+        before = setting_of(run, nominal, nominal)
+        usual, _ = catalogue.testable(before)
+        plain, _ = model_of(run, usual, before)
+        start = nominal_campaign.widened(plain, before, start)
+        at = nominal_cache.settled(plain, before, start, nominal)
+        found = nominal_cache.characteristics(plain, before, start, nominal, at)
+        campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
+    return Setup(Trial(campaign, recorded, tuple(held)), untested)
+
+
+def _fitted(run: Run) -> str:
+    """What was fitted to the very voyages in question, as `causes.testable` calls it."""
+    return "physics" if run.config.physical else "network"

@@ -1,0 +1,134 @@
+"""Store and run to a trial: what is usual for the ship, the voyages in question, the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.prepare import seconds
+from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.nominal_reference import Start
+from shiplog.exceptions import StoreError
+from shiplog.models import mmg
+from shiplog.models.causes import Cause, Setting, constants_of
+from shiplog.models.extended import Extended
+from shiplog.models.mmg import estimate
+from shiplog.profile import Profile
+from shiplog.simulation.extended_simulator import ExtendedSimulator, campaign
+from shiplog.training.run_folder import Run
+from shiplog.voyages import one_hertz, parts, recording, timescale, windows
+from shiplog.voyages.recording import Record
+from shiplog.voyages.split import plan
+from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
+
+PLACES = 12  # of a map of the bottom
+WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slower for it
+
+
+def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
+    """Those that are asked for, or all that the run has not seen: of a voyage of which it has seen
+    a part, the test part. Raises StoreError for none."""
+    if wanted:
+        return store.select(list(wanted))
+    stored = store.select()
+    names = [n for n in stored if not parts.overlapping([n], run.made_on)]
+    names += [n for n in store.there(run.config.split.test) if n not in stored]
+    if not names:
+        raise StoreError(
+            f"Every voyage in {store.path} was used to make {run.name}.",
+            hint="name some with --voyages, or ingest voyages it has not seen.",
+        )
+    return names
+
+
+def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
+    return recording.read([frame.collect() for frame in store.tables(names)], names, profile)
+
+
+def in_ship_time(
+    run: Run, nominal: Record | None, recorded: Record
+) -> tuple[Record | None, Record]:
+    """Both campaigns with the time scale of this ship at the working speed of its usual voyages."""
+    usual = recorded if nominal is None else nominal
+    if not len(usual) or not len(recorded):  # too little for a verdict, which is said later
+        return nominal, recorded
+    _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
+    shorter = min(one.seconds for one in (usual, recorded))
+    working = float(np.quantile(np.linalg.norm(usual.state[:, [1, 3]], axis=1), WORKING))
+    of = timescale.of_ship(main.length, working, shorter)
+    changed = None if nominal is None else replace(nominal, timescale=of)
+    return changed, replace(recorded, timescale=of)
+
+
+def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
+    """As `evaluate` cuts them; None where no stretch is long enough for one."""
+    rows = one_hertz.with_elapsed(seconds(store, names, profile))
+    planned = plan(rows, "ref", run.config.window)
+    if planned.height == 0:
+        return None
+    return windows.cut(rows, planned, run.config.window, profile.actuator_names, profile.wind_names)
+
+
+def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
+    """What judges in a trial, with what the run has of causes, as it stands before any more."""
+    if run.config.physical:
+        return run.extended(run.config.seeds[0], trial.record)
+    ref = trial.reference
+    held = () if run.extension is None else run.extension.causes
+    numbers = run.extension_numbers()
+    theta = np.concatenate((ref.theta, *(numbers[c.label] for c in held)))
+    model = replace(
+        ref.model, causes=held, constants=constants_for(run, held, ref.setting)
+    )  # fmt: skip
+    shares, lengths = campaign(trial.record)
+    return ExtendedSimulator(
+        model, theta, np.zeros((len(theta),) * 2), run.profile, shares, lengths
+    )
+
+
+def model_of(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
+    """The run's physics with room for these causes, and where its coefficients stand."""
+    if run.config.physical:
+        base, start, stand_in, values = run.base()
+    else:
+        base, start = run.ship()
+        stand_in, values = base, start.values
+    constants = constants_for(run, causes, setting)
+    return Extended(base, tuple(causes), stand_in, values, constants), start
+
+
+def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[str, np.ndarray]:
+    """What these causes' forces need, as the run has it or as its setting says."""
+    held = {} if run.extension is None else run.extension.constants
+    return constants_of(causes, setting) | dict(held)
+
+
+def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
+    """Ship and place of a diagnosis; its speed is that of the `usual` voyages."""
+    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
+    ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
+    places, spacing = _places(recorded, PLACES)
+    scale = {
+        "speed": max(speed, 1e-3), "length": main.length, "mass": main.mass,
+        "moment": main.mass * main.length,
+    }  # fmt: skip
+    windless = run.profile.has_wind and not ship.wind
+    lacking = {f"wind.{k}": v for k, v in estimate.wind(main).items()} if windless else {}
+    return Setting(run.profile, scale, places, spacing, lacking, ship.parts)
+
+
+def _places(record: Record, count: int) -> tuple[np.ndarray, float]:
+    """Points [K, 2] that cover where the ship was, and the spacing between them [m]: each the
+    farthest from those before it (Gonzalez 1985)."""
+    every = record.state[:: max(1, len(record) // 4000)][:, [0, 2]]
+    chosen = [every.mean(0)]
+    nearest = np.linalg.norm(every - chosen[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(every[int(nearest.argmax())])
+        nearest = np.minimum(nearest, np.linalg.norm(every - chosen[-1], axis=1))
+    points = np.array(chosen)
+    apart = np.linalg.norm(points[:, None] - points, axis=-1) + np.diag(np.full(count, np.inf))
+    return points, max(float(np.median(apart.min(0))), 1e-3)

@@ -1,0 +1,123 @@
+"""A force that nobody records and that comes and goes: its log likelihood, place and course."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import minimize
+
+from shiplog.diagnosis import likelihood
+from shiplog.diagnosis.evidence import LOUDER, Found, Point, Trial
+from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.nominal_reference import Reference
+from shiplog.jit_cache import traced
+from shiplog.models.mmg import MMG, body
+
+REACH = 0.5  # lengths from midship
+
+
+@dataclass(frozen=True)
+class Pulses:
+    """The unrecorded thruster: log likelihood, its gain over process noise that is raised in each
+    channel by itself, place [m ahead of midship], root mean square force [N], and acceleration of
+    1 N [3]."""
+
+    value: float
+    gain: float
+    lever: float
+    force: float
+    unit: np.ndarray
+
+
+def pulses(trial: Trial, point: Point, base: Found, usual: np.ndarray | None = None) -> Pulses:
+    """A force to the side that comes and goes at one place along the ship, unrecorded: its
+    accelerations go together as those of no other unrest do. Judged on what is left.
+
+    usual    acceleration [3] that the nominal process noise has at one place; none where None
+    """
+    left, d = trial.left(point.linear, trial.solved(point, base))
+    return pulses_of(left, d, trial.reference, trial.unrest, trial.weight, usual)
+
+
+def pulses_of(
+    linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray,
+    usual: np.ndarray | None = None,
+) -> Pulses:  # fmt: skip
+    """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
+    kept = weight > 0.0  # a segment that says nothing has no likelihood
+    linear, weight = linear.pick(kept), weight[kept]
+    # subtracted before it is squared: of products small differences of large numbers would be left
+    alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
+    startless = likelihood.startless(likelihood.weighed(alone, unrest), unrest)
+    plain = replace(unrest, pulse=None)
+
+    def value(unrest: Unrest) -> float:
+        each, volume = startless.square(unrest)
+        return -0.5 * ref.counts * (float(weight @ each) + volume)
+
+    def raised(factors: np.ndarray) -> float:
+        side = math.exp(0.5 * (factors[1] + factors[2]))
+        pulse = None if usual is None else usual * side
+        return value(replace(plain, push=plain.push * np.exp(factors), pulse=pulse))
+
+    # from day to day one channel's noise is raised by more than another's, with no device at work,
+    # and what usually pushes at one place pushes there more
+    first = np.full(3, math.log(max(LOUDER, key=lambda v: value(plain.louder(v)))))
+    about = {"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1}
+    by_channel = -float(minimize(lambda at: -raised(at), first, method="Nelder-Mead",
+                                 options=about).fun)  # fmt: skip
+    ship, length = ref.model.stand_in, ref.setting.scale["length"]
+    across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
+
+    def of(lever: float, force: float) -> float:
+        unit = across + lever * length * turning
+        return value(replace(plain, pulse=unit * force))
+
+    levers = np.linspace(-0.45, 0.45, 7)
+    # in newtons that matter: from the usual unrest upwards
+    ordinary = plain.push[1] / abs(across[1])
+    sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
+    finer = minimize(  # beside the place itself a part of the force would be another cause's
+        lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
+        bounds=((-REACH, REACH), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
+    )  # fmt: skip
+    lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
+    one = -float(finer.fun)
+    return Pulses(one, one - by_channel, lever, force, across + lever * turning)
+
+
+def pulse_force(
+    trial: Trial, point: Point, base: Found, pulses: Pulses
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
+    unrest = trial.unrest.louder(base.louder)
+    left = trial.left(point.linear, trial.solved(point, base))
+    z, covariance = likelihood.starts_and_knots(*left, unrest)
+    knots = trial.grid.knots
+    kernel = unrest.kernel(knots)
+    pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
+    share = pulse @ np.linalg.inv(kernel)
+    pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+    sway = slice(knots, 2 * knots)
+    beyond = (pulse - share @ pulse)[sway, sway]
+    known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
+    variance = np.diagonal(known + beyond, axis1=1, axis2=2)
+    return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
+
+
+def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:
+    """ν̇ [n, 3] that forces X, Y, N [n, 3] make of a ship at rest."""
+    return np.asarray(_accelerations(ship, dict(coefficients), force))
+
+
+@traced
+def _accelerations(ship, coefficients, force):
+    zero = jnp.zeros(())
+    return body.accelerations(coefficients, ship.geometry, zero, zero, zero, force)

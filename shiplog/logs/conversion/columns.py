@@ -1,0 +1,261 @@
+"""One table to the topics that its profile reads, through the profile's [table] section."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from shiplog import units
+from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
+from shiplog.logs.conversion import clock
+from shiplog.logs.conversion.delimited import Table
+from shiplog.logs.write import SCHEMAS, Series
+from shiplog.profile import LABELS, TABLE_CHANNELS, Column, Profile, Source
+
+log = logging.getLogger(__name__)
+
+TOPICS = {  # the contract's topic to its schema
+    "/ship/state": "shiplog.ShipState", "/wind/apparent": "shiplog.Wind", "/gyro": "shiplog.Gyro",
+    "/gnss/velocity": "shiplog.GnssVelocity", "/gnss/fix": "foxglove.LocationFix",
+}  # fmt: skip
+FAMILIES = {
+    "rudder": "shiplog.Rudder",
+    "propeller": "shiplog.Propeller",
+    "azimuth": "shiplog.Azimuth",
+    "thruster": "shiplog.Thruster",
+}
+# A topic filled in fewer rows than this is slower than its table; in more, what is empty is lost.
+SLOWER = 0.5
+NAMED = 8  # vessels that a message names
+
+
+def voyages(table: Table, profile: Profile, path: Path) -> Iterator[tuple[str, pl.DataFrame]]:
+    """The table in SI, a column a channel and `time` in ns, one part a voyage.
+
+    Rows without a time are dropped, and said; without a voyage column the file is one voyage.
+    Raises ChannelMissing for columns that are not there, ProfileError for what cannot be read.
+    """
+    if not profile.table:
+        raise ProfileError(
+            f"The profile {profile.source} has no [table] section.",
+            hint=f"say which column is which channel there; `shiplog profile {path}` drafts it.",
+        )
+    frame = table.frame
+    # Two sources of one ship may name a column differently; what is not in this table is left out.
+    present = {name: c for name, c in profile.table.items() if name in frame.columns}
+    _require(present, profile, frame, path)
+    frame = _of_one_vessel(frame, present, profile, path)
+    time = _time(frame, present)
+    columns = [time.rename("time")]
+    for name, column in present.items():
+        if column.channel not in LABELS:
+            columns.append(_si(frame[name], column, path))
+        elif column.channel == "voyage":
+            columns.append(text_of(frame[name]).rename("voyage"))
+    si = pl.DataFrame(columns).filter(pl.col("time").is_not_null())
+    if si.height < frame.height:
+        log.warning("%s: %d rows without a time left out", path.name, frame.height - si.height)
+    if si.height == 0:
+        raise ProfileError(
+            f"{path.name}: no row of {listed(_named(present, 'time'))} holds a time.",
+            hint="correct `unit` or `format` of that column in [table].",
+        )
+    parts = [((path.stem,), si)]
+    if "voyage" in si.columns:
+        parts = list(
+            si.filter(pl.col("voyage").is_not_null()).group_by("voyage", maintain_order=True)
+        )
+    for (name,), part in parts:
+        back = int((part["time"].diff() < 0).sum())
+        if back:
+            log.warning("%s: %s goes back in time %d times; sorted", path.name, name, back)
+        part = part.sort("time", maintain_order=True)
+        yield re.sub(r'[\\/:*?"<>|]', "_", str(name)), part.drop("voyage", strict=False)
+
+
+def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
+    """SI columns back into each topic's fields and units: what the profile will read again."""
+    time = table["time"].to_numpy()
+    topics: dict[str, dict[str, np.ndarray]] = {}
+    noted: dict[str, dict[str, str]] = {}
+    for source, names in sources(profile):
+        columns = topics.setdefault(source.topic, {})
+        for name, path, (offset, factor) in zip(names, source.paths, source.scale(), strict=True):
+            if name == "yaw_rate" and name not in table.columns:
+                si = _turning(table)
+                noted[source.topic] = {"yaw_rate": "differentiated from the heading"}
+            else:
+                si = table[name].fill_null(np.nan).to_numpy()
+            columns[path] = si / factor + offset
+    return [_topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()]
+
+
+def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
+    """What the profile reads, and the channels of a table that fill it."""
+    sensors = [
+        (sensor, TABLE_CHANNELS[name, profile.sensors.kind(name)])
+        for name, sensor in profile.sensors.items()
+    ]
+    return [*sensors, *((actuator, (actuator.name,)) for actuator in profile.actuators)]
+
+
+def schema_of(topic: str, fields: Iterable[str]) -> str:
+    """The contract's schema of a topic that holds no other fields, else one of its own."""
+    contract = TOPICS.get(topic) or FAMILIES.get(topic.strip("/").split("/")[0], "")
+    if set(fields) <= set(SCHEMAS.get(contract, ())):
+        return contract
+    return "shiplog.voyages.one_hertz." + plain(topic.strip("/"))
+
+
+def plain(name: str) -> str:
+    """A protobuf name: letters, digits and underscores, no digit first."""
+    name = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"_{name}" if name[:1].isdigit() else name
+
+
+def _topic(
+    topic: str, time: np.ndarray, columns: dict[str, np.ndarray], noted: dict[str, str]
+) -> Series:
+    filled = np.any([np.isfinite(values) for values in columns.values()], axis=0)
+    if filled.any() and filled.mean() < SLOWER:
+        time, columns = time[filled], {n: values[filled] for n, values in columns.items()}
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    rate = {"nominal_hz": f"{1e9 / step:.3g}"} if step > 0 else {}
+    return Series(
+        topic, schema_of(topic, columns), time, columns, frame_id="midship",
+        metadata={**rate, "clock": "of the table", **noted},
+    )  # fmt: skip
+
+
+def _turning(table: pl.DataFrame) -> np.ndarray:
+    """Yaw rate [rad/s] of the heading, NaN where either neighbour has none.
+
+    Repeated times would divide by zero: a row of the same time takes part only once.
+    """
+    time = table["time"].to_numpy() * 1e-9
+    heading = table["heading"].fill_null(np.nan).to_numpy()
+    rate = np.full(len(time), np.nan)
+    known = np.isfinite(heading)
+    known[1:] &= np.diff(time) > 0
+    if known.sum() > 1:
+        rate[known] = np.gradient(np.unwrap(heading[known]), time[known])
+    return rate
+
+
+def _require(present: dict[str, Column], profile: Profile, frame: pl.DataFrame, path: Path) -> None:
+    """Every channel that the profile reads has its column here, or say which ones have none."""
+    given = {column.channel for column in present.values()}
+    needed = {"time"} | {name for _, names in sources(profile) for name in names}
+    if "yaw_rate" not in given and "heading" in given:
+        needed.discard("yaw_rate")
+        if profile.sensors.yaw_rate is None:
+            log.info("%s: no yaw rate; ingest differentiates the heading", path.name)
+        else:
+            log.warning(
+                "%s: no yaw rate; the log holds the heading's derivative instead. Without "
+                "[sensors.yaw_rate] in the profile, nobody takes it for a gyro's",
+                path.name,
+            )
+    lacking = needed - given
+    if not lacking:
+        return
+    free = set(frame.columns) - set(profile.table)
+    column = next((n for n, c in profile.table.items() if c.channel in lacking), "")
+    hint = f"name the columns in the [table] section of {profile.source}"
+    for name, sensor in profile.sensors.items():
+        kind = profile.sensors.kind(name)
+        other = [
+            k for (n, k), names in TABLE_CHANNELS.items()
+            if n == name and k != kind and set(names) <= given
+        ]  # fmt: skip
+        if other and lacking & set(TABLE_CHANNELS[name, kind]):
+            hint = (
+                f"the columns say {name} as {other[0]!r} and the profile reads {kind!r} from "
+                f'{sensor.topic}: put kind = "{other[0]}" and its fields into [sensors.{name}]'
+            )
+            break
+    raise ChannelMissing(
+        f"{path.name} has no column for {listed(lacking)}{nearest(column, free)}. "
+        f"Columns found: {listed(frame.columns, most=40)}.",
+        hint=f"{hint}; or draft a profile with `shiplog profile {path}`.",
+    )
+
+
+def _of_one_vessel(
+    frame: pl.DataFrame, present: dict[str, Column], profile: Profile, path: Path
+) -> pl.DataFrame:
+    for name, column in present.items():
+        if column.channel != "vessel":
+            continue
+        vessels = text_of(frame[name])
+        if column.only is None:
+            if vessels.n_unique() > 1:
+                raise ProfileError(
+                    f"{path.name} holds {vessels.n_unique()} vessels in {name!r}: "
+                    f"{busiest(vessels)}.",
+                    hint=f'say which in {profile.source}: "{name}" = {{ channel = "vessel", '
+                    'only = "..." }.',
+                )
+            continue
+        frame = frame.filter(vessels == str(column.only))
+        if frame.height == 0:
+            raise ProfileError(
+                f"{path.name} has no row of vessel {column.only}. Vessels: {busiest(vessels)}.",
+                hint=f"correct `only` of {name!r} in {profile.source}.",
+            )
+    return frame
+
+
+def busiest(vessels: pl.Series) -> str:
+    """The vessels with most rows, for a message."""
+    counts = vessels.drop_nulls().value_counts(sort=True, name="rows")
+    shown = [f"{name} ({rows} rows)" for name, rows in counts.head(NAMED).iter_rows()]
+    rest = counts.height - len(shown)
+    return ", ".join(shown) + (f", and {rest} more" if rest > 0 else "")
+
+
+def _time(frame: pl.DataFrame, present: dict[str, Column]) -> pl.Series:
+    (name, *_), day = _named(present, "time"), _named(present, "date")
+    column = present[name]
+    time = clock.instants(frame[name], column.unit, column.format)
+    if not day:
+        return time
+    midnight = clock.dates(frame[day[0]], present[day[0]].format)
+    return midnight + time % clock.DAY_NS
+
+
+def _named(present: dict[str, Column], channel: str) -> list[str]:
+    return [name for name, column in present.items() if column.channel == channel]
+
+
+def _si(values: pl.Series, column: Column, path: Path) -> pl.Series:
+    """A column as SI numbers; words in it are blanks, and said."""
+    if values.dtype == pl.String:
+        number = clock.number_of(values)
+        words = values.filter(number.is_null() & (values.str.strip_chars() != ""))
+        if number.null_count() == len(number) and len(words):
+            raise ProfileError(
+                f"{path.name}: the column {values.name!r} holds no number, but {words[0]!r}.",
+                hint="name another column for this channel in [table].",
+            )
+        if len(words):
+            log.warning(
+                "%s: %d values of %s are no numbers, such as %r; taken as not measured",
+                path.name, len(words), values.name, words[0],
+            )  # fmt: skip
+    else:
+        number = values.cast(pl.Float64, strict=False)
+    factor = column.sign * units.factor(column.unit or "1")
+    return ((number - column.offset) * factor).rename(column.channel)
+
+
+def text_of(values: pl.Series) -> pl.Series:
+    """Names of voyages or vessels: a whole number has no decimals."""
+    if values.dtype.is_float():
+        values = values.cast(pl.Int64, strict=False)
+    return values.cast(pl.String)

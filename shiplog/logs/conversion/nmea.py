@@ -1,0 +1,297 @@
+"""NMEA 0183 text to topics of the contract, with the clock that its lines leave open.
+
+A sentence has its own time only where it carries UTC (RMC, GGA, GLL). The others take the receive
+stamp of their line, or without one a place between the UTC times before and after them.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, date, datetime
+from pathlib import Path
+
+import numpy as np
+import pynmea2
+
+from shiplog.exceptions import ChannelMissing, listed
+from shiplog.logs.conversion.clock import DAY_NS, NANOS, UNIX, YEAR_2000, YEAR_2100
+from shiplog.logs.conversion.nmea_sentences import (
+    INSTEAD,
+    SENTENCES,
+    TOPICS,
+    NotValid,
+    facts,
+    family,
+)
+from shiplog.logs.write import Series
+
+log = logging.getLogger(__name__)
+
+SUFFIXES = (".nmea", ".txt", ".log", ".nma", ".gps", ".csv", ".dat", ".raw")
+SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z]{3},[^$!\r\n*]*(?:\*[0-9A-Fa-f]{2})?")
+ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
+NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
+OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
+LEAST = 0.5  # share of the first lines with a sentence that make a text an NMEA log
+LATE_S = 0.5  # clocks that differ by more are said: at 10 m/s a ship is 5 m further by then
+EPOCH = date(1970, 1, 1)
+
+
+@dataclass(slots=True)
+class Rows:
+    """The sentences of one topic and talker; times in ns, -1 where there is none."""
+
+    kind: str  # of nmea_sentences.TOPICS
+    own: list[int] = field(default_factory=list)  # UTC in the sentence
+    received: list[int] = field(default_factory=list)
+    place: list[int] = field(default_factory=list)  # which sentence of the file it was
+    values: list[tuple[float, ...]] = field(default_factory=list)
+
+
+def is_nmea(path: Path) -> bool:
+    """Whether the text holds NMEA sentences, whatever it is called."""
+    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
+        return False
+    with path.open("rb") as stream:
+        lines = stream.read(16_384).decode("latin-1").splitlines()[:100]
+    filled = [line for line in lines if line.strip()]
+    return bool(filled) and sum(bool(SENTENCE.search(x)) for x in filled) >= LEAST * len(filled)
+
+
+def read_nmea(path: Path) -> tuple[list[Series], int]:
+    """An NMEA log as topics, and how many of its sentences were damaged.
+
+    Raises ChannelMissing where no sentence says anything of a ship, or none has a time.
+    """
+    reader = _Reader()
+    with path.open("r", encoding="latin-1") as stream:
+        for line in stream:
+            reader.take(line)
+    return reader.finish(path.name), reader.damaged
+
+
+def lines_to_series(lines: Iterable[str], name: str, received: Sequence[int]) -> list[Series]:
+    """Sentences with the recorder's time [ns] of each, as topics. Raises ChannelMissing."""
+    reader = _Reader()
+    for line, stamp in zip(lines, received, strict=True):
+        reader.take(line, stamp)
+    return reader.finish(name)
+
+
+class _Reader:
+    """Sentences one after the other, with the date and the UTC that hold so far."""
+
+    def __init__(self) -> None:
+        self.rows: dict[tuple[str, str], Rows] = {}  # by topic and talker
+        self.utc: list[tuple[int, int]] = []  # (place, ns) of each new UTC
+        self.last: int | None = None  # ns, the UTC before
+        self.dated: tuple[int, int] | None = None  # place of the first date, and what it adds
+        self.of_day: int | None = None  # ns, the last receive stamp that had no date
+        self.damaged = self.invalid = self.place = 0
+        self.unused: Counter[str] = Counter()
+
+    def take(self, line: str, received: int | None = None) -> None:
+        """One line: its receive stamp, and the sentences in it."""
+        found = list(SENTENCE.finditer(line))
+        if not found:
+            self.damaged += "$" in line
+            return
+        if received is None:
+            received = self._stamp(line[: found[0].start()] + " " + line[found[-1].end() :])
+        for match in found:
+            self.place += 1
+            self._sentence(match.group().strip(), -1 if received is None else received)
+
+    def _sentence(self, text: str, received: int) -> None:
+        kind = text[3:6]
+        if text[0] == "!" or kind not in (*SENTENCES, "ZDA"):
+            self.unused[kind] += 1
+            return
+        try:
+            message = pynmea2.parse(text, check="*" in text)
+            own = self._own(message)
+            said = facts(message)
+        except NotValid:
+            self.invalid += 1
+            return
+        except (pynmea2.ParseError, ValueError, TypeError, AttributeError, ArithmeticError):
+            self.damaged += 1  # a field that is no number raises whatever its converter raises
+            return
+        for topic, values in said or ():
+            rows = self.rows.setdefault((topic, message.talker), Rows(topic))
+            rows.own.append(own)
+            rows.received.append(received)
+            rows.place.append(self.place)
+            rows.values.append(values)
+
+    def _own(self, message) -> int:
+        """The UTC in a sentence [ns], -1 in one without."""
+        time = getattr(message, "timestamp", None)
+        if not time or isinstance(time, str):
+            return -1
+        of_day = ((time.hour * 60 + time.minute) * 60 + time.second) * NANOS
+        of_day += time.microsecond * 1000
+        utc = of_day + (self._day_before(of_day) * DAY_NS)
+        day = None
+        if message.sentence_type == "RMC":
+            day = message.datestamp
+        elif message.sentence_type == "ZDA":
+            day = date(message.year, message.month, message.day)
+        if isinstance(day, date):
+            true = (day - EPOCH).days * DAY_NS + of_day
+            if self.dated is None:
+                self.dated = self.place, true - utc
+            utc = true
+        self.last = utc
+        if not self.utc or self.utc[-1][1] != utc:
+            self.utc.append((self.place, utc))
+        return utc
+
+    def _day_before(self, of_day: int) -> int:
+        """The day that a time without a date belongs to: the nearest to the last one."""
+        if self.last is None:
+            return 0
+        day, before = divmod(self.last, DAY_NS)
+        return day + (of_day < before - DAY_NS // 2) - (of_day > before + DAY_NS // 2)
+
+    def _stamp(self, around: str) -> int | None:
+        """The receive stamp [ns] in what stands beside the sentence; None where there is none."""
+        if iso := ISO.search(around):
+            zone = (iso[4] or "Z").replace("Z", "+00:00")
+            whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
+            return int(whole.timestamp()) * NANOS + _fraction(iso[3])
+        if number := NUMBER.search(around):
+            for _, per in UNIX:
+                if YEAR_2000 <= int(number[1]) / per < YEAR_2100:
+                    scale = NANOS // per
+                    return int(number[1]) * scale + _fraction(number[2]) // per
+        if clock := OF_DAY.search(around):
+            seconds = (int(clock[1]) * 60 + int(clock[2])) * 60 + int(clock[3])
+            of_day = seconds * NANOS + _fraction(clock[4])
+            day = 0
+            if self.of_day is not None:  # counts on by itself: the GNSS date is added at the end
+                day, before = divmod(self.of_day, DAY_NS)
+                day += of_day < before - DAY_NS // 2
+            self.of_day = day * DAY_NS + of_day
+            return self.of_day
+        return None
+
+    def finish(self, name: str) -> list[Series]:
+        """The topics. Raises ChannelMissing where there is none, or no time at all."""
+        topics = self._chosen(name)
+        if not topics:
+            raise ChannelMissing(
+                f"{name} holds no valid sentence of position, heading, wind or actuators. "
+                f"Sentences found: {listed(self.unused)}.",
+                hint="record RMC, GGA, HDT, ROT, MWV, RSA or RPM.",
+            )
+        for count, what in (
+            (self.damaged, "damaged sentences (checksum or fields) left out"),
+            (self.invalid, "sentences left out whose own status says that they are not valid"),
+        ):
+            if count:
+                log.warning("%s: %d %s", name, count, what)
+        if self.unused:
+            most = ", ".join(f"{kind} ({n})" for kind, n in self.unused.most_common(8))
+            log.info("%s: sentences not used: %s", name, most)
+        clock = _Clock(self, topics, name)
+        return [clock.series(topic, rows) for topic, rows in sorted(topics.items())]
+
+    def _chosen(self, name: str) -> dict[str, Rows]:
+        """By topic: the best sentence for position and velocity; two talkers are two topics."""
+        there = {kind for kind, _ in self.rows}
+        wanted = {kind: kind for kind in there if kind.startswith("/")}
+        for topic, kinds in INSTEAD.items():
+            wanted |= {
+                kind: topic for kind in kinds if kind in there and topic not in wanted.values()
+            }
+        topics: dict[str, Rows] = {}
+        for (kind, talker), rows in self.rows.items():
+            if kind not in wanted:
+                continue
+            topic = wanted[kind]
+            if sum(other == kind for other, _ in self.rows) > 1:
+                topic = f"{topic}/{talker.lower()}"
+                log.info("%s: several talkers send one sentence; %s is of %s", name, topic, talker)
+            topics[topic] = rows
+        return topics
+
+
+class _Clock:
+    """The times of a file's sentences, once all of it is read."""
+
+    def __init__(self, reader: _Reader, topics: dict[str, Rows], name: str) -> None:
+        until, added = reader.dated or (0, 0)
+        self.until, self.added = until, added
+        self.places = np.array([place for place, _ in reader.utc], np.int64)
+        self.utc = np.array([utc for _, utc in reader.utc], np.int64)
+        self.utc[self.places < until] += added
+        self.name = name
+        if reader.utc and reader.dated is None:
+            log.warning("%s: no RMC or ZDA says the date; times count from 1970-01-01", name)
+        late = [
+            got - own
+            for rows in topics.values()
+            for own, got in zip(self.own(rows).tolist(), rows.received, strict=True)
+            if own >= 0 and got >= 0
+        ]
+        self.days = 0
+        self.late = int(np.median(late)) if late else 0
+        if reader.of_day is not None and late:  # stamps without a date: only the day is made good
+            self.days = round(self.late / DAY_NS) * DAY_NS
+            self.late -= self.days
+        if abs(self.late) > LATE_S * NANOS:
+            log.warning(
+                "%s: its receive stamps are %+.2f s against GNSS time; sentences without a time of "
+                "their own are put back by that", name, self.late / NANOS,
+            )  # fmt: skip
+        else:
+            self.late = 0
+
+    def own(self, rows: Rows) -> np.ndarray:
+        """UTC [n] ns of sentences, those before the first date put onto its day; -1 is none."""
+        own = np.array(rows.own, np.int64)
+        return own + self.added * ((np.array(rows.place) < self.until) & (own >= 0))
+
+    def series(self, topic: str, rows: Rows) -> Series:
+        """One topic with its times. Raises ChannelMissing where nothing says any."""
+        place, own = np.array(rows.place, np.int64), self.own(rows)
+        received = np.array(rows.received, np.int64)
+        stamped = received >= 0
+        received = received - self.days * stamped
+        if not len(self.utc) and not stamped.any():
+            raise ChannelMissing(
+                f"{self.name} has no time: neither RMC, GGA or ZDA nor a stamp before each line.",
+                hint="record RMC with the other sentences, or have the logger stamp each line.",
+            )
+        time = np.where(
+            own >= 0, own, np.where(stamped, received - self.late, self._between(place))
+        )
+        known = time >= 0
+        schema, names = TOPICS[family(rows.kind)]
+        values = np.array(rows.values, float).reshape(len(place), -1)[known]
+        columns = dict(zip(names, values.T, strict=False))
+        logged = np.where(stamped, received, time)[known]
+        return Series(topic, schema, time[known], columns, log_time=logged, frame_id="nmea")
+
+    def _between(self, place: np.ndarray) -> np.ndarray:
+        """Times [n] ns of the sentences at `place` [n]: spread evenly over the time from the UTC
+        before them to the next. -1 before the first UTC."""
+        if not len(self.utc):
+            return np.full(len(place), -1, np.int64)
+        before = np.searchsorted(self.places, place, side="right") - 1
+        usual = int(np.median(np.diff(self.utc))) if len(self.utc) > 1 else 0
+        step = np.diff(self.utc, append=self.utc[-1] + usual)
+        first = np.searchsorted(before, before, side="left")  # `before` only grows
+        many = np.searchsorted(before, before, side="right") - first
+        spread = self.utc[before] + step[before] * (np.arange(len(place)) - first) // many
+        return np.where(before >= 0, spread, -1)
+
+
+def _fraction(digits: str | None) -> int:
+    """ns of the digits behind a decimal point."""
+    return int((digits or "")[:9].ljust(9, "0"))

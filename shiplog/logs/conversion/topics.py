@@ -1,0 +1,119 @@
+"""A folder of one table a topic, as dumped from a ROS bag or a flight recorder."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from shiplog.exceptions import ChannelMissing, ShiplogError, listed
+from shiplog.logs.conversion import clock
+from shiplog.logs.conversion.columns import plain, schema_of
+from shiplog.logs.conversion.delimited import is_table, read_table
+from shiplog.logs.conversion.nmea import lines_to_series
+from shiplog.logs.write import Series
+from shiplog.profile import Profile
+
+log = logging.getLogger(__name__)
+
+# Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
+# A flight recorder's GNSS topic holds UTC besides; its `timestamp` is what all its topics share.
+STAMPS = ("stamp_ns", "stamp", "header.stamp", "timestamp", "utc", "time_utc", "datetime", "time",
+          "t", "unix", "epoch")  # fmt: skip
+LOGGED = (
+    "log_time_ns",
+    "log_time",
+    "rosbagTimestamp",
+    "bag_time",
+    "received",
+    "timestamp_received",
+)
+UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", "msec": "ms"}
+
+
+def folder_to_series(folder: Path, profile: Profile | None) -> list[Series]:
+    """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field.
+
+    A column `log_time_ns` (or of the names above) is the recorder's clock, `stamp_ns` the
+    message's; other names and units come from the profile's [table], with channel = "time".
+    A column of NMEA sentences becomes their topics. Nothing is aligned: that is ingest's work.
+    Raises ChannelMissing where no table has a time.
+    """
+    parts: list[Series] = []
+    reasons: list[str] = []
+    for path in sorted(p for p in folder.iterdir() if is_table(p)):
+        try:
+            parts += _one(path, profile)
+        except ShiplogError as error:
+            reasons.append(error.message)
+    for reason in reasons:
+        log.warning("left out: %s", reason)
+    if not parts:
+        raise ChannelMissing(
+            f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
+            hint="give one table a topic, each with a column of times such as log_time_ns, or a "
+            "single table.",
+        )
+    return parts
+
+
+def _one(path: Path, profile: Profile | None) -> list[Series]:
+    frame = read_table(path).frame
+    named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
+    by_profile = next((n for n in named if n in frame.columns), None)
+    stamp_name = by_profile or _known(frame, STAMPS)
+    logged_name = _known(frame, LOGGED)
+    names = [n for n in (stamp_name, logged_name) if n]
+    if not names:
+        raise ChannelMissing(
+            f"{path.name} has no column of times. Columns found: {listed(frame.columns)}.",
+            hint='name it in [table], as { channel = "time", unit = "us" }.',
+        )
+    columns = {n: named.get(n) for n in names}
+    clocks = {
+        n: clock.instants(frame[n], (c.unit if c else None) or _unit(n), c.format if c else None)
+        for n, c in columns.items()
+    }
+    stamp, logged = clocks[names[0]], clocks[names[-1]]
+    keep = (logged if logged_name else stamp).is_not_null()
+    order = logged.filter(keep).arg_sort()
+    frame, logged = frame.filter(keep)[order], logged.filter(keep)[order]
+    stamp = stamp.filter(keep)[order].fill_null(strategy="forward").fill_null(logged)
+    if frame.height == 0:
+        return []
+    topic = "/" + path.stem.replace("__", "/")
+    text = next((n for n in frame.columns if n.lower() in ("sentence", "nmea")), None)
+    if text is not None and frame[text].dtype == pl.String:
+        return lines_to_series(frame[text].fill_null("").to_list(), path.name, logged.to_list())
+    fields = [
+        n for n, t in frame.schema.items()
+        if t.is_numeric() and n not in clocks and not n.endswith("_ns")
+    ]  # fmt: skip
+    if not fields:
+        return []
+    return [
+        Series(
+            topic=topic,
+            schema=schema_of(topic, fields),
+            time=stamp.to_numpy(),
+            columns={
+                plain(n): frame[n].cast(pl.Float64).fill_null(np.nan).to_numpy() for n in fields
+            },
+            log_time=logged.to_numpy(),
+        )
+    ]
+
+
+def _known(frame: pl.DataFrame, names: tuple[str, ...]) -> str | None:
+    lowered = {name.lower(): name for name in reversed(frame.columns)}
+    for name in names:
+        for unit in ("", *(f"_{u}" for u in (*UNIT_IN_NAME, "s", "utc"))):
+            if name + unit in lowered:
+                return lowered[name + unit]
+    return None
+
+
+def _unit(name: str) -> str | None:
+    return UNIT_IN_NAME.get(name.lower().rsplit("_", 1)[-1])

@@ -1,0 +1,266 @@
+"""What a cause is: a name, a story, numbers that are zero where it is absent, and a hook.
+
+A cause stands around any dynamic model. It may say what the instruments should have shown and
+what the actuators really did (`read`), how the water moves (`water`), which coefficients of the
+ship are others (`coefficients`), or which force is there besides (`force`). All numbers zero is
+the model as it was, exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from shiplog.profile import Profile
+from shiplog.voyages.recording import Record
+
+DEGREE = math.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a cause, in SI; zero where the cause is absent.
+
+    prior      its realistic size: the standard deviation of a change that is found between two
+               campaigns, from the literature that its cause's docstring names
+    least      below this it is there but does not matter: a trace
+    of         "speed", "length", "mass": prior and least are shares of the ship's
+    low, high  beyond, it means nothing
+    """
+
+    name: str
+    unit: str
+    prior: float
+    least: float
+    of: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a cause knows of ship and place, besides its numbers.
+
+    scale   "speed" (root mean square of the campaigns, m/s), "length" (m), "mass" (kg) and
+            "moment", their product
+    places  [K, 2]  points x₀, y₀ that cover where the ship was, and `spacing` between them [m]
+    lacking coefficients of the forces that the model has not, as they are of such a ship
+    parts   forces that the model has (mmg.PARTS); None for all that the profile can have
+    """
+
+    profile: Profile
+    scale: Mapping[str, float]
+    places: np.ndarray
+    spacing: float
+    lacking: Mapping[str, float] = field(default_factory=dict)
+    parts: tuple[str, ...] | None = None
+
+    def columns(self, *kinds: str) -> list[int]:
+        """Columns of the actuators of these kinds, whose force the model has."""
+        off = () if self.parts is None else {"rudder", "propeller", "thruster"} - {*self.parts}
+        return [
+            i for i, a in enumerate(self.profile.actuators) if a.kind in kinds and a.kind not in off
+        ]
+
+    def prior(self, parameter: Parameter) -> float:
+        return parameter.prior * self.scale.get(parameter.of, 1.0)
+
+    def least(self, parameter: Parameter) -> float:
+        return parameter.least * self.scale.get(parameter.of, 1.0)
+
+    def bounds(self, parameter: Parameter) -> tuple[float, float]:
+        by = self.scale.get(parameter.of, 1.0)
+        return parameter.low * by, parameter.high * by
+
+
+def _unless(met: Callable[[Setting], bool], reason: str) -> Callable[[Setting], str | None]:
+    return lambda setting: None if met(setting) else reason
+
+
+# What a cause can need of ship and place, and why it cannot be tested where that is not there.
+NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
+    "yaw rate": _unless(
+        lambda s: s.profile.sensors.yaw_rate is not None, "no yaw rate is recorded"
+    ),
+    "body velocity": _unless(
+        lambda s: s.profile.sensors.kind("velocity") == "body",
+        "the velocity is recorded over ground",
+    ),
+    "wind": _unless(lambda s: s.profile.has_wind, "no wind is recorded"),
+    "wind force": _unless(lambda s: not s.lacking, "the model feels no wind"),
+    "rudder": _unless(lambda s: bool(s.columns("rudder")), "the ship has no rudder"),
+    "steering": _unless(
+        lambda s: bool(s.columns("rudder")) or bool(s.columns("thruster") and s.columns("azimuth")),
+        "the ship has no rudder",
+    ),
+    "thrust": _unless(
+        lambda s: bool(s.columns("propeller", "thruster")), "the ship has no screw or thruster"
+    ),
+    "bank": _unless(lambda s: bool(s.profile.site.banks), "the profile's [site] shows no bank"),
+}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One of the contract's parameters, from fitted numbers."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    def as_json(self) -> dict:
+        return {"value": self.value, "low": self.low, "high": self.high, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Frozen and hashable: a model extended by causes is compiled once."""
+
+    name: ClassVar[str]
+    kind: ClassVar[str]  # environment, ship or sensor
+    story: ClassVar[str]
+    equation: ClassVar[str]  # what it adds to the equations of motion or of the instruments
+    parameters: ClassVar[tuple[Parameter, ...]]
+    needs: ClassVar[tuple[str, ...]] = ()  # words of NEEDS, without which it cannot be tested
+    separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
+    user: ClassVar[bool] = False
+    shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
+
+    @property
+    def label(self) -> str:
+        """Unique in the catalogue: the name, and what of it where there are several."""
+        return self.name
+
+    @property
+    def count(self) -> int:
+        return len(self.parameters)
+
+    @property
+    def absorbed(self) -> bool:
+        """Whether any model that is fitted to the affected data takes it in."""
+        return False
+
+    @property
+    def renames(self) -> bool:
+        """Whether it only says otherwise what drives the ship or where it is measured: a network
+        that is fitted to the affected data, without symmetry or origin, takes that in, too."""
+        return False
+
+    @property
+    def usual(self) -> bool:
+        """Whether a ship may have some of it always: false where coefficients, or another cause,
+        already stand for that."""
+        return not self.absorbed
+
+    @property
+    def reads(self) -> bool:
+        """Whether it changes what was recorded, and not the ship's motion."""
+        return type(self).read is not Cause.read
+
+    def on(self, setting: Setting) -> Cause:
+        """The cause as this ship has it: one rudder has one offset, two have two."""
+        return self
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        """The cause as this ship has it, once for each unit of which it is tested on its own."""
+        return (self.on(setting),)
+
+    def beside(self, label: str) -> bool:
+        """Whether it may stand beside a cause that is named already."""
+        return label != self.label
+
+    def missing(self, setting: Setting) -> str | None:
+        """Why it cannot be tested on this ship; None where it can."""
+        return next((why for need in self.needs if (why := NEEDS[need](setting))), None)
+
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        """Numbers that the force needs and nobody fits."""
+        return {}
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        """[count] realistic size of each number."""
+        return np.array([setting.prior(p) for p in self.parameters])
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        both = [setting.bounds(p) for p in self.parameters]
+        return np.array([b[0] for b in both]), np.array([b[1] for b in both])
+
+    # --- hooks ---
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        """What was, of what was recorded: sensors put right, actuators as they acted."""
+        return record
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        """The numbers whose `read` undoes this one's: what the instruments will show."""
+        return -p
+
+    def water(self, p: Any) -> tuple[Any, Any] | None:
+        """Velocity of the water along x₀ and y₀ [m/s]."""
+        return None
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        """The ship's coefficients with the cause in them. `share`: of the campaign, 0 to 1."""
+        return c
+
+    def force(self, p: Any, state: Any, at: dict) -> Any | None:
+        """X, Y, N [..., 3] at midship besides the ship's own [N, N, N m]."""
+        return None
+
+    # --- words ---
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        """The contract's parameters and units, of numbers [..., count]."""
+        return {q.name: (p[..., i] / si(q.unit), q.unit) for i, q in enumerate(self.parameters)}
+
+    def told(
+        self, p: np.ndarray, covariance: np.ndarray, freedom: float = math.inf, draws: int = 4000
+    ) -> dict[str, Shown]:
+        """The contract's parameters with 90 % intervals.
+
+        freedom   degrees of it with which the covariance's size is known: Student's t
+        """
+        rng = np.random.default_rng(0)
+        root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(p)))
+        drawn = rng.standard_normal((draws, len(p))) @ root.T
+        if math.isfinite(freedom):
+            drawn *= np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
+        many = self.shown(p + drawn)
+        found = {}
+        for name, (value, unit) in self.shown(np.asarray(p, dtype=float)).items():
+            spread = many[name][0] - value
+            if unit == "deg":
+                spread = (spread + 180.0) % 360.0 - 180.0
+            low, high = np.quantile(spread, (0.05, 0.95))
+            middle = float(value)
+            found[name] = Shown(
+                middle, middle + min(float(low), 0.0), middle + max(float(high), 0.0), unit
+            )
+        return found
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        said = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in shown.items())
+        return f"{self.story} {said}."
+
+    def practical(self, p: np.ndarray, setting: Setting) -> bool:
+        """Whether any of its numbers is large enough to matter."""
+        least = np.array([setting.least(q) for q in self.parameters])
+        return bool((np.abs(p) >= least).any())
+
+
+def constants_of(causes: Iterable[Cause], setting: Setting) -> dict[str, np.ndarray]:
+    """What all their forces need and nobody fits."""
+    needed: dict[str, np.ndarray] = {}
+    for cause in causes:
+        needed |= cause.constants(setting)
+    return needed
+
+
+def si(unit: str) -> float:
+    """How many of the SI's one of these is."""
+    return {"deg": DEGREE, "deg/s": DEGREE}.get(unit, 1.0)

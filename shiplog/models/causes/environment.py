@@ -1,0 +1,228 @@
+"""Causes outside the ship: the water, the wind, the bottom, the shore."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from shiplog.models.causes.base import Cause, Parameter, Setting, Shown
+
+
+@dataclass(frozen=True)
+class Current(Cause):
+    """Size: PIANC 2014 (report 121) designs channels for cross-currents of 0.5 to 1.5 kn and more
+    along the channel, passed at 5 to 8 kn: 0.1 to 0.4 of the ship's speed, each way."""
+
+    name = "current"
+    kind = "environment"
+    story = "The water moves, and the ship with it."
+    equation = "ν̇ = f(ν - RᵀV, u, ω) + d(RᵀV)/dt,  V = ({north:+.3f}, {east:+.3f}) m/s"
+    parameters = (
+        Parameter("north", "m/s", 0.25, 0.015, of="speed"),
+        Parameter("east", "m/s", 0.25, 0.015, of="speed"),
+    )
+    separated_by = {
+        "heading_offset": "one full slow turn, or the same course out and back",
+        "wind_force": "repeat in calm, or turn: wind force follows the wind, a current does not",
+        "wind_direction_offset": "one full slow turn; a drifting stop shows the current alone",
+    }
+
+    def water(self, p: Any) -> tuple[Any, Any]:
+        return p[0], p[1]
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        towards = np.degrees(np.arctan2(p[..., 1], p[..., 0])) % 360.0
+        return {"speed": (np.hypot(p[..., 0], p[..., 1]), "m/s"), "direction": (towards, "deg")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return (
+            f"A steady current of {shown['speed'].value:.3g} m/s towards "
+            f"{shown['direction'].value % 360.0:.0f} deg."
+        )
+
+
+@dataclass(frozen=True)
+class WindForce(Cause):
+    """Of a model that has no wind force, that of such a ship times its numbers.
+
+    Size: coefficients ahead of ship types differ by a quarter from their mean (Blendermann 1994, as
+    in Fossen 2011, Table 8.1), and areas above water by as much with the load on deck.
+
+    lacking   the coefficients that the model has not
+    """
+
+    lacking: tuple[str, ...] = ()
+
+    name = "wind_force"
+    kind = "environment"
+    needs = ("wind",)
+    story = "The wind pushes otherwise than the model has it."
+    equation = "X_A·{surge_factor:.2f}, Y_A·{sway_factor:.2f}, N_A·{yaw_factor:.2f}"
+    parameters = (
+        Parameter("surge_factor", "1", 0.3, 0.03, low=-1.0),
+        Parameter("sway_factor", "1", 0.3, 0.03, low=-1.0),
+        Parameter("yaw_factor", "1", 0.3, 0.03, low=-1.0),
+    )
+    separated_by = {
+        "wind_speed_scale": "a second anemometer, or fast straight runs in calm",
+        "current": "repeat in calm, or turn: wind force follows the wind, a current does not",
+    }
+
+    @property
+    def absorbed(self) -> bool:
+        return not self.lacking
+
+    def on(self, setting: Setting) -> WindForce:
+        return WindForce(tuple(n for n in setting.lacking if n.startswith("wind.")))
+
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        values = [setting.lacking[name] for name in self.lacking]
+        return {"wind.of_such_a_ship": np.array(values)} if values else {}
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.ones(3) if self.lacking else super().sizes(setting)
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        if self.lacking:  # which way the wind turns the ship depends on what stands on deck
+            return np.array([0.0, 0.0, -3.0]), np.full(3, np.inf)
+        return super().bounds(setting)
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        if self.lacking:
+            had, already = dict(zip(self.lacking, at["wind.of_such_a_ship"], strict=True)), 0.0
+        else:
+            had, already = {k: v for k, v in c.items() if k.startswith("wind.")}, 1.0
+        factor = {axis: already + p[i] for i, axis in enumerate("xyn")}
+        return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        already = 0.0 if self.lacking else 1.0
+        return {q.name: (already + p[..., i], "1") for i, q in enumerate(self.parameters)}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        x, y, n = (shown[q.name].value for q in self.parameters)
+        whose = "it does such a ship; the model has no wind" if self.lacking else "the model has it"
+        return (
+            f"The wind pushes {x:.2f} times as hard ahead, {y:.2f} athwart, and turns {n:.2f} "
+            f"times as hard as {whose}."
+        )
+
+
+@dataclass(frozen=True)
+class ShallowWater(Cause):
+    """Hull forces and added masses grow where the water is shallow; a map of how much, since no
+    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990.
+
+    Size: theirs has a full ship's sway damping a quarter larger at a depth of twice the draught,
+    which is 0.3 here; PIANC 2014 begins to count shallow water at 3 draughts, and ends at 1.1."""
+
+    places: int = 12
+
+    name = "shallow_water"
+    kind = "environment"
+    story = "The bottom is near in places."
+    equation = "X₀, Y_v, N_r, C_D, m_y and J grow with a map of depth; at most {strength:.2f}"
+    parameters = ()
+    separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
+
+    @property
+    def count(self) -> int:
+        return self.places
+
+    def missing(self, setting: Setting) -> str | None:
+        return None if len(setting.places) == self.places else "the ship stayed in one place"
+
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.full(self.places, 0.3)
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(self.places, -0.5), np.full(self.places, 5.0)
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        near = _bumps(state, at["shallow.places"], at["shallow.spacing"])
+        depth = (near * jnp.stack(p)).sum(-1)
+        depth = jnp.where(depth >= 0.0, depth, 0.0)  # no water is deeper than deep
+        grow = {
+            "hull.x_0f": 0.3, "hull.x_0a": 0.3, "hull.y_v": 0.8, "hull.n_r": 0.8,
+            "hull.c_d": 1.2, "body.m_y": 0.7, "body.i_j": 0.2,
+        }  # fmt: skip
+        return c | {k: c[k] * (1.0 + share * depth) for k, share in grow.items()}
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"strength": (p.max(-1), "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return (
+            "Shallow water: where it is shallowest, cross-flow drag is "
+            f"{1.0 + 1.2 * shown['strength'].value:.2f} times that of deep water."
+        )
+
+    def practical(self, p: np.ndarray, setting: Setting) -> bool:
+        return bool(p.max() > 0.05)
+
+
+def _bumps(state: Any, places: Any, spacing: Any) -> Any:
+    """[..., K] Gaussian bumps around the places, that add up to about one between them."""
+    north = state[..., 0, None] - places[:, 0]
+    east = state[..., 2, None] - places[:, 1]
+    return jnp.exp(-0.5 * (north**2 + east**2) / (0.8 * spacing) ** 2)
+
+
+@dataclass(frozen=True)
+class Bank(Cause):
+    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974).
+
+    Size: all of it. The profile shows the bank and the model has none; published formulas differ
+    from each other by about a factor of two (Vantorre, Delefortrie et al. 2003)."""
+
+    name = "bank"
+    kind = "environment"
+    needs = ("bank",)
+    story = "A bank draws the ship in."
+    equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/L/3)³), N bow out"
+    parameters = (Parameter("strength", "1", 1.0, 0.08),)
+    separated_by = {"shallow_water": "the same run farther from the bank"}
+
+    def constants(self, setting: Setting) -> dict[str, np.ndarray]:
+        lines = [[*a, *b] for line in setting.profile.site.banks for a, b in pairwise(line)]
+        ship = setting.profile.ship
+        breadth = ship.breadth_m or 0.15 * setting.scale["length"]
+        draught = ship.draught_m or 0.07 * setting.scale["length"]
+        density = setting.profile.site.density or 1000.0
+        return {
+            "bank.lines": np.array(lines),
+            "bank.ship": np.array([setting.scale["length"], breadth, draught, density]),
+        }
+
+    def force(self, p: Any, state: Any, at: dict) -> Any:
+        lines = at["bank.lines"]
+        length, breadth, draught, density = (at["bank.ship"][i] for i in range(4))
+        a, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
+        here = jnp.stack((state[..., 0], state[..., 2]), -1)[..., None, :]
+        part = ((here - a) * along).sum(-1) / (along**2).sum(-1)
+        to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
+        distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
+        gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
+        near = 1.0 / (1.0 + (gap / (3.0 * length)) ** 3)
+        c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
+        ahead = (c * to[..., 0] + s * to[..., 1]) / distance
+        starboard = (c * to[..., 1] - s * to[..., 0]) / distance
+        u = state[..., 1, None]
+        pull = 0.15 * 0.5 * density * length * draught * (u * starboard) ** 2 * near * p[0]
+        lead = u / jnp.sqrt(u * u + 1e-4)
+        turn = -0.25 * length * pull * starboard * lead
+        return jnp.stack(((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return (
+            f"The bank draws the ship in, with {shown['strength'].value:.2f} of the suction that "
+            "is usual."
+        )

@@ -1,0 +1,256 @@
+"""Causes in the instruments: what they show is not what was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shiplog.models.causes.base import Cause, Parameter, Shown
+from shiplog.voyages.recording import Record, reduced
+
+
+@dataclass(frozen=True)
+class HeadingOffset(Cause):
+    """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which knows
+    no heading, or from GNSS velocity that the recorder has turned by the compass: `turned`.
+
+    Size: a gyro may settle 0.75 deg · sec(latitude) off (ISO 8728), up to 2.2 deg at 70 deg, and
+    a corrected magnetic compass keeps a deviation of up to 3 deg (ISO 25862).
+    """
+
+    turned: bool = False
+
+    name = "heading_offset"
+    kind = "sensor"
+    story = "The compass stands beside the ship's axis."
+    equation = "ψ_measured = ψ {angle:+.2f} deg"
+    parameters = (Parameter("angle", "deg", np.radians(2.5), np.radians(0.25)),)
+    separated_by = {
+        "current": "one full slow turn, or the same course out and back",
+        "rudder_offset": "hover and coasting with the screw stopped: the rudders' offset vanishes",
+    }
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:gnss" if self.turned else self.name
+
+    def beside(self, label: str) -> bool:
+        return label.partition(":")[0] != self.name
+
+    @property
+    def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return ("body velocity",) if self.turned else ()
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = record.sighted.turned(-float(p[0]))
+        if self.turned:
+            c, s = np.cos(p[0]), np.sin(p[0])
+            ahead, starboard = seen.velocity[:, 0], seen.velocity[:, 1]
+            was = np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+            seen = replace(seen, velocity=was)
+        return reduced(record, seen)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."
+
+
+@dataclass(frozen=True)
+class YawRateBias(Cause):
+    """Size: a rate-of-turn indicator may be 0.5 deg/min off (IMO A.526(13)), a small gyro of the
+    micromechanical kind tenths of a degree a second when switched on (Titterton & Weston 2004)."""
+
+    name = "yaw_rate_bias"
+    kind = "sensor"
+    needs = ("yaw rate",)
+    story = "The gyro shows a turn where there is none."
+    equation = "r_measured = r {value:+.3f} deg/s"
+    parameters = (Parameter("value", "deg/s", np.radians(0.2), np.radians(0.01)),)
+    separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = record.sighted
+        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate - p[0]))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The yaw rate shows {shown['value'].value:+.3f} deg/s too much."
+
+
+@dataclass(frozen=True)
+class YawRateScale(Cause):
+    """Size: a rate-of-turn indicator may show 5 % of the rate too much (IMO A.526(13))."""
+
+    name = "yaw_rate_scale"
+    kind = "sensor"
+    needs = ("yaw rate",)
+    story = "The gyro shows more or less than the ship turns."
+    equation = "r_measured = {value:.3f} r"
+    parameters = (Parameter("value", "1", 0.05, 0.003, low=-0.9),)
+    separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        seen = record.sighted
+        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate / (1.0 + p[0])))
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        return -p / (1.0 + p)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"value": (1.0 + p[..., 0], "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The yaw rate shows {shown['value'].value:.3f} times what the ship turns."
+
+
+@dataclass(frozen=True)
+class ClockOffset(Cause):
+    """One channel is late against the heading; `gnss` is position and velocity together.
+
+    Size: a receiver that reports each second and stamps what arrives is up to a second late (IMO
+    MSC.112(73)): 0.58 s in the mean square of such delays."""
+
+    channel: str = "gnss"
+
+    name = "clock_offset"
+    kind = "sensor"
+    story = "A channel's clock is off."
+    shifts = True
+    equation = "measured(t) = true(t - {time:.2f} s)"
+    parameters = (Parameter("time", "s", 0.6, 0.04, low=-5.0, high=5.0),)
+    separated_by = {
+        "antenna_offset": "spin on the spot against straight acceleration",
+        "clock_offset": "hard acceleration on a straight course",
+    }
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self.channel}"
+
+    @property
+    def usual(self) -> bool:
+        return self.channel != "gnss"  # that is position and velocity together
+
+    def beside(self, label: str) -> bool:
+        """`gnss` is position and velocity together: two of the three say it all."""
+        both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
+        if self.channel == "gnss":
+            return label != self.label and label not in both
+        return label != self.label and not (self.label in both and label == f"{self.name}:gnss")
+
+    @property
+    def needs(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return {"wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",)}.get(self.channel, ())
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        late = float(p[0])
+        if self.channel == "wind":
+            return replace(record, wind=record.later(record.wind, late))
+        seen = record.sighted
+        if self.channel in ("position", "gnss"):
+            seen = replace(seen, position=record.later(seen.position, late))
+        if self.channel in ("velocity", "gnss"):
+            seen = replace(seen, velocity=record.later(seen.velocity, late))
+        if self.channel == "yaw_rate":
+            seen = replace(seen, yaw_rate=record.later(seen.yaw_rate, late))
+        return reduced(record, seen)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        late = shown["time"].value
+        what = {"gnss": "position and velocity", "yaw_rate": "the yaw rate"}.get(
+            self.channel, f"the {self.channel}"
+        )
+        what = what[0].upper() + what[1:]
+        ending = "" if self.channel == "gnss" else "s"
+        return (
+            f"{what} come{ending} {abs(late):.2f} s {'after' if late > 0 else 'before'} the "
+            "heading."
+        )
+
+
+@dataclass(frozen=True)
+class AntennaOffset(Cause):
+    """Size: an arm that nobody entered. A merchant ship's mast stands on the bridge, some 0.3 L
+    abaft midship, and off the centreline by up to half the breadth, 0.07 L (IMO SN.1/Circ.227 asks
+    for both)."""
+
+    name = "antenna_offset"
+    kind = "sensor"
+    story = "The antenna stands elsewhere than the profile has it."
+    equation = "antenna at profile + ({x:+.2f}, {y:+.2f}) m"
+    parameters = (
+        Parameter("x", "m", 0.3, 0.015, of="length"),
+        Parameter("y", "m", 0.07, 0.015, of="length"),
+    )
+    separated_by = {"clock_offset": "spin on the spot against straight acceleration"}
+
+    @property
+    def renames(self) -> bool:
+        return True
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return reduced(record, record.sighted, (float(p[0]), float(p[1])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        x, y = shown["x"].value, shown["y"].value
+        return (
+            f"The antenna is {abs(x):.2f} m {'ahead' if x >= 0 else 'astern'} and {abs(y):.2f} m "
+            f"to {'starboard' if y >= 0 else 'port'} of where the profile has it."
+        )
+
+
+@dataclass(frozen=True)
+class WindDirectionOffset(Cause):
+    """Size: 5 deg is what is asked of an instrument (WMO-No. 8, Chap. 5); a vane's zero on its mast
+    and the flow about the ship make it twice that (Smith, Bourassa & Sharp 1999)."""
+
+    name = "wind_direction_offset"
+    kind = "sensor"
+    needs = ("wind", "wind force")
+    story = "The anemometer is turned on its mast."
+    equation = "γ_measured = γ_A {angle:+.1f} deg"
+    parameters = (Parameter("angle", "deg", np.radians(10.0), np.radians(1.5)),)
+    separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
+
+    @property
+    def renames(self) -> bool:
+        return True
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        c, s = np.cos(p[0]), np.sin(p[0])
+        ahead, starboard = record.wind[:, 0], record.wind[:, 1]
+        turned = np.stack((c * ahead + s * starboard, c * starboard - s * ahead), -1)
+        return replace(record, wind=turned)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The wind's direction shows {shown['angle'].value:+.1f} deg too much."
+
+
+@dataclass(frozen=True)
+class WindSpeedScale(Cause):
+    """Size: 10 % is what is asked of an instrument (WMO-No. 8, Chap. 5); the flow about a bridge is
+    faster by 10 % or more (Moat, Yelland, Pascal & Molland 2005): both, and the height's share."""
+
+    name = "wind_speed_scale"
+    kind = "sensor"
+    needs = ("wind", "wind force")
+    story = "The anemometer shows more or less than blows."
+    equation = "U_measured = {value:.2f} U_A"
+    parameters = (Parameter("value", "1", 0.18, 0.02, low=-0.9),)
+    separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
+
+    @property
+    def absorbed(self) -> bool:
+        return True
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return replace(record, wind=record.wind / (1.0 + p[0]))
+
+    def inverse(self, p: np.ndarray) -> np.ndarray:
+        return -p / (1.0 + p)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"value": (1.0 + p[..., 0], "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The wind speed shows {shown['value'].value:.2f} times what blows."

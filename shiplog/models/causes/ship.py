@@ -1,0 +1,396 @@
+"""Causes in the ship herself: hull, load, screws, rudders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numba
+import numpy as np
+
+from shiplog.models.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.profile import Profile
+from shiplog.voyages.recording import Record
+
+K_T = ("k0", "k1", "k2", "c3", "c6", "c7")  # a screw's thrust is their sum of products
+
+
+def _thrust(c: dict, factor: Any, unit: str = "") -> dict:
+    """Coefficients with the thrust of all screws and thrusters, or of one unit, times a factor.
+
+    Thrusters have coefficients of their own. Screws share one set: "propeller.<name>.factor" says
+    how many times that thrust one of them has (`models.mmg.model`).
+    """
+    if unit and f"thruster.{unit}_ahead" not in c:
+        name = f"propeller.{unit}.factor"
+        return c | {name: c.get(name, 1.0) * factor} if "propeller.k0" in c else c
+    found = [f"thruster.{unit}_{way}" for way in ("ahead", "astern")] if unit else [
+        name for name in c
+        if name in {f"propeller.{key}" for key in K_T}
+        or (name.startswith("thruster.") and name.endswith(("_ahead", "_astern")))
+    ]  # fmt: skip
+    return _times(c, tuple(found), factor)
+
+
+def _times(c: dict, names: tuple[str, ...], factor: Any) -> dict:
+    return c | {name: c[name] * factor for name in names if name in c}
+
+
+def _columns(profile: Profile, kind: str) -> list[int]:
+    return [i for i, a in enumerate(profile.actuators) if a.kind == kind]
+
+
+@dataclass(frozen=True)
+class _Factor(Cause):
+    """Coefficients times one factor."""
+
+    scaled: ClassVar[tuple[str, ...]]
+    kind = "ship"
+    parameters = (Parameter("factor", "1", 0.4, 0.04, low=-1.0),)
+
+    @property
+    def absorbed(self) -> bool:
+        return True
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _times(c, self.scaled, 1.0 + p[0])
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"factor": (1.0 + p[..., 0], "1")}
+
+
+@dataclass(frozen=True)
+class Fouling(_Factor):
+    """Size: a frigate's resistance at 15 kn grows by 0.11 with light slime, 0.20 with heavy slime,
+    and 0.34, 0.52 and 0.80 with more and more shells (Schultz 2007): 0.46 in the mean square."""
+
+    name = "fouling"
+    story = "The hull has grown rough."
+    equation = "X'₀·{factor:.2f}"
+    scaled = ("hull.x_0f", "hull.x_0a")
+    parameters = (Parameter("factor", "1", 0.45, 0.06, low=-1.0),)
+    separated_by = {
+        "thrust_loss": "bollard pull (high revolutions at rest) against coasting (screw stopped)"
+    }
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The hull resists {shown['factor'].value:.2f} times as much as it did."
+
+
+@dataclass(frozen=True)
+class CrossFlowDrag(_Factor):
+    """Size: of a section with the breadth-to-draught ratio of a laden ship (2.5), drag is a quarter
+    more than with that of one in ballast (5), by Hoerner's curve (Fossen 2011, Sec. 6.4)."""
+
+    name = "cross_flow_drag"
+    story = "The hull resists being pushed sideways otherwise than the model has it."
+    equation = "C_D·{factor:.2f}"
+    scaled = ("hull.c_d",)
+    parameters = (Parameter("factor", "1", 0.25, 0.03, low=-1.0),)
+    separated_by = {
+        "shallow_water": "the same manoeuvre at two places",
+        "payload": "step of the screw from rest (inertia) against a pure decay of sway",
+    }
+
+    def beside(self, label: str) -> bool:
+        """Shallow water makes it grow where it is shallow, and a map of that is rough."""
+        return super().beside(label) and label != "shallow_water"
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"Cross-flow drag is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class RudderForce(_Factor):
+    """Size: the hull adds a share a_H of 0.16 to 0.41 to a rudder's force (Kijima et al. 1990, C_b
+    of 0.5 to 0.9), and what a blade in a jet has differs as much with its place (Molland & Turnock
+    2007): a quarter."""
+
+    name = "rudder_force"
+    needs = ("rudder",)
+    story = "The rudders are stronger or weaker than the model has them."
+    equation = "F_N, F_T·{factor:.2f}"
+    scaled = ("rudder.f_alpha", "rudder.f_t")
+    parameters = (Parameter("factor", "1", 0.25, 0.02, low=-1.0),)
+    separated_by = {"thrust_loss": "steady speed on a straight course, rudders amidships"}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The rudders' force is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class ThrustLoss(Cause):
+    """Of all screws and thrusters together, or of one of several.
+
+    Size: fouled blades lose 0.12 to 0.30 of their efficiency (Owen et al. 2018), and air that a
+    screw draws takes up to 0.7 of its thrust (Smogeli 2006): three tenths.
+
+    actuator   the profile's name of the unit; empty for all
+    """
+
+    actuator: str = ""
+
+    name = "thrust_loss"
+    kind = "ship"
+    needs = ("thrust",)
+    story = "The screw pushes less than it did."
+    equation = "K_T·{factor:.2f}"
+    parameters = (Parameter("factor", "1", 0.3, 0.02, low=-1.0),)
+    separated_by = {
+        "fouling": "bollard pull (high revolutions at rest) against coasting (screw stopped)",
+        "payload": "step of the screw from rest (inertia) against steady speed",
+        "thrust_drift": "the same run at the beginning and at the end",
+        "thrust_loss": "the same step by one unit after the other, the others stopped",
+    }
+
+    @property
+    def label(self) -> str:
+        return f"{self.name}:{self.actuator}" if self.actuator else self.name
+
+    @property
+    def absorbed(self) -> bool:
+        return True
+
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        """All together, and where there are several units each of them."""
+        units = setting.columns("propeller", "thruster")
+        names = [setting.profile.actuators[i].name for i in units] if len(units) > 1 else []
+        return (replace(self, actuator=""), *(replace(self, actuator=name) for name in names))
+
+    def beside(self, label: str) -> bool:
+        """All together says what each unit says, and does not stand beside one."""
+        same = label.partition(":")[0] == self.name
+        return not same or (bool(self.actuator) and ":" in label and label != self.label)
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _thrust(c, 1.0 + p[0], self.actuator)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {"factor": (1.0 + p[..., 0], "1")}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        whose = f"thrust of {self.actuator}" if self.actuator else "thrust"
+        return f"The {whose} is {shown['factor'].value:.2f} times the model's."
+
+
+@dataclass(frozen=True)
+class ThrustDrift(Cause):
+    """Size: within a campaign, two thirds of what a screw loses for good (`ThrustLoss`)."""
+
+    name = "thrust_drift"
+    kind = "ship"
+    needs = ("thrust",)
+    story = "The screw pushes less from voyage to voyage."
+    equation = "K_T·(1 {slope:+.2f} · share of the campaign)"
+    parameters = (Parameter("slope", "1", 0.2, 0.025, low=-1.0),)
+    separated_by = {"thrust_loss": "the same run at the beginning and at the end"}
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return _thrust(c, 1.0 + p[0] * share)
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return (
+            f"The thrust changes by {100.0 * shown['slope'].value:+.0f} % from the beginning of "
+            "the campaign to its end."
+        )
+
+
+@dataclass(frozen=True)
+class Payload(Cause):
+    """A load on board: mass, and with it inertia, where it stands. The draught stays.
+
+    Size: deadweight is half of a cargo ship's displacement and more (Schneekluth & Bertram 1998);
+    of that, as much as leaves the draught about what it was, a quarter of the length off midship.
+    """
+
+    name = "payload"
+    kind = "ship"
+    story = "The ship carries a load."
+    equation = "m + {mass:.1f} kg at {position:+.2f} m"
+    parameters = (
+        Parameter("mass", "kg", 0.2, 0.015, of="mass", low=-0.5),
+        Parameter("moment", "kg m", 0.05, 0.004, of="moment"),
+    )
+    separated_by = {
+        "thrust_loss": "step of the screw from rest (inertia) against steady speed",
+        "cross_flow_drag": "step of the screw from rest (inertia) against a pure decay of sway",
+    }
+
+    @property
+    def absorbed(self) -> bool:
+        return True
+
+    def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
+        return c | {"load.mass": p[0], "load.moment": p[1]}
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        mass = p[..., 0]
+        return {
+            "mass": (mass, "kg"),
+            "position": (p[..., 1] / np.where(np.abs(mass) > 1e-9, mass, 1.0), "m"),
+        }
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        at = shown["position"].value
+        return (
+            f"A load of {shown['mass'].value:.3g} kg, {abs(at):.2f} m "
+            f"{'ahead of' if at >= 0 else 'abaft'} midship."
+        )
+
+
+def _steering(profile: Profile) -> list[int]:
+    """Columns of the rudders; of a ship without, of what turns its thrusters."""
+    return _columns(profile, "rudder") or _columns(profile, "azimuth")
+
+
+@dataclass(frozen=True)
+class _OnRudders(Cause):
+    """Of rudders, or of azimuths where the ship has no rudder."""
+
+    what: str = field(default="rudders", kw_only=True)
+
+    kind = "ship"
+    needs = ("steering",)
+
+    def on(self, setting: Setting) -> Cause:
+        rudders = _columns(setting.profile, "rudder")
+        return replace(self, what="rudders" if rudders else "azimuths")
+
+    def _with(self, record: Record, acting: np.ndarray) -> Record:
+        actuator = record.actuator.copy()
+        actuator[:, _steering(record.profile)] = acting
+        return replace(record, actuator=actuator)
+
+    def _recorded(self, record: Record) -> np.ndarray:
+        return record.actuator[:, _steering(record.profile)]
+
+
+@dataclass(frozen=True)
+class RudderOffset(_OnRudders):
+    """Up to two groups of rudders: those to port of the centreline, and the others.
+
+    Size: what stays below the 5 deg at which a steering failure has to be alarmed (46 CFR 113.43).
+    """
+
+    groups: tuple[str, ...] = ("port", "starboard")
+
+    name = "rudder_offset"
+    story = "The rudders stand beside where they are recorded."
+    equation = "δ = δ_recorded + offset"
+    parameters = ()
+    separated_by = {
+        "heading_offset": "hover and coasting with the screw stopped: the offset then vanishes"
+    }
+
+    @property
+    def renames(self) -> bool:
+        return True
+
+    @property
+    def count(self) -> int:
+        return len(self.groups)
+
+    def on(self, setting: Setting) -> Cause:
+        columns = _steering(setting.profile)
+        aside = [setting.profile.actuators[i].position_m[1] for i in columns]
+        paired = min(aside, default=0.0) < 0.0 < max(aside, default=0.0)
+        groups = ("port", "starboard") if paired else ("angle",)
+        return replace(super().on(setting), groups=groups)
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.full(self.count, np.radians(4.0))
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(self.count, -np.radians(40.0)), np.full(self.count, np.radians(40.0))
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        columns = _steering(record.profile)
+        if self.count == 1:
+            each = np.full(len(columns), p[0])
+        else:
+            aside = [record.profile.actuators[i].position_m[1] for i in columns]
+            each = np.array([p[0] if y < 0.0 else p[1] for y in aside])
+        return self._with(record, self._recorded(record) + each)
+
+    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        return {name: (np.degrees(p[..., i]), "deg") for i, name in enumerate(self.groups)}
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        said = " and ".join(
+            f"{v.value:+.1f} deg" + (f" ({name})" if self.count > 1 else "")
+            for name, v in shown.items()
+        )
+        return f"The {self.what} stand {said} off what is recorded."
+
+    def practical(self, p: np.ndarray, setting: Setting) -> bool:
+        return bool(np.abs(p).max() > np.radians(0.3))
+
+
+@dataclass(frozen=True)
+class RudderLag(_OnRudders):
+    """Size: steering machines are of the first order with 1 to 2.5 s (van Amerongen 1982; Fossen
+    2011, Sec. 9.5), and the record of the order lacks all of that."""
+
+    name = "rudder_lag"
+    story = "The rudders follow what is recorded with a lag of the first order."
+    equation = "T δ̇ = δ_recorded - δ,  T = {time:.2f} s"
+    parameters = (Parameter("time", "s", 1.6, 0.1, low=0.0, high=20.0),)
+    separated_by = {"rudder_delay": "rudder doublets of 2 to 4 s at constant revolutions"}
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The {self.what} follow their record with a lag of {shown['time'].value:.2f} s."
+
+
+def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
+    """First-order lag of values [n, k] that go straight from row to row, exactly.
+
+    A negative time is the first-order lead, which a derivative about zero needs.
+    """
+    rate = np.gradient(values, record.step, axis=0)
+    starts = record.starts
+    rate[starts] = 0.0
+    if time <= 0.0:
+        return values - time * rate
+    decay = np.exp(-record.step / time)
+    # y' = (x - y)/T with x linear between rows: y₁ = a y₀ + b₀ x₀ + b₁ x₁, exact
+    b1 = 1.0 - time / record.step * (1.0 - decay)
+    b0 = 1.0 - decay - b1
+    return _filtered(values, starts, decay, b0, b1)
+
+
+@numba.njit(cache=True)
+def _filtered(x, starts, decay, b0, b1):
+    """y₁ = decay y₀ + b₀ x₀ + b₁ x₁; a stretch begins in balance with its first row."""
+    y = np.empty_like(x)
+    for i in range(len(x)):
+        for k in range(x.shape[1]):
+            if i == 0 or starts[i]:
+                y[i, k] = x[i, k]
+            else:
+                y[i, k] = decay * y[i - 1, k] + b0 * x[i - 1, k] + b1 * x[i, k]
+    return y
+
+
+@dataclass(frozen=True)
+class RudderDelay(_OnRudders):
+    """Size: a second, the interval at which an autopilot's sentences come (IEC 61162-1)."""
+
+    name = "rudder_delay"
+    story = "The rudders act later than they are recorded."
+    equation = "δ(t) = δ_recorded(t - {time:.2f} s)"
+    parameters = (Parameter("time", "s", 1.0, 0.1, low=0.0, high=10.0),)
+    separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
+
+    @property
+    def usual(self) -> bool:
+        return False  # a small one is a small lag
+
+    def read(self, record: Record, p: np.ndarray) -> Record:
+        return self._with(record, record.later(self._recorded(record), -float(p[0])))
+
+    def sentence(self, shown: Mapping[str, Shown]) -> str:
+        return f"The {self.what} act {shown['time'].value:.2f} s later than they are recorded."

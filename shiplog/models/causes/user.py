@@ -1,0 +1,65 @@
+"""Causes of the user's own: a Python file with classes of `shiplog.models.causes.Cause`."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from shiplog.arguments import check_causes
+from shiplog.exceptions import RunError
+from shiplog.models.causes import CATALOGUE, Cause
+
+
+def load(paths: Sequence[Path]) -> tuple[Cause, ...]:
+    """Every cause that the files define. Raises RunError for a file that cannot be run, holds
+    none, or takes a name of the catalogue."""
+    found: list[Cause] = []
+    for path in paths:
+        found += _of(Path(path))
+    taken = {cause.label for cause in CATALOGUE}
+    for cause in found:
+        if cause.label in taken:
+            raise RunError(
+                f"There is a cause {cause.label!r} already.", hint="give yours another `name`."
+            )
+        taken.add(cause.label)
+    return tuple(found)
+
+
+def _of(path: Path) -> list[Cause]:
+    check_causes([path])
+    name = f"shiplog_user_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's own code may raise
+        raise RunError(
+            f"{path} cannot be run: {type(error).__name__}: {error}.", hint="mend it first."
+        ) from error
+    kinds = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Cause) and value.__module__ == name
+    ]
+    causes = []
+    for kind in kinds:
+        lacking = [n for n in ("name", "kind", "story", "equation", "parameters")
+                   if not hasattr(kind, n)]  # fmt: skip
+        if lacking:
+            raise RunError(
+                f"{path}: {kind.__name__} has no {', '.join(lacking)}.",
+                hint="a cause has name, kind, story, equation, parameters and one hook.",
+            )
+        kind.user = True
+        causes.append(kind())
+    if not causes:
+        raise RunError(
+            f"{path} defines no cause.",
+            hint="derive a class from shiplog.models.causes.Cause in it, with a name and one hook.",
+        )
+    return causes

@@ -1,0 +1,1 @@
+"""What is written and shown: verdict, pages, tables, pictures."""

@@ -1,0 +1,96 @@
+"""A verdict on one page, for people."""
+
+from __future__ import annotations
+
+from shiplog.exceptions import listed
+from shiplog.report.verdict import HOPELESS, Verdict, less
+
+
+def markdown(verdict: Verdict) -> str:
+    """Markdown: what is named with its numbers and gain, what is not and why, where it is wrong."""
+    lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
+    lines += [f"Model: {verdict.run}, made {verdict.made}.", ""]
+    for cause in verdict.causes:
+        lines += [
+            f"## {cause['name']} (probability {cause['probability']:.2f})", "",
+            cause["sentence"], "", f"    {cause['equation']}", "",
+            "| parameter | value | 90 % interval | unit |", "| --- | ---: | --- | --- |",
+        ]  # fmt: skip
+        for name, p in cause["parameters"].items():
+            if isinstance(p["value"], str):
+                lines.append(f"| {name} | {p['value']} | | |")
+            else:
+                lines.append(
+                    f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} "
+                    f"| {p['unit']} |"
+                )
+        if cause["indistinguishable_from"]:
+            lines += [
+                "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}; "
+                f"this would: {cause['next_test']}.",
+            ]  # fmt: skip
+        if (expected := cause.get("next_test_expected")) is not None:
+            lines += [
+                f"Simulated, {expected['manoeuvre']} would tell most: {expected['nats']:.3g} nats "
+                f"in {expected['seconds']:.0f} s.",
+            ]  # fmt: skip
+        lines.append("")
+    if verdict.gain is not None:
+        g = verdict.gain
+        lines += [
+            "## Gain on held-out windows", "",
+            f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
+            f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
+            f"fitted without {verdict.without}).", "",
+            "By channel: " + ", ".join(
+                f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items()
+            ) + ".", "",
+        ]  # fmt: skip
+    if verdict.ranking:
+        lines += ["## Ranking", "", "| hypothesis | probability |", "| --- | ---: |"]
+        lines += [f"| {r['name']} | {r['probability']:.3f} |" for r in verdict.ranking]
+        lines.append("")
+    for title, rows in (("Rejected", verdict.rejected), ("Traces", verdict.traces)):
+        if rows:
+            lines += [f"## {title}", ""]
+            lines += [f"- {r['name']}: {r.get('reason') or r.get('sentence')}" for r in rows]
+            lines.append("")
+    if verdict.limits:
+        lines += [
+            "## What these data would not show", "",
+            "Smaller than this, a cause may be there: of each number alone, and all its numbers "
+            "together as a share of what is realistic.", "",
+            "| cause | from | of realistic |", "| --- | --- | ---: |",
+        ]  # fmt: skip
+        for one in verdict.limits:
+            numbers = ", ".join(
+                f"{k.replace('_', ' ')} {v['value']:.2g} {v['unit']}".removesuffix(" 1")
+                for k, v in one["parameters"].items()
+            )
+            label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
+            share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "never shows"
+            lines.append(f"| {label} | {numbers} | {share} |")
+        lines.append("")
+    if verdict.wrong:
+        lines += ["## Where it is wrong", ""]
+        lines += [
+            f"- {w['channel'].replace('_', ' ')}: {w['share_of_error']:.0%} of the error; "
+            f"{w['where']}"
+            for w in verdict.wrong
+        ]
+        lines.append("")
+    if verdict.unseen:
+        lines += [
+            "What the model cannot see, and the residual depends on (cross-validated R²):", "",
+            *[f"- {u['variable']}: {u['sentence']}" for u in verdict.unseen], "",
+        ]  # fmt: skip
+    if verdict.intervals:
+        lines += ["## Stretches left out or never trained on", ""]
+        lines += [
+            f"- {i.voyage}, {i.start_s:.0f} to {i.end_s:.0f} s ({i.kind}): {i.sentence}"
+            for i in verdict.intervals
+        ]
+        lines.append("")
+    if verdict.notes:
+        lines += ["## Notes", "", *[f"- {note}" for note in verdict.notes], ""]
+    return "\n".join(lines)

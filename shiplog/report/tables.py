@@ -1,0 +1,369 @@
+"""Tables and sentences for people, in Markdown; their JSON twins for machines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from shiplog.exceptions import listed
+from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
+from shiplog.profile import Profile
+from shiplog.report.judgement import FEWEST
+from shiplog.voyages.one_hertz import WINDOW
+
+if TYPE_CHECKING:
+    from shiplog.voyages.store import Entry
+
+MOST_FINDINGS = 16  # lines on one log
+MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
+
+# Slower is said: a manoeuvring ship turns by degrees between two samples.
+SELDOM_HZ = 4.5
+# A coarser step is said: about three times what a good instrument is accurate to.
+COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "wind": 0.3}
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table with aligned columns."""
+    text = [[_cell(value) for value in row] for row in rows]
+    widths = [
+        max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
+        for i, h in enumerate(head)
+    ]
+    numeric = [
+        bool(rows) and all(isinstance(r[i], (int, float)) for r in rows) for i in range(len(head))
+    ]
+
+    def line(cells: Sequence[str]) -> str:
+        padded = [
+            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)
+        ]
+        return f"| {' | '.join(padded)} |"
+
+    rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
+    return "\n".join([line(list(head)), line(rule), *map(line, text)])
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool) or not isinstance(value, float):
+        return str(value)
+    if not math.isfinite(value):
+        return "diverged" if value > 0 else "-"
+    if value != 0 and abs(value) < 0.001:
+        return f"{value:.1e}"
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def voyage_lines(report: VoyageReport) -> list[str]:
+    """What one log's health is, in a few lines: at most a screen."""
+    lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
+    head = f"{report.name}: {report.messages_read} messages read, {lost} lost; "
+    if report.usable_s is None:
+        return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
+    head += (
+        f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
+        f"{report.windows} {'window' if report.windows == 1 else 'windows'} of {WINDOW} s"
+    )
+    return [head, *_instruments(report.instruments), *_findings(report.findings)]
+
+
+def _instruments(instruments: Sequence[Instrument]) -> list[str]:
+    """Which of them measure seldom, and which count in coarse steps."""
+    rates: dict[float, list[str]] = {}
+    for one in instruments:
+        if one.rate_hz < SELDOM_HZ:
+            rates.setdefault(float(f"{one.rate_hz:.2g}"), []).append(one.channel)
+    lines = [
+        f"  rate: {listed(names, most=4)} at {rate:g} Hz; what stands between two samples is "
+        "interpolated."
+        for rate, names in sorted(rates.items())
+    ]
+    coarse = [
+        f"{one.channel} {one.resolution:.2g} {one.unit}"
+        for one in instruments
+        if one.resolution > COARSE.get(one.channel, math.inf)
+    ]
+    if coarse:
+        lines.append(f"  resolution: {', '.join(coarse)}; this counts as accuracy.")
+    return lines
+
+
+def _findings(findings: Sequence[Finding]) -> list[str]:
+    """Each by itself where they are few of a kind and channel, else their number and largest."""
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        groups.setdefault((finding.kind, finding.channel), []).append(finding)
+    lines = []
+    for (kind, channel), group in groups.items():
+        if len(group) <= MOST_ALIKE:
+            lines += [f"  {kind}: {finding.sentence}" for finding in group]
+            continue
+        largest = max((f for f in group if f.start_s is not None), key=_size, default=group[0])
+        if largest.unit == "s":
+            total = sum(f.value or 0.0 for f in group)
+            lines.append(f"  {kind}: {channel}, {total:.1f} s in all; most: {largest.sentence}")
+        else:
+            lines.append(f"  {kind}: {channel}, {len(group)} times; most: {largest.sentence}")
+    left = len(lines) - MOST_FINDINGS
+    if left > 0:
+        lines = [*lines[:MOST_FINDINGS], f"  and {left} more lines."]
+    if any(len(group) > MOST_ALIKE for group in groups.values()) or left > 0:
+        lines.append("  all of them, one by one, with --json.")
+    return lines
+
+
+def _size(finding: Finding) -> float:
+    return abs(finding.value or 0.0)
+
+
+def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object]) -> dict:
+    """The contract's answer of `check` and `ingest`; refused: file → why."""
+    return {
+        "contract": CONTRACT,
+        "voyages": [report.as_json() for report in reports],
+        "refused": {path: str(why) for path, why in refused.items()},
+    }
+
+
+def catalogue(entries: Sequence[Entry]) -> str:
+    """What is in a store; figures that an older program did not write down stay open."""
+    rows = [
+        (
+            e.name, e.ship, e.start[:19], e.seconds,
+            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
+            e.findings,
+        )
+        for e in entries
+    ]  # fmt: skip
+    head = (
+        "voyage", "ship", "start", "seconds", "slowest, Hz", "usable, s", f"windows of {WINDOW} s",
+        "findings",
+    )  # fmt: skip
+    return table(head, rows)
+
+
+def estimated(profile: Profile) -> list[str]:
+    """Which particulars the profile leaves out, and what stands in for them."""
+    missing = [
+        name
+        for name in (
+            "breadth_m",
+            "draught_m",
+            "mass_kg",
+            "x_g_m",
+            "block_coefficient",
+            "frontal_area_m2",
+            "lateral_area_m2",
+        )
+        if getattr(profile.ship, name) is None
+    ]
+    if not missing:
+        return []
+    breadth = "; the hull is drawn a sixth as broad as long" if "breadth_m" in missing else ""
+    return [
+        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}: a learned model "
+        f"does without{breadth}."
+    ]
+
+
+def summary(errors: pl.DataFrame) -> dict:
+    """The figures of one model: L per seed and their mean, RMSE, end errors.
+
+    errors: one row per window and seed, with seed, voyage, window and `evaluate.ERRORS`. RMSE is
+    over all windows of a seed, then the mean over seeds; end errors are means over both.
+    """
+    per_seed = (
+        errors.group_by("seed")
+        .agg(
+            pl.col("loss").mean(),
+            *[
+                pl.col(f"rmse_{name}").pow(2).mean().sqrt()
+                for name in ("surge", "sway", "yaw_rate")
+            ],
+            pl.col("end_position_m", "end_heading_deg").mean(),
+        )
+        .sort("seed")
+    )
+    windows = errors.select("voyage", "window").unique().height
+    return {
+        "loss": float(per_seed["loss"].mean()),  # type: ignore[arg-type]
+        "windows": windows,
+        "seeds": per_seed["loss"].to_list(),
+        "rmse": {
+            name: float(per_seed[f"rmse_{name}"].mean())  # type: ignore[arg-type]
+            for name in ("surge", "sway", "yaw_rate")
+        },
+        "end_position_m": float(per_seed["end_position_m"].mean()),  # type: ignore[arg-type]
+        "end_heading_deg": float(per_seed["end_heading_deg"].mean()),  # type: ignore[arg-type]
+    }
+
+
+def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame) -> dict:
+    """The contract's answer of `evaluate`.
+
+    coverage: one row per window, with voyage, window and coverage (0 to 1).
+    """
+    per_voyage = errors.group_by("voyage").agg(
+        pl.col("loss").mean(), windows=pl.col("window").n_unique()
+    )
+    covered = coverage.group_by("voyage").agg(pl.col("coverage").mean())
+    voyages = {
+        row["voyage"]: {key: row[key] for key in ("loss", "windows", "coverage")}
+        for row in per_voyage.join(covered, on="voyage").sort("voyage").to_dicts()
+    }
+    return {"contract": CONTRACT, **summary(errors), "floors": floors, "voyages": voyages}
+
+
+def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on: str) -> str:
+    """One line a model and a floor: what a reader looks at first.
+
+    fitted_on: the run whose training data the fitted floor had.
+    """
+    rows = []
+    for label, s in summaries.items():
+        spread = f"{min(s['seeds']):.0f} to {max(s['seeds']):.0f}" if len(s["seeds"]) > 1 else "-"
+        rows.append(
+            (
+                label,
+                s["loss"],
+                spread,
+                s["rmse"]["surge"],
+                s["rmse"]["sway"],
+                math.degrees(s["rmse"]["yaw_rate"]),
+                s["end_position_m"],
+                s["end_heading_deg"],
+            )
+        )
+    names = {
+        "hold": "floor: hold the velocity",
+        "least_squares": f"floor: quadratic least squares on the data of {fitted_on}",
+    }
+    dash = "-"
+    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
+    head = (
+        "model",
+        "L",
+        "L over seeds",
+        "RMSE u [m/s]",
+        "RMSE v [m/s]",
+        "RMSE r [deg/s]",
+        "end position [m]",
+        "end heading [deg]",
+    )
+    return table(head, rows)
+
+
+def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -> str:
+    """The worst windows, with where they left the training data."""
+    mean = errors.group_by("voyage", "window").agg(
+        pl.col("loss", "end_position_m", "end_heading_deg").mean(), pl.col("elapsed").first()
+    )
+    rows = (
+        mean.join(coverage, on=["voyage", "window"])
+        .sort("loss", descending=True)
+        .head(most)
+        .select(
+            "voyage", "elapsed", "loss", "end_position_m", "end_heading_deg", "coverage", "reason"
+        )
+        .rows()
+    )
+    shown = [
+        (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
+    ]
+    return table(
+        (
+            "voyage",
+            "from [s]",
+            "L",
+            "end position [m]",
+            "end heading [deg]",
+            "covered",
+            "outside the training data",
+        ),
+        shown,
+    )
+
+
+def parameters_table(identified: pl.DataFrame) -> str:
+    """Every parameter that was free: start, value, standard error, and how far it moved."""
+    rows = [
+        (
+            r["name"],
+            r["symbol"],
+            r["meaning"],
+            f"{r['start']:.4g}",
+            f"{r['value']:.4g}",
+            f"{r['standard_error']:.2g}",
+            f"{(r['value'] - r['start']) / r['spread']:+.1f}",
+        )
+        for r in identified.filter(pl.col("free")).to_dicts()
+    ]
+    head = ("parameter", "symbol", "what", "start", "value", "standard error", "moved (spreads)")
+    return table(head, rows)
+
+
+WIND_BIN = 1.0  # m/s
+
+
+def winds(errors: pl.DataFrame) -> pl.DataFrame:
+    """run, low, high [m/s], windows, loss: L by the mean apparent wind of a window."""
+    low = (pl.col("wind_speed") / WIND_BIN).floor() * WIND_BIN
+    return (
+        errors.drop_nulls("wind_speed")
+        .with_columns(low=low, high=low + WIND_BIN)
+        .group_by("run", "low", "high", maintain_order=True)
+        .agg(windows=pl.struct("voyage", "window").n_unique(), loss=pl.col("loss").mean())
+        .sort("low", maintain_order=True)
+    )
+
+
+def wind_lines(errors: pl.DataFrame) -> list[str]:
+    """A table of L by wind, a column a run, and a blank line; nothing without a wind sensor."""
+    found = winds(errors)
+    names = errors["run"].unique(maintain_order=True).to_list()
+    if found.is_empty():
+        return []
+    rows = []
+    for low in found["low"].unique(maintain_order=True):
+        here = {r["run"]: r for r in found.filter(pl.col("low") == low).to_dicts()}
+        one = here[names[0]]
+        span = f"{one['low']:.0f} to {one['high']:.0f}"
+        rows.append((span, one["windows"], *(here[n]["loss"] for n in names)))
+    head = ("apparent wind [m/s]", "windows", *(f"L of {n}" for n in names))
+    return ["By wind:", "", table(head, rows), ""]
+
+
+def band_lines(inside: pl.DataFrame) -> list[str]:
+    """What share of the samples lies inside each run's 90 % band, and a blank line."""
+    lines = []
+    for run in inside["run"].unique(maintain_order=True):
+        mine = inside.filter(pl.col("run") == run)
+        shares = ", ".join(
+            f"{channel.replace('_', ' ')} {share:.0%}"
+            for channel, share in mine.select("channel", "share").iter_rows()
+        )
+        lines.append(f"Inside the 90 % band of {run}: {shares}.")
+    return [*lines, ""] if lines else []
+
+
+def voyages_table(answer: dict) -> str:
+    """L, windows and coverage of each voyage; of a few windows no share is said."""
+    rows = [
+        (name, v["windows"], v["loss"], f"{v['coverage']:.0%}" if v["windows"] >= FEWEST else "-")
+        for name, v in answer["voyages"].items()
+    ]
+    return table(("voyage", "windows", "L", "covered"), rows)
+
+
+def finite(value):
+    """JSON has no infinity: null it, at any depth."""
+    if isinstance(value, dict):
+        return {k: finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

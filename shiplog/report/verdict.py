@@ -1,0 +1,352 @@
+"""The answer of a diagnosis: as the contract has it, with its sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from shiplog.channels import VELOCITY
+from shiplog.diagnosis.next_manoeuvre import Advice
+from shiplog.diagnosis.omitted_inputs import Dependence
+from shiplog.diagnosis.result import LEAST, PULSES, Decision, Named
+from shiplog.exceptions import listed
+from shiplog.logs.health_report import CONTRACT
+from shiplog.models.causes import Cause, Setting, si
+from shiplog.simulation.error_reduction import Gain
+
+SHARE_SAID = 0.01  # of a ranking
+SURELY = 0.9  # probability from which on a sentence is said without it
+HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
+NINETY = 1.645  # standard deviations to either end of a 90 % interval
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of a voyage that is another matter: external, gap or coverage."""
+
+    voyage: str
+    start_s: float
+    end_s: float
+    kind: str
+    sentence: str
+
+    def as_json(self) -> dict:
+        return {
+            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
+            "kind": self.kind, "sentence": self.sentence,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `shiplog diagnose` answers.
+
+    verdict    named, none, unknown, coverage or external
+    causes     as the contract has them
+    said       one sentence
+    without    what of each held-out window the numbers have not seen
+    """
+
+    verdict: str
+    said: str
+    run: str
+    before_effect: bool
+    made: str = "on voyages before these"
+    causes: tuple[dict, ...] = ()
+    ranking: tuple[dict, ...] = ()
+    rejected: tuple[dict, ...] = ()
+    traces: tuple[dict, ...] = ()
+    wrong: tuple[dict, ...] = ()
+    structure: dict | None = None
+    intervals: tuple[Interval, ...] = ()
+    gain: Gain | None = None
+    without: str = "its voyage"
+    unseen: tuple[dict, ...] = ()
+    limits: tuple[dict, ...] = ()
+    unavailable: tuple[dict, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    def as_json(self) -> dict:
+        found = {
+            "contract": CONTRACT,
+            "verdict": self.verdict,
+            "sentence": self.said,
+            "causes": list(self.causes),
+            "ranking": list(self.ranking),
+            "rejected": list(self.rejected),
+            "traces": list(self.traces),
+            "wrong": list(self.wrong),
+            "intervals": [i.as_json() for i in self.intervals],
+            "unseen": list(self.unseen),
+            "limits": list(self.limits),
+            "unavailable": list(self.unavailable),
+            "explained": max(self.gain.reduction, 0.0) if self.gain and self.causes else 0.0,
+            "notes": list(self.notes),
+            "base": {"run": self.run, "before_effect": self.before_effect},
+        }
+        if self.structure is not None:
+            found["structure"] = self.structure
+        if self.gain is not None:
+            found["gain"] = self.gain.as_json()
+        return found
+
+
+DEPENDS = {
+    "position": ("x0", "y0"),
+    "heading": ("heading",),
+    "time": ("time",),
+    "motion": ("surge", "sway", "yaw_rate"),
+    "wind": ("wind_speed", "wind_angle"),
+    "stochastic": (),
+    "intermittent": ("time",),
+}
+
+
+def cause_json(named: Named, advice: Advice | None = None) -> dict:
+    shown = named.shown
+    content = {
+        "name": named.cause.name,
+        "probability": min(max(named.probability, 0.0), 1.0),
+        "parameters": {k: v.as_json() for k, v in shown.items()} | _which(named),
+        "sentence": named.cause.sentence(shown),
+        "equation": equation(named),
+        "indistinguishable_from": list(dict.fromkeys(n.split(":")[0] for n in named.alike)),
+    }
+    if math.isfinite(named.evidence):  # chosen on whole windows, it has none
+        content["evidence_nats"] = named.evidence
+    tests = [named.cause.separated_by[n] for n in named.alike if n in named.cause.separated_by]
+    if named.alike:
+        content["next_test"] = "; ".join(dict.fromkeys(tests)) or (
+            advice.words if advice else "the same manoeuvres again, with turns both ways and stops"
+        )
+    if advice is not None:
+        content["next_test_expected"] = {
+            "manoeuvre": advice.words, "seconds": advice.seconds, "nats": advice.nats,
+        }  # fmt: skip
+    if named.cause.user:
+        content["user"] = True
+    return content
+
+
+WHICH = ("channel", "actuator")  # what a cause's label has behind its colon
+
+
+def _which(named: Named) -> dict:
+    found = {key: getattr(named.cause, key, "") for key in WHICH}
+    return {
+        key: {"value": value, "low": value, "high": value, "unit": ""}
+        for key, value in found.items()
+        if value
+    }
+
+
+def equation(named: Named) -> str:
+    """With numbers; fields of the fit and of what is shown may both stand in it."""
+    values = {p.name: float(v) for p, v in zip(named.cause.parameters, named.numbers, strict=False)}
+    values |= {k: v.value for k, v in named.shown.items()}
+    return named.cause.equation.format(**values)
+
+
+def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
+    """The thruster that nobody records. `times`: voyage, start_s, end_s, force_N, sd_N."""
+    found = decision.pulses
+    assert found is not None
+    strongest = max(times, key=lambda t: abs(t["force_N"]), default=None)
+    peak, sd = (found.force, found.force) if strongest is None else (
+        abs(strongest["force_N"]), strongest["sd_N"],
+    )  # fmt: skip
+    low, high = max(peak - NINETY * sd, 0.0), peak + NINETY * sd
+    size = {"value": peak, "low": low, "high": high, "unit": "N"}
+    where = "ahead of" if found.lever >= 0.0 else "abaft"
+    return {
+        "name": PULSES,
+        "probability": probability,
+        "parameters": {"force": size},
+        "times": list(times),
+        "sentence": (
+            f"A side force of up to {peak:.2g} N, {abs(found.lever):.2g} m {where} midship, comes "
+            "and goes without being recorded: a thruster, or something that pushes."
+        ),
+        "equation": "Y + F(t), N + x F(t)",
+        "indistinguishable_from": [],
+        "evidence_nats": found.gain,
+    }
+
+
+def trace_json(named: Named) -> dict:
+    """There, but too small to matter."""
+    return {
+        "name": named.cause.name,
+        "parameters": {k: v.as_json() for k, v in named.shown.items()},
+        "sentence": f"Present, but below practical size: {named.cause.sentence(named.shown)}",
+    }
+
+
+def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
+    found = decision.structure
+    if found is None:
+        return None
+    depends = tuple(actuators) if found.family == "controls" else DEPENDS[found.family]
+    return {
+        "family": found.family, "acts_on": list(found.acts_on), "depends_on": list(depends),
+        "evidence_nats": found.evidence,
+    }  # fmt: skip
+
+
+def probabilities_json(ranking: Mapping[str, float]) -> tuple[dict, ...]:
+    """Every answer that has a share worth stating, likeliest first."""
+    kept = [(n, p) for n, p in ranking.items() if p >= SHARE_SAID]
+    return tuple(
+        {"name": n, "probability": min(p, 1.0)} for n, p in sorted(kept, key=lambda pair: -pair[1])
+    )
+
+
+def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
+    """The smallest size of each cause that these data would show, best known first: of each number
+    alone, and as a share of the realistic size. Numbers that no size would show are left out."""
+    by = {c.label: c for c in causes}
+    found = []
+    for label, told in decision.told.items():
+        cause, least = by[label], told.least(LEAST)
+        sizes = least * cause.sizes(setting)
+        if len(cause.parameters) == len(sizes):
+            parts = zip(cause.parameters, sizes, least, strict=True)
+            shown = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
+        else:  # as many as the ship has rudders, or the map places
+            shown = cause.shown(sizes)
+        numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
+        found.append({"name": cause.name, "share": told.together(LEAST), "parameters": numbers})
+        if label != cause.name:
+            key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
+            found[-1][key] = label.partition(":")[2]
+    return tuple(sorted(found, key=lambda one: one["share"]))
+
+
+def sentence(
+    verdict: str,
+    causes: Sequence[dict],
+    structure: dict | None,
+    gain: Gain | None,
+    louder: float,
+    alone: float | None = None,
+    ranking: Sequence[dict] = (),
+    wrong: Sequence[dict] = (),
+) -> str:
+    """The verdict in a sentence or a few; what is named comes after the share that it explains.
+
+    alone   share of the error that the model takes off when it is fitted again with nothing named;
+            None where it is not fitted again
+    wrong   share of the error in each channel, before anything is named
+    """
+    if verdict == "named":
+        said = " ".join(_likely(cause) for cause in causes)
+        if gain is None:
+            return said
+        if gain.real:
+            share = (
+                f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
+                f"explained ({gain.low:.0%} to {gain.high:.0%})."
+            )
+        else:
+            share = (
+                f"No part of the error on {gain.windows} held-out windows is surely explained: it "
+                f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
+            )
+        said = " ".join(part for part in (share, said, _left(gain, wrong)) if part)
+        if alone is None:
+            return said
+        return f"{said} Fitted again with nothing named, the model has an error {less(alone)}."
+    if verdict == "undecided":
+        said = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
+        return f"Undecided: {' or '.join(said)}. No answer has a probability of {SURELY:.0%}."
+    if verdict == "unknown":
+        assert structure is not None
+        if structure["family"] == "intermittent":
+            return (
+                "Outside the catalogue: a force that comes and goes pushes the ship sideways, and "
+                "no device whose place and pattern are known does that."
+            )
+        if structure["family"] == "stochastic":
+            return (
+                f"The ship is pushed about at random {louder:.1f} times as hard as when the model "
+                "was made; no cause of the catalogue does that."
+            )
+        return (
+            f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
+            f"{listed(structure['depends_on'])}."
+        )
+    if verdict == "coverage":
+        return "Not trained in these conditions: record data there first, then ask again."
+    if verdict == "external":
+        return "The ship was pushed, held or towed: no force of its own explains these stretches."
+    return (
+        "No change found: the errors are those that the model already had in its nominal voyages."
+    )
+
+
+def _left(gain: Gain, wrong: Sequence[dict]) -> str:
+    """The largest part of the error that what is named does not explain; empty where none is."""
+    left = {
+        one["channel"]: one["share_of_error"] * (1.0 - gain.channels.get(one["channel"], 0.0))
+        for one in wrong
+    }
+    if not left:
+        return ""
+    channel, share = max(left.items(), key=lambda pair: pair[1])
+    return (
+        f"The largest part that is not is in {channel.replace('_', ' ')}: {share:.0%} of the error."
+    )
+
+
+def _answer(name: str) -> str:
+    """One entry of the ranking, in words."""
+    if name == "none":
+        return "no change"
+    if name.startswith("unknown:"):
+        return f"something outside the catalogue ({name.partition(':')[2]})"
+    return name.replace("_", " ")
+
+
+def unseen_json(row: Dependence) -> dict:
+    """One line of the table of what the model cannot see."""
+    r2 = dict(zip((c.name for c in VELOCITY), row.r2, strict=True))
+    said = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in r2.items())
+    depends = f"acts on {listed(row.acts_on)}" if row.significant else "no dependence"
+    return {
+        "variable": row.variable, "r2": r2, "acts_on": list(row.acts_on),
+        "significant": row.significant, "left_out": row.folds,
+        "sentence": f"R² {said} ({row.folds} left out): {depends}",
+    }  # fmt: skip
+
+
+def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
+    """Label → why not. Of a cause with several channels, the reason says which."""
+    found = []
+    for label, why in reasons.items():
+        name, _, channel = label.partition(":")
+        found.append({"name": name, "reason": f"{channel}: {why}" if channel else why})
+    return tuple(found)
+
+
+def _likely(cause: dict) -> str:
+    """A cause's sentence, and how sure it is where it is not."""
+    if cause["probability"] >= SURELY:
+        return _or(cause)
+    how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
+    return f"{how}, and not surely ({cause['probability']:.0%}): {_or(cause)}"
+
+
+def _or(cause: dict) -> str:
+    """A cause's sentence, and what it may be instead."""
+    others = cause["indistinguishable_from"]
+    if not others:
+        return cause["sentence"]
+    return (
+        f"{cause['sentence'].removesuffix('.')}; or it is {listed(others)}: these data cannot tell."
+    )
+
+
+def less(share: float) -> str:
+    """A share of the error that is taken off, in words; negative where it grows."""
+    return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"

@@ -1,0 +1,38 @@
+"""Measured against simulated in Rerun. Only this package imports it, and only when it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from shiplog.report.comparison_data import Actuator, Comparison
+from shiplog.report.diagnosis_data import Exhibit
+from shiplog.report.viewer.native import Served, open_viewer, serve
+
+__all__ = [
+    "Actuator", "Comparison", "Exhibit", "Served", "open_viewer", "save", "save_album",
+    "save_diagnosis", "serve",
+]  # fmt: skip
+
+
+def save(comparison: Comparison, path: str | Path) -> None:
+    """Write the comparison as an .rrd, under a temporary name until it is whole."""
+    from shiplog.report.viewer import (
+        recording,  # half a second of imports that most commands never need
+    )
+
+    recording.write(comparison, Path(path))
+
+
+def save_album(title: str, text: str, pictures: Mapping[str, Path], path: str | Path) -> None:
+    """Write a text and pictures, name → PNG file, as an .rrd with a tab each."""
+    from shiplog.report.viewer import album
+
+    album.write(title, text, pictures, Path(path))
+
+
+def save_diagnosis(exhibit: Exhibit, path: str | Path) -> None:
+    """Write the pictures of a diagnosis as an .rrd."""
+    from shiplog.report.viewer import recording
+
+    recording.write_diagnosis(exhibit, Path(path))

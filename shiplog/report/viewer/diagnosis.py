@@ -1,0 +1,264 @@
+"""What a diagnosis found: where it tells most on the chart, the force that no model had beside the
+force of what was named, and the error before and after."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+import rerun as rr
+import rerun.blueprint as rrb
+
+from shiplog import channels
+from shiplog.report.comparison_data import Comparison
+from shiplog.report.diagnosis_data import AFTER, BEFORE, Exhibit
+from shiplog.report.viewer import display, forces, style, timeline, trajectory
+from shiplog.report.viewer.display import Drawn
+from shiplog.report.viewer.style import entity
+
+SIDES = 1.645  # standard deviations of a 90 % band
+LACKS = "model lacks (black)"  # a dark dot does not show in Rerun's dark legend
+COLOURS_SAID = ("blue", "orange")  # style.MODELS: before, and after
+NAMED = style.MODELS[1]  # the force of what the model after has
+ROOM = 1.0  # sizes of the measured track that a simulated one is followed beyond it
+CHANNELS = dict(zip((c.name for c in channels.VELOCITY), forces.AXES, strict=True))
+DRAWABLE = str.maketrans({  # Rerun's fonts lack these, and its headless viewer falls over them
+    "ᵀ": "'", "ᵢ": "_i", "⁻": "^-", "₊": "_+", "₋": "_-", "∇": "grad ",
+})  # fmt: skip
+CUT_OFF = 4.0  # times the middle error before: where the axis of errors ends at the latest
+
+
+@dataclass(frozen=True)
+class Pictured:
+    """An exhibit ready to be drawn.
+
+    tracks    its voyages, and of each the window that tells most as a voyage of its own
+    models    what `tracks` calls BEFORE and, where there is one, AFTER; in this order their names
+              sort, which is the order of their colours
+    closeups  voyage → the name of that window
+    pushed    voyage, time, part, surge, sway, yaw [N, N m]: as Comparison.forces has them
+    errors    voyage, time, seconds, before, after: root mean square
+    """
+
+    exhibit: Exhibit
+    tracks: Drawn
+    models: dict[str, str]
+    closeups: dict[str, str]
+    pushed: pl.DataFrame
+    errors: pl.DataFrame
+
+    @property
+    def voyages(self) -> list[str]:
+        """The most telling one first."""
+        return list(dict.fromkeys((*self.closeups, *self.exhibit.voyages)))
+
+
+def pictured(exhibit: Exhibit) -> Pictured:
+    """Tables as the other views take them."""
+    models = {BEFORE: "before" if exhibit.extended else "the model"}
+    if exhibit.extended:
+        models[AFTER] = f"with {_spoken(exhibit.extended)}"
+    closeups, measured, tracks = {}, [], []
+    for row in exhibit.telling.to_dicts():
+        begin, end = row["time"], row["time"] + row["seconds"]
+        name = f"{row['voyage']}, {begin:.0f} to {end:.0f} s"
+        of, within = pl.col("voyage") == row["voyage"], pl.col("time").is_between(begin, end)
+        closeups[row["voyage"]] = name
+        measured.append(exhibit.measured.filter(of, within).with_columns(voyage=pl.lit(name)))
+        tracks.append(
+            exhibit.tracks.filter(of, pl.col("window") == row["window"]).with_columns(
+                voyage=pl.lit(name)
+            )
+        )
+    compared = Comparison(
+        title=exhibit.title,
+        ship_length=exhibit.ship_length,
+        ship_breadth=exhibit.ship_breadth,
+        ship_outline=exhibit.ship_outline,
+        banks=exhibit.banks,
+        actuators=(),
+        has_wind=False,
+        measured=pl.concat([*measured, exhibit.measured]),
+        simulated=pl.concat([*tracks, exhibit.tracks]).with_columns(
+            pl.col("model").replace(models), seed=pl.lit(0), d=pl.lit(0.0)
+        ),
+        training=exhibit.measured.clear(),
+        summary=exhibit.report,
+    )
+    # L is over seconds: what is left of it per second, and its root, reads as a speed
+    root = [(pl.col(n) / pl.col("seconds")).sqrt().alias(n) for n in (BEFORE, AFTER)]
+    return Pictured(
+        exhibit, display.drawn(compared), models, closeups, _pushed(exhibit),
+        exhibit.errors.with_columns(root),
+    )  # fmt: skip
+
+
+def _spoken(names: tuple[str, ...]) -> str:
+    """Causes in words; what one of them is of stands in brackets: "clock offset (gnss)"."""
+    spoken = [name.replace("_", " ").partition(":") for name in names]
+    return " and ".join(f"{cause} ({of})" if of else cause for cause, _, of in spoken)
+
+
+def _pushed(exhibit: Exhibit) -> pl.DataFrame:
+    """A row an instant and part: what the model lacks, the ends of its band, what was named."""
+    part = {
+        LACKS: pl.col("force"),
+        "low": pl.col("force") - SIDES * pl.col("sd"),
+        "high": pl.col("force") + SIDES * pl.col("sd"),
+        "named": pl.col("named"),
+    }
+    return pl.concat(
+        exhibit.residual.with_columns(part=pl.lit(name), value=value)
+        .pivot("channel", index=["voyage", "time", "part"], values="value")
+        .rename(CHANNELS)
+        .select("voyage", "time", "part", *forces.AXES)
+        .sort("time", maintain_order=True)
+        for name, value in part.items()
+    )
+
+
+# --- where each picture stands --------------------------------------------------------------------
+
+
+def blueprint(picture: Pictured) -> list[rrb.Container]:
+    """A tab a voyage: chart and report left, along time right."""
+    return [_tab(picture, voyage) for voyage in picture.voyages[: display.MOST_TABS]]
+
+
+def _tab(picture: Pictured, voyage: str) -> rrb.Container:
+    names = [_in_words(picture, voyage), "Whole voyage"]
+    charts = [picture.closeups.get(voyage), voyage]
+    left = rrb.Vertical(
+        rrb.Tabs(
+            *(_chart(picture, c, n) for c, n in zip(charts, names, strict=True) if c),
+            active_tab=0,
+        ),
+        rrb.TextDocumentView(origin="/report", name="Report"),
+        row_shares=[1.55, 1.0],
+    )
+    right: list[rrb.View] = []
+    if (picture.pushed["voyage"] == voyage).any():
+        right += [_force(picture, voyage, axis) for axis in forces.AXES]
+    if (picture.errors["voyage"] == voyage).any():
+        right.append(_errors(picture, voyage))
+    if not right:  # too short for either
+        return rrb.Vertical(left, name=voyage)
+    return rrb.Horizontal(left, rrb.Vertical(*right), column_shares=[1.0, 1.45], name=voyage)
+
+
+def _in_words(picture: Pictured, voyage: str) -> str:
+    """The window's heading, which says what the colours are."""
+    _, unit = trajectory.in_chart_units(picture.tracks)
+    what = "Most improved" if AFTER in picture.models else "Worst"
+    lines = zip(picture.models.values(), COLOURS_SAID, strict=False)
+    said = ", ".join(["measured black", *(f"{model} {colour}" for model, colour in lines)])
+    when = picture.closeups.get(voyage, "").removeprefix(f"{voyage}, ")
+    short = {"metres": "m", "kilometres": "km"}[unit]
+    return f"{what}, {when} [{short}]: {said}"
+
+
+def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
+    tracks, _ = trajectory.in_chart_units(picture.tracks)
+    east, north = trajectory.extent(tracks, voyage, ROOM)
+    labels = 0.08 * (east[1] - east[0])  # they stand about its edge
+    return rrb.Spatial2DView(
+        origin=entity("track", voyage),
+        name=name,
+        background=list(style.PAPER),
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=[east[0] - labels, east[1]], y_range=[-north[1], -north[0]]
+        ),
+    )
+
+
+def _force(picture: Pictured, voyage: str, axis: str) -> rrb.View:
+    what, _, positive = forces.AXES[axis]
+    name, factor = forces.unit(picture.pushed, axis)
+    return rrb.TimeSeriesView(
+        origin=entity("unexplained", voyage, axis),
+        name=f"{what} [{name}], positive {positive}",
+        axis_x=_whole_voyage(picture, voyage),
+        axis_y=rrb.ScalarAxis(range=forces.readable_range(picture.pushed, axis, factor)),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=axis == "surge"),
+        background=style.plot_background(),
+    )
+
+
+def _errors(picture: Pictured, voyage: str) -> rrb.View:
+    return rrb.TimeSeriesView(
+        origin=entity("errors", voyage),
+        name="velocity error of each held-out window, root mean square [cm/s, or 0.1 deg/s]",
+        axis_x=_whole_voyage(picture, voyage),
+        axis_y=rrb.ScalarAxis(range=error_range(picture.errors)),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=True),
+        background=style.plot_background(),
+    )
+
+
+def _whole_voyage(picture: Pictured, voyage: str) -> rrb.TimeAxis:
+    measured = picture.tracks.measured.filter(pl.col("voyage") == voyage)
+    return timeline.whole_voyage(measured, after=0.24)
+
+
+def error_range(errors: pl.DataFrame) -> tuple[float, float]:
+    """From zero to the largest; a rollout that ran away does not flatten the others."""
+    values = np.concatenate([display.column(errors, name) for name in (BEFORE, AFTER)])
+    middle = float(np.nanmedian(display.column(errors, BEFORE)))
+    most = max(min(float(np.nanmax(values)), CUT_OFF * middle), 1e-3)
+    return -0.04 * most, 1.08 * most
+
+
+# --- what is sent ---------------------------------------------------------------------------------
+
+
+def send(recording: rr.RecordingStream, picture: Pictured) -> None:
+    """Charts, forces, errors and the report."""
+    trajectory.send(recording, picture.tracks, ROOM)
+    for voyage in picture.voyages:
+        _send_forces(recording, picture, voyage)
+        _send_errors(recording, picture, voyage)
+    said = picture.exhibit.report.translate(DRAWABLE)
+    recording.log("/report", rr.TextDocument(said, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
+    rows = picture.pushed.filter(pl.col("voyage") == voyage)
+    lacks, low, high, named = (
+        rows.filter(pl.col("part") == part) for part in (LACKS, "low", "high", "named")
+    )
+    time, begins = display.column(lacks, "time"), display.pieces(lacks)
+    if not len(time):
+        return
+    ends, none = time[[0, -1]], np.empty(0, dtype=np.intp)
+    for axis in forces.AXES:
+        _, factor = forces.unit(picture.pushed, axis)
+        band = np.column_stack([display.column(end, axis) for end in (low, high)])
+        # drawn in order of names: zero, the band, what the model lacks, what was named
+        for name, at, values, cuts, labels, colour, width in (
+            ("axis", ends, np.zeros((2, 1)), none, ["zero"], style.ZERO, 1.0),
+            ("band", time, band, begins, ["90 % band"] * 2, style.faded(style.MEASURED), 0.7),
+            ("lacks", time, display.column(lacks, axis)[:, None], begins, [LACKS], style.MEASURED,
+             1.5),
+            ("named", time, display.column(named, axis)[:, None], begins,
+             [f"force of {_spoken(picture.exhibit.named)}"], NAMED, 1.5),
+        ):  # fmt: skip
+            if np.isfinite(values).any():
+                timeline.send_lines(
+                    recording, entity("unexplained", voyage, axis, name), at, values / factor,
+                    cuts, labels, colour, width,
+                )  # fmt: skip
+
+
+def _send_errors(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
+    """A level line a window."""
+    rows = picture.errors.filter(pl.col("voyage") == voyage)
+    begin = display.column(rows, "time")
+    time = np.column_stack((begin, begin + display.column(rows, "seconds"))).ravel()
+    for (name, model), colour in zip(picture.models.items(), style.MODELS, strict=False):
+        values = np.repeat(display.column(rows, name), 2)
+        if np.isfinite(values).any():
+            timeline.send_lines(
+                recording, entity("errors", voyage, model), time, values[:, None],
+                np.arange(2, len(time), 2), [model], colour, 3.0,
+            )  # fmt: skip

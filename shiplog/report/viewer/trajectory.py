@@ -1,0 +1,346 @@
+"""The track on a chart: north up, hulls to scale, every rollout from where it was started.
+
+Rerun's 2D views have y pointing down, so a point is drawn at (y₀, -x₀).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from shiplog.report.viewer import display, style
+from shiplog.report.viewer.display import Drawn
+from shiplog.report.viewer.style import entity
+
+HULL = np.array(  # (ahead, starboard) in ship lengths and breadths: a transom and a pointed bow
+    [(0.5, 0.0), (0.28, 0.5), (-0.42, 0.5), (-0.5, 0.38), (-0.5, -0.38), (-0.42, -0.5),
+     (0.28, -0.5), (0.5, 0.0)]
+)  # fmt: skip
+NORTHWARD = pl.DataFrame({"x0": [0.0], "y0": [0.0], "heading": [0.0]})
+FARTHEST = 500.0  # m
+MOST_HULLS = 60  # on one track: more would hide the lines
+
+
+def blueprint(drawn: Drawn, voyage: str | None) -> rrb.View | None:
+    """The chart of one voyage."""
+    if voyage is None:
+        return None
+    drawn, unit = in_chart_units(drawn)
+    east, north = extent(drawn, voyage)
+    every = hull_interval(drawn.measured.filter(pl.col("voyage") == voyage), drawn.ship_length)
+    return rrb.Spatial2DView(
+        origin=entity("track", voyage),
+        name=f"Track, north up, {unit}: measured black, hull every {every:g} s, dots start windows",
+        background=list(style.PAPER),
+        visual_bounds=rrb.VisualBounds2D(x_range=list(east), y_range=[-north[1], -north[0]]),
+    )
+
+
+def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None:
+    """Tracks and hulls of every voyage, measured and simulated. `room`: as for `extent`."""
+    drawn, _ = in_chart_units(drawn)
+    measured = drawn.measured
+    simulated = drawn.simulated
+    shown = display.shown_seeds(drawn)
+    for voyage in drawn.voyages:
+        _send_chart(recording, drawn, voyage, room)
+        rows = measured.filter(pl.col("voyage") == voyage)
+        _send_measured(recording, drawn, voyage, rows)
+        _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
+        for model, colour in style.colours(drawn.models).items():
+            rollouts = simulated.filter(pl.col("voyage") == voyage, pl.col("model") == model)
+            bold = pl.col("seed") == shown[model]
+            _send_simulated(recording, drawn, voyage, model, colour, rollouts.filter(bold))
+            others = _strips(rollouts.filter(~bold), ("seed", "window"))
+            recording.log(
+                entity("track", voyage, "seeds", model),
+                rr.LineStrips2D(
+                    others,
+                    colors=style.faded(colour),
+                    radii=rr.Radius.ui_points(0.5),
+                    draw_order=12.0,
+                ),
+                static=True,
+            )
+
+
+def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
+    """Metres, or kilometres at sea: Rerun 0.41 pales lines far from the origin of a 2D view."""
+    places = np.concatenate([display.column(drawn.measured, name) for name in ("x0", "y0")])
+    if not (np.abs(places) > FARTHEST).any():
+        return drawn, "metres"
+    km = [pl.col(name) / 1000.0 for name in ("x0", "y0")]
+    small = replace(
+        drawn,
+        ship_length=drawn.ship_length / 1000.0,
+        ship_breadth=drawn.ship_breadth / 1000.0,
+        ship_outline=tuple((x / 1000.0, y / 1000.0) for x, y in drawn.ship_outline),
+        measured=drawn.measured.with_columns(km),
+        simulated=drawn.simulated.with_columns(km),
+        banks=tuple(tuple((x / 1000.0, y / 1000.0) for x, y in bank) for bank in drawn.banks),
+    )
+    return small, "kilometres"
+
+
+def positions(table: pl.DataFrame) -> NDArray[np.float64]:
+    """[N, 2] where the rows are on the chart: east, and south."""
+    return np.column_stack((display.column(table, "y0"), -display.column(table, "x0")))
+
+
+def outline(drawn: Drawn) -> NDArray[np.float64]:
+    """[K, 2] (ahead, starboard) of midship: the ship's own outline, closed, or one like it."""
+    if not drawn.ship_outline:
+        return HULL * (drawn.ship_length, drawn.ship_breadth)
+    return np.array([*drawn.ship_outline, drawn.ship_outline[0]], dtype=float)
+
+
+def hulls(table: pl.DataFrame, outline: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[N, K, 2] the outline [K, 2] of the ship at every row, to scale."""
+    ahead, starboard = outline.T
+    heading = np.radians(display.column(table, "heading"))[:, None]
+    east = ahead * np.sin(heading) + starboard * np.cos(heading)
+    north = ahead * np.cos(heading) - starboard * np.sin(heading)
+    return positions(table)[:, None, :] + np.stack((east, -north), axis=-1)
+
+
+def hull_interval(rows: pl.DataFrame, length: float) -> float:
+    """The round number of seconds that leaves at most MOST_HULLS outlines on a track, and mostly
+    a ship's length between them."""
+    time = display.column(rows, "time")
+    sailed = float(np.nansum(np.linalg.norm(np.diff(positions(rows), axis=0), axis=1)))
+    count = min(max(sailed / length, 1.0), MOST_HULLS)
+    least = (time[-1] - time[0]) / count if len(time) else 1.0
+    choices = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600]
+    return float(next((c for c in choices if c >= least), 3600 * math.ceil(least / 3600)))
+
+
+def grid_step(extent: float) -> float:
+    """Metres between grid lines: 1, 2 or 5 times a power of ten, some five lines a side."""
+    power = 10.0 ** math.floor(math.log10(extent / 5.0))
+    return next(power * k for k in (1.0, 2.0, 5.0, 10.0) if extent / (power * k) <= 7.5)
+
+
+def _send_measured(
+    recording: rr.RecordingStream, drawn: Drawn, voyage: str, rows: pl.DataFrame
+) -> None:
+    recording.log(
+        entity("track", voyage, "measured"),
+        rr.LineStrips2D(
+            _lines(positions(rows), display.pieces(rows)),
+            colors=style.MEASURED,
+            radii=rr.Radius.ui_points(1.25),
+            draw_order=10.0,
+        ),
+        static=True,
+    )
+    every = hull_interval(rows, drawn.ship_length)
+    marks = rows.filter((pl.col("time") / every).floor().diff().fill_null(1) > 0)
+    recording.log(
+        entity("track", voyage, "measured", "hulls"),
+        rr.LineStrips2D(
+            _whole(hulls(marks, outline(drawn))),
+            colors=style.faded(style.MEASURED, 0.8),
+            radii=rr.Radius.ui_points(0.5),
+            draw_order=11.0,
+        ),
+        static=True,
+    )
+    _send_moving_hull(recording, drawn, voyage, "measured", style.MEASURED, rows)
+
+
+def _send_simulated(
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    voyage: str,
+    model: str,
+    colour: style.Colour,
+    rollouts: pl.DataFrame,
+) -> None:
+    recording.log(
+        entity("track", voyage, "simulated", model),
+        rr.LineStrips2D(
+            _strips(rollouts, ("window",)),
+            colors=colour,
+            radii=rr.Radius.ui_points(1.0),
+            draw_order=20.0,
+        ),
+        static=True,
+    )
+    _send_moving_hull(recording, drawn, voyage, model, colour, rollouts)
+
+
+def _send_window_starts(
+    recording: rr.RecordingStream, voyage: str, simulated: pl.DataFrame
+) -> None:
+    """Every rollout of a window starts at the measured state: one dot serves all models."""
+    points = positions(simulated.group_by("window").agg(pl.all().sort_by("time").first()))
+    recording.log(
+        entity("track", voyage, "window_starts"),
+        rr.Points2D(
+            points[np.isfinite(points).all(axis=1)],
+            colors=style.MEASURED,
+            radii=rr.Radius.ui_points(3.5),
+            draw_order=25.0,
+        ),
+        static=True,
+    )
+
+
+def _send_moving_hull(
+    recording: rr.RecordingStream,
+    drawn: Drawn,
+    voyage: str,
+    whose: str,
+    colour: style.Colour,
+    rows: pl.DataFrame,
+) -> None:
+    heading = np.radians(display.column(rows, "heading"))
+    points = np.column_stack((positions(rows), np.zeros(len(rows))))
+    valid = np.isfinite(points).all(axis=1) & np.isfinite(heading)
+    if not valid.any():
+        return
+    zero = np.zeros(int(valid.sum()))
+    half = heading[valid] / 2.0  # about Rerun's z, which points into the chart: clockwise
+    path = entity("track", voyage, "now", whose)
+    time = display.column(rows, "time")[valid]
+    recording.send_columns(  # from the first instant on: before it a hull would lie at the origin
+        path,
+        indexes=[rr.TimeColumn(style.TIMELINE, duration=time[:1])],
+        columns=rr.LineStrips2D.columns(
+            strips=list(hulls(NORTHWARD, outline(drawn))),
+            colors=[colour],
+            radii=-1.5,  # negative: points of the screen, as Radius.ui_points makes them
+            draw_order=30.0,
+        ),
+    )
+    recording.send_columns(
+        path,
+        indexes=[rr.TimeColumn(style.TIMELINE, duration=time)],
+        columns=rr.Transform3D.columns(
+            translation=points[valid],
+            quaternion=np.column_stack((zero, zero, np.sin(half), np.cos(half))),
+        ),
+    )
+
+
+def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: float) -> None:
+    """Grid lines at round metres, and what the site has."""
+    east, north = extent(drawn, voyage, room)
+    step = grid_step(max(east[1] - east[0], north[1] - north[0]))
+    meridians = np.arange(math.ceil(east[0] / step), math.floor(east[1] / step) + 1) * step
+    parallels = np.arange(math.ceil(north[0] / step), math.floor(north[1] / step) + 1) * step
+    beyond = 3 * step  # lines go on where the view is wider than the track
+    grid = [
+        [(x, -north[1] - beyond), (x, beyond - north[0])]
+        for x in np.arange(meridians[0] - beyond, meridians[-1] + beyond + step / 2, step)
+    ]
+    grid += [
+        [(east[0] - beyond, -y), (east[1] + beyond, -y)]
+        for y in np.arange(parallels[0] - beyond, parallels[-1] + beyond + step / 2, step)
+    ]
+    recording.log(
+        entity("track", voyage, "grid"),
+        rr.LineStrips2D(grid, colors=style.GRID, radii=rr.Radius.ui_points(0.5), draw_order=1.0),
+        static=True,
+    )
+    inside = 0.04 * (north[1] - north[0])
+    places = [(x, -north[0] - inside) for x in meridians]
+    places += [(east[0], -y) for y in parallels]
+    names = [f"y₀ {x:g}" for x in meridians] + [f"x₀ {y:g}" for y in parallels]
+    recording.log(
+        entity("track", voyage, "grid", "labels"),
+        rr.Points2D(
+            places,
+            labels=names,
+            show_labels=True,
+            colors=style.TICK,
+            radii=rr.Radius.ui_points(0.0),
+        ),
+        static=True,
+    )
+    if drawn.banks:
+        recording.log(
+            entity("track", voyage, "banks"),
+            rr.LineStrips2D(
+                [[(y, -x) for x, y in bank] for bank in drawn.banks],
+                colors=style.BANK,
+                radii=rr.Radius.ui_points(2.0),
+                draw_order=2.0,
+            ),
+            static=True,
+        )
+
+
+def extent(
+    drawn: Drawn, voyage: str, room: float = 0.0
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """East and north ranges that show all that was measured with room for what was simulated.
+
+    What a diverging model does far outside is left there: it must not shrink the ship to a dot.
+
+    room   how far beyond it is followed, in sizes of the measured track
+    """
+    of = pl.col("voyage") == voyage
+    rows, simulated = drawn.measured.filter(of), drawn.simulated.filter(of)
+    ranges, followed = [], []
+    for name in ("y0", "x0"):
+        values = display.column(rows, name)
+        values = values[np.isfinite(values)]
+        low, high = (values.min(), values.max()) if len(values) else (0.0, 0.0)
+        ranges.append((float(low), float(high)))
+        followed.append(display.column(simulated, name))
+    size = max(high - low for low, high in ranges)
+    margin = max(0.08 * size, 1.5 * drawn.ship_length)
+    (west, east), (south, north) = (
+        _widened(ends, values, room * size) for ends, values in zip(ranges, followed, strict=True)
+    )
+    return (west - margin, east + margin), (south - margin, north + margin)
+
+
+def _widened(
+    ends: tuple[float, float], values: NDArray[np.float64], most: float
+) -> tuple[float, float]:
+    """The range with these values in it, but wider by `most` on either side at most."""
+    low, high = ends
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return low, high
+    return (
+        min(low, max(float(values.min()), low - most)),
+        max(high, min(float(values.max()), high + most)),
+    )
+
+
+def _strips(rollouts: pl.DataFrame, by: tuple[str, ...]) -> list[NDArray[np.float64]]:
+    """One line per rollout."""
+    if rollouts.is_empty():
+        return []
+    begins = np.flatnonzero(rollouts.select(pl.struct(by).rle_id().diff()).to_series() == 1)
+    return _lines(positions(rollouts), begins)
+
+
+def _lines(points: NDArray[np.float64], begins: NDArray[np.intp]) -> list[NDArray[np.float64]]:
+    """The points cut at `begins` and where one is not finite."""
+    lines = []
+    for piece in np.split(points, begins):
+        valid = np.isfinite(piece[:, 0] + piece[:, 1])
+        lines += [part for part in _runs(piece, valid) if len(part) > 1]
+    return lines
+
+
+def _runs(piece: NDArray[np.float64], valid: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    if valid.all():
+        return [piece]
+    edges = np.flatnonzero(np.diff(valid.astype(np.int8))) + 1
+    parts = zip(np.split(piece, edges), np.split(valid, edges), strict=True)
+    return [part for part, good in parts if good.all()]
+
+
+def _whole(outlines: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    return list(outlines[np.isfinite(outlines).all(axis=(1, 2))])

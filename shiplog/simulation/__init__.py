@@ -1,0 +1,1 @@
+"""Rollouts, their derivatives and errors; baselines, coverage, the interval of a prediction."""

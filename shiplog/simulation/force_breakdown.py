@@ -1,0 +1,49 @@
+"""Who pushes when: the parts of the force along a measured voyage."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import polars as pl
+
+from shiplog.channels import STATE
+from shiplog.models.hybrid import Hybrid
+from shiplog.models.mmg import MMG, body
+from shiplog.profile import Profile
+from shiplog.simulation.sensitivities import Simulator, true_wind
+
+
+def along(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.DataFrame:
+    """Part by part at every measured second: voyage, time, part, surge [N], sway [N], yaw [N m].
+
+    seconds   the 1 Hz table with `elapsed`; the forces are those at the measured motion. What a
+              hybrid's network adds is its acceleration times the mass with added mass.
+    """
+    state = jnp.array(seconds.select([c.name for c in STATE]).to_numpy())
+    actuator = jnp.array(seconds.select(profile.actuator_names).to_numpy())
+    if profile.has_wind:
+        blowing = true_wind(np.asarray(state), seconds.select(profile.wind_names).to_numpy())
+    else:
+        blowing = np.zeros((seconds.height, 2))
+    found = _parts(simulator.model, jnp.asarray(simulator.theta), state, actuator, blowing)
+    found["total"] = sum(found.values())
+    index = seconds.select("voyage", pl.col("elapsed").alias("time"))
+    tables = []
+    for name, force in found.items():
+        values = np.asarray(force)
+        columns = {axis: values[:, i] for i, axis in enumerate(("surge", "sway", "yaw"))}
+        tables.append(index.with_columns(pl.lit(name).alias("part")).hstack(pl.DataFrame(columns)))
+    return pl.concat(tables)
+
+
+@jax.jit
+def _parts(model, theta, state, actuator, wind):
+    physics: MMG = model.physics if isinstance(model, Hybrid) else model
+    count = len(physics.names)
+    parts = dict(physics.forces(theta[:count], state, actuator, wind))
+    if isinstance(model, Hybrid):
+        p = dict(zip(physics.names, theta[:count], strict=True))
+        added = model.added(theta, state, actuator, wind)
+        parts["network"] = body.forces_of(p, physics.geometry, added)
+    return parts

@@ -1,0 +1,333 @@
+"""Rollouts of physical models, compiled, and their exact derivatives.
+
+A rollout runs step by step; its derivatives need no second one. Along the path that it took,
+ν̇ is differentiated at all samples at once (reverse mode: three outputs, any number of
+parameters), and what a parameter does to the path is then a linear recursion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import torch
+from jax import Array
+
+from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.jit_cache import traced
+from shiplog.voyages.windows import Windows
+
+jax.config.update("jax_enable_x64", True)
+
+VELOCITY = np.array(VELOCITY_IN_STATE)
+CHUNK = 128  # windows at a time: their sensitivities to 60 parameters are 45 MB
+
+
+class Physical(Protocol):
+    """Equations of motion that can be compiled, their numbers in a vector of their own.
+
+    A JAX pytree: `jax.tree_util.register_static` for what is hashable and never changes shape.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def substeps(self) -> int:
+        """Euler steps within each measured one."""
+        ...
+
+    def acceleration(
+        self, theta: Array, state: Array, actuator: Array, true_wind: Array
+    ) -> Array: ...
+
+
+class Series(NamedTuple):
+    """What drives N rollouts, and what was measured. The wind is the true one.
+
+    A simulation of a ship that moves otherwise than the measured one feels another apparent
+    wind, so the measured apparent wind and motion are turned into the wind over ground first.
+
+    measured   [N, I, 6]  channels.STATE; its first row is where a rollout begins
+    actuator   [N, I, A]  held over each step
+    wind       [N, I, 2]  where it comes from, along x₀ and y₀ [m/s]; zero without a sensor
+    dt         [N, I - 1]
+    weight     [N]        of each window in sums; 0 leaves it out
+    """
+
+    measured: np.ndarray
+    actuator: np.ndarray
+    wind: np.ndarray
+    dt: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Trapezoidal weights of the samples [N, I] in s, as in Eq. 8."""
+        half = 0.5 * self.dt
+        return np.pad(half, ((0, 0), (1, 0))) + np.pad(half, ((0, 0), (0, 1)))
+
+
+def series(windows: Windows) -> Series:
+    """Windows as physical models take them."""
+    measured = windows.state.double().numpy()
+    wind = windows.wind.double().numpy()
+    return Series(
+        measured,
+        windows.actuator.double().numpy(),
+        true_wind(measured, wind) if wind.shape[-1] else np.zeros((*measured.shape[:2], 2)),
+        windows.dt.double().numpy(),
+        np.ones(len(measured)),
+    )
+
+
+def true_wind(state: np.ndarray, wind: np.ndarray) -> np.ndarray:
+    """The wind over ground [..., 2], where it comes FROM along x₀ and y₀, of the apparent one.
+
+    state   [..., 6]  channels.STATE
+    wind    [..., 2]  apparent wind speed [m/s] and angle [rad]
+    """
+    ahead = wind[..., 0] * np.cos(wind[..., 1]) - state[..., 1]
+    starboard = wind[..., 0] * np.sin(wind[..., 1]) - state[..., 3]
+    c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+    return np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+
+
+def apparent_wind(state: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """The inverse of `true_wind`: speed and angle in (-π, π] [..., 2]."""
+    c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+    ahead = c * true[..., 0] + s * true[..., 1] + state[..., 1]
+    starboard = c * true[..., 1] - s * true[..., 0] + state[..., 3]
+    return np.stack((np.hypot(ahead, starboard), np.arctan2(starboard, ahead)), -1)
+
+
+def rate(model: Physical, theta: Array, state: Array, actuator: Array, wind: Array) -> Array:
+    """ẋ [..., 6] of Eq. 2."""
+    acceleration = model.acceleration(theta, state, actuator, wind)
+    c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
+    u, v = state[..., 1], state[..., 3]
+    return jnp.stack(
+        (
+            c * u - s * v,
+            acceleration[..., 0],
+            s * u + c * v,
+            acceleration[..., 1],
+            state[..., 5],
+            acceleration[..., 2],
+        ),
+        axis=-1,
+    )
+
+
+@traced
+def _rollout(model, theta, start, actuator, wind, dt):
+    """[N, I, 6] of inputs [N, I - 1, ...], a step each."""
+
+    def step(state, driven):
+        at, blowing, length = driven
+        state = state + length[:, None] * rate(model, theta, state, at, blowing)
+        return state, state
+
+    driven = (jnp.moveaxis(actuator, 1, 0), jnp.moveaxis(wind, 1, 0), dt.T)
+    _, states = jax.lax.scan(step, start, driven)
+    return jnp.concatenate((start[:, None], jnp.moveaxis(states, 0, 1)), axis=1)
+
+
+def _fine(actuator, wind, dt, substeps: int):
+    """Inputs held over each step, the step cut into `substeps`."""
+    held = (actuator[:, :-1], wind[:, :-1], dt / substeps)
+    if substeps == 1:
+        return held
+    return tuple(jnp.repeat(values, substeps, axis=1) for values in held)
+
+
+def rollout(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
+    """Explicit Euler (Eq. 9) from the first measured state: states [N, I, 6].
+
+    The paper's step is the sampling interval; a model with `substeps` cuts it, inputs held.
+    """
+    whole = padded(data)
+    driven = _fine(whole.actuator, whole.wind, whole.dt, model.substeps)
+    states = _rollout(model, theta, whole.measured[:, 0], *driven)
+    return np.asarray(states)[: len(data.measured), :: model.substeps]
+
+
+def padded(data: Series) -> Series:
+    """Filled up with windows of weight 0 to the next power of two (multiples of CHUNK above):
+    a shape that has been compiled once serves every selection of voyages."""
+    count = len(data.measured)
+    size = -(-count // CHUNK) * CHUNK if count > CHUNK else max(8, 1 << (count - 1).bit_length())
+    if size == count:
+        return data
+    last = data._replace(weight=np.zeros(count))
+    return Series(
+        *(
+            np.concatenate((values, np.repeat(filler[-1:], size - count, axis=0)))
+            for values, filler in zip(data, last, strict=True)
+        )
+    )
+
+
+@traced
+def _linearised(model, theta, start, actuator, wind, dt, *, free=None):
+    """`free`: indices of the parameters to differentiate by; all of them if None."""
+    actuator, wind, dt = _fine(actuator, wind, dt, model.substeps)
+    states = _rollout(model, theta, start, actuator, wind, dt)
+    moving = tuple(range(len(theta))) if free is None else free
+    parts = jax.lax.split(theta, [1] * len(theta))
+    count = len(moving)
+
+    def slopes(state, at, blowing):
+        def acceleration(state, values):
+            put = dict(zip(moving, jax.lax.split(values, [1] * count), strict=True))
+            whole = jnp.concatenate([put.get(i, part) for i, part in enumerate(parts)])
+            return model.acceleration(whole, state, at, blowing)
+
+        values = jnp.concatenate([parts[i] for i in moving])
+        return jax.jacrev(acceleration, argnums=(0, 1))(state, values)
+
+    by_state, by_theta = jax.vmap(jax.vmap(slopes))(states[:, :-1], actuator, wind)
+
+    def step(sensitivity, along):
+        state, a, b, length = along
+        c, s = jnp.cos(state[:, 4, None]), jnp.sin(state[:, 4, None])
+        u, v = state[:, 1, None], state[:, 3, None]
+        du, dv, dpsi, dr = (sensitivity[:, i] for i in (1, 3, 4, 5))
+        motion = a @ sensitivity + b
+        change = jnp.stack(
+            (
+                c * du - s * dv - (s * u + c * v) * dpsi,
+                motion[:, 0],
+                s * du + c * dv + (c * u - s * v) * dpsi,
+                motion[:, 1],
+                dr,
+                motion[:, 2],
+            ),
+            axis=1,
+        )
+        sensitivity = sensitivity + length[:, None, None] * change
+        return sensitivity, sensitivity
+
+    first = jnp.zeros((start.shape[0], 6, count))
+    along = (
+        jnp.moveaxis(states[:, :-1], 1, 0),
+        jnp.moveaxis(by_state, 1, 0),
+        jnp.moveaxis(by_theta, 1, 0),
+        dt.T,
+    )
+    _, path = jax.lax.scan(step, first, along)
+    path = jnp.concatenate((first[:, None], jnp.moveaxis(path, 0, 1)), axis=1)
+    return states[:, :: model.substeps], path[:, :: model.substeps]
+
+
+def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.ndarray, np.ndarray]:
+    """States [N, I, 6] and their derivatives by θ [N, I, 6, P], exact for the Euler rollout."""
+    whole = padded(data)
+    states, slopes = _linearised(
+        model, theta, whole.measured[:, 0], whole.actuator, whole.wind, whole.dt
+    )
+    count = len(data.measured)
+    return np.asarray(states)[:count], np.asarray(slopes)[:count]
+
+
+@traced
+def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=None):
+    states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free=free)
+    scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
+    error = (states[..., VELOCITY] - measured[..., VELOCITY]) * scale
+    slope = slopes[:, :, VELOCITY] * scale[..., None]
+    pull = jnp.einsum("nki,nkip->np", error, slope)
+    loss = (error**2).sum((1, 2))
+    # A window of weight 0 may have run away, and 0 · inf is not 0.
+    used = (weight > 0.0)[:, None, None, None]
+    slope = jnp.where(used, slope * jnp.sqrt(weight)[:, None, None, None], 0.0)
+    flat = slope.reshape(-1, slope.shape[-1])
+    return loss, pull, flat.T @ flat
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Least squares of the rollout error around one θ, summed over windows.
+
+    loss   [N]     L of each window (Eq. 8)
+    pull   [N, P]  half its gradient
+    gram   [P, P]  weighted sum of JᵀJ
+    """
+
+    loss: np.ndarray
+    pull: np.ndarray
+    gram: np.ndarray
+
+
+def normal(
+    model: Physical, theta: np.ndarray, data: Series, free: tuple[int, ...] | None = None
+) -> Normal:
+    """Loss, gradient and Gauss-Newton matrix in flat memory, CHUNK windows at a time.
+
+    free   indices of the parameters wanted; then P is their number
+    """
+    whole = padded(data)
+    parts = [
+        _normal(
+            model,
+            theta,
+            *(values[at : at + CHUNK] for values in (*whole[:4], whole.steps, whole.weight)),
+            free=free,
+        )
+        for at in range(0, len(whole.measured), CHUNK)
+    ]
+    count = len(data.measured)
+    loss, pull = (np.concatenate([p[i] for p in parts])[:count] for i in (0, 1))
+    return Normal(loss, pull, np.sum([p[2] for p in parts], axis=0))
+
+
+def losses(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
+    """L of each window [N], infinite where the rollout diverges."""
+    return state_losses(rollout(model, theta, data), data)
+
+
+def state_losses(states: np.ndarray, data: Series) -> np.ndarray:
+    """The same of states [N, I, 6] that are simulated already."""
+    error = states[..., VELOCITY] - data.measured[..., VELOCITY]
+    with np.errstate(over="ignore", invalid="ignore"):
+        each = (data.steps[..., None] * (error * np.array(VELOCITY_WEIGHTS)) ** 2).sum((1, 2))
+    return np.where(np.isfinite(each), each, np.inf)
+
+
+def pick(data: Series, rows: Sequence[int] | np.ndarray | slice) -> Series:
+    """Some of the windows."""
+    return Series(*(values[rows] for values in data))
+
+
+def spread(model: Physical, theta: np.ndarray, covariance: np.ndarray, data: Series) -> np.ndarray:
+    """Standard deviation of the states [N, I, 6] that the parameters' uncertainty alone makes."""
+    parts = []
+    for at in range(0, len(data.measured), CHUNK):
+        part = pick(data, slice(at, at + CHUNK))
+        slopes = linearised(model, theta, part)[1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            variance = np.einsum("nkip,pq,nkiq->nki", slopes, covariance, slopes, optimize=True)
+        known = np.isfinite(variance)
+        parts.append(np.sqrt(np.where(known, np.maximum(variance, 0.0), np.inf)))
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Equations, their numbers, and how sure those are: what a run of a physical model holds."""
+
+    model: Physical
+    theta: np.ndarray  # [P]
+    covariance: np.ndarray  # [P, P]
+
+    def simulate(self, windows: Windows) -> torch.Tensor:
+        """States [N, I, 6], as shiplog.simulation.rollout gives them."""
+        return torch.from_numpy(rollout(self.model, self.theta, series(windows)).copy())
+
+    def spread(self, windows: Windows) -> np.ndarray:
+        """[N, I, 6]"""
+        return spread(self.model, self.theta, self.covariance, series(windows))

@@ -1,0 +1,117 @@
+"""One ship's equations, starting values and windows: what an identification begins with."""
+
+from __future__ import annotations
+
+import fnmatch
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from shiplog.exceptions import RunError, WindowError, listed, nearest
+from shiplog.models import mmg
+from shiplog.profile import Profile
+from shiplog.simulation.sensitivities import Series, losses, series
+from shiplog.training.run_config import Config
+from shiplog.voyages import one_hertz, windows
+from shiplog.voyages.split import plan
+from shiplog.voyages.windows import Windows
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """One ship's equations, starting values and windows.
+
+    data            training windows
+    voyages, days   [N]  group of each of them; the same data under two names is one voyage
+    free            [P]  which parameters may move
+    unseen          windows of the validation voyages; None without
+    """
+
+    model: mmg.MMG
+    start: mmg.Parameters
+    data: Series
+    voyages: list[str]
+    days: list[str]
+    free: np.ndarray
+    unseen: Windows | None
+
+
+def prepare(
+    config: Config,
+    profile: Profile,
+    learnt: pl.DataFrame,
+    held: pl.DataFrame,
+    planned: pl.DataFrame,
+    parameters: Path | None,
+) -> Prepared:
+    """Equations, starting values and windows of a run. Raises ProfileError or WindowError.
+
+    learnt, held   seconds of the training and of the validation voyages
+    planned        the training windows
+    """
+    off = config.physics.without
+    ship, main, estimates = mmg.geometry_of(profile, off)
+    for sentence in estimates:
+        log.info(sentence)
+    path = parameters or mmg.beside(profile.source)
+    start = mmg.load(path, ship, off) if path else mmg.estimated(ship, main)
+    if path is None:
+        log.info("no published coefficients for this ship: %s", start.source)
+    names = (profile.actuator_names, profile.wind_names)
+    cut = windows.cut(learnt, planned, config.window, *names)
+    _refuse_none(planned, config.window, config.split.training)
+    unseen = None
+    if held.height:
+        whole = plan(held, "ref", config.window)
+        _refuse_none(whole, config.window, config.split.validation)
+        unseen = windows.cut(held, whole, config.window, *names)
+    twin: dict[str, str] = {}
+    for left, right, _ in one_hertz.shared_rows(learnt).iter_rows():
+        twin[str(right)] = twin.get(str(left), str(left))
+    first = dict(
+        learnt.group_by("voyage").agg(pl.col("time").min().dt.strftime("%Y-%m-%d")).iter_rows()
+    )
+    voyages = [twin.get(name, name) for name in map(str, cut.plan["voyage"])]
+    data = series(cut)
+    model = _stable(mmg.MMG(ship, config.physics.substeps), start.values, data)
+    return Prepared(
+        model, start, data, voyages, [first[v] for v in voyages],
+        _free(config.physics.free, start.names), unseen,
+    )  # fmt: skip
+
+
+def _refuse_none(planned: pl.DataFrame, size: int, voyages: Sequence[str]) -> None:
+    if planned.height == 0:
+        raise WindowError(
+            f"No window of {size} s in {listed(voyages)}.", hint="choose a shorter --window."
+        )
+
+
+def _stable(model: mmg.MMG, values: np.ndarray, data: Series) -> mmg.MMG:
+    """With as many Euler steps a second as a small, quick ship needs to hold every window."""
+    for substeps in (1, 2, 4, 8):
+        finer = mmg.MMG(model.geometry, max(substeps, model.substeps))
+        if np.isfinite(losses(finer, values, data)).all():
+            if finer.substeps > model.substeps:
+                log.info("%d Euler steps within each second keep the ship stable", finer.substeps)
+            return finer
+    return model  # the identification says what is wrong
+
+
+def _free(patterns: Sequence[str], names: tuple[str, ...]) -> np.ndarray:
+    """Which parameters may move. Raises RunError for a pattern that none has."""
+    if not patterns:
+        return np.ones(len(names), dtype=bool)
+    for pattern in patterns:
+        if not fnmatch.filter(names, pattern):
+            raise RunError(
+                f"No parameter is called {pattern!r}{nearest(pattern, names)}.",
+                hint=f"--free takes names or patterns such as 'wind.*': {listed(names, most=99)}.",
+            )
+    return np.array([any(fnmatch.fnmatch(n, p) for p in patterns) for n in names])

@@ -1,0 +1,328 @@
+"""One log to one 10 Hz table at midship, with a mark on every row and a finding for every fault.
+
+Value columns are SI, angles in (-π, π]; a value that was not measured is null. The marks are
+`channels.Quality`; what they mean for the 1 Hz averages stands in `table`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+
+from shiplog import channels, frames
+from shiplog.channels import Quality
+from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
+from shiplog.logs.health_report import Finding, Instrument, VoyageReport
+from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.profile import Actuator, Profile, Sensor, Source
+from shiplog.voyages import fault_detection, resampling, sensor_consistency
+from shiplog.voyages import one_hertz as tables
+from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.voyage_grid import Grid, mark_gaps, mark_holds, mark_jumps
+
+CLOCKS = {  # of a source: its column, and the one that it is held against
+    "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
+    "publish": ("publish_time", "log_time"),
+}  # fmt: skip
+
+RESOLVED = {  # of a sensor: the channel whose unit its resolution has
+    "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
+    "yaw_rate": channels.YAW_RATE, "wind": channels.WIND_SPEED,
+}  # fmt: skip
+
+# Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
+# rows (100 s) are no voyage. A million rows, 28 hours, take 100 MB, whatever they hold.
+LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
+
+
+@dataclass(frozen=True)
+class Voyage:
+    """A log as the store takes it."""
+
+    name: str
+    profile: Profile
+    contents: Contents
+    table: pl.DataFrame  # time, the profile's columns, quality
+    report: VoyageReport
+    datum: tuple[float, float] | None  # latitude, longitude [deg] of x0 = y0 = 0
+    estimates: tuple[Estimate, ...]  # what the sensors say of each other
+    corrected: tuple[Estimate, ...] | None = None  # of them, what was put right; None: not asked
+
+
+def ingest(path, profile: Profile) -> Voyage:
+    """Read one log through a profile. Raises LogUnreadable, ChannelMissing, ProfileError."""
+    reading = read(path, profile.wanted())
+    return build(reading, profile)
+
+
+def build(reading: Reading, profile: Profile) -> Voyage:
+    """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
+    _require(reading, profile)
+    reading, left_out = _without_strays(reading, profile)
+    sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
+    base = sampled["heading"].time
+    if len(base) < 2:
+        raise LogUnreadable(
+            f"{reading.contents.path.name} holds {len(base)} usable heading sample(s) on "
+            f"{profile.sensors.heading.topic}.",
+            hint="check the topic and the `clock` in the profile; `shiplog check` lists topics.",
+        )
+    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
+    start, end = _span(base, [*sampled.values(), *driven.values()])
+    if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
+        raise LogUnreadable(
+            f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
+            f"{(end - start) * 1e-9 / resampling.DAY_S:.1f} days apart.",
+            hint="set another `clock` for the heading in the profile, or record the log again "
+            "with a clock that runs.",
+        )
+    grid = Grid(resampling.grid(start, end))
+    datum = _motion(grid, reading, profile, sampled)
+    if profile.sensors.wind is not None:
+        _wind(grid, profile.sensors.wind, sampled["wind"])
+    for actuator in profile.actuators:
+        _actuator(grid, actuator, driven[actuator.name])
+    mark_gaps(grid)
+    mark_holds(grid, profile, sampled)
+    mark_jumps(grid, profile, sampled)
+    grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
+    table = pl.DataFrame(
+        {"time": grid.times}
+        | {name: grid.columns[name] for name in profile.columns}
+        | {"quality": grid.marks}
+    ).with_columns(
+        pl.col("time").cast(pl.Datetime("ns", "UTC")),
+        pl.col(profile.columns).fill_nan(None),
+    )
+    estimates = tuple(sensor_consistency.estimates(table, profile))
+    said = sensor_consistency.findings(estimates, table.height, profile)
+    named = table.lazy().with_columns(voyage=pl.lit(""))
+    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    report = VoyageReport(
+        name=reading.contents.path.stem,
+        messages_read=reading.health.messages_read,
+        messages_lost=reading.health.messages_lost,
+        rows=table.height,
+        seconds=round(grid.seconds, 3),
+        findings=(*reading.health.findings, *left_out, *grid.findings, *said),
+        usable_s=usable_s,
+        windows=windows,
+        instruments=tuple(_instrument(*one) for one in [*sampled.items(), *driven.items()]),
+    )
+    return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
+
+
+def _instrument(name: str, samples: resampling.Samples) -> Instrument:
+    channel = RESOLVED.get(name)
+    finest = samples.resolution * channel.to_display if channel else 0.0
+    unit = channel.display_unit if channel else ""
+    return Instrument(name, round(1.0 / samples.period_s, 3), float(f"{finest:.3g}"), unit)
+
+
+def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int]:
+    """First and last grid time: the heading's, less the moment the instruments take to start.
+
+    Instruments that begin within a second of each other are not late; a voyage without its first
+    tenth has no gap. One that begins later than that does have one.
+    """
+    moment = 1_000_000_000
+    started = [int(s.time[0]) for s in sampled if len(s.time) and s.time[0] - base[0] <= moment]
+    stopped = [int(s.time[-1]) for s in sampled if len(s.time) and base[-1] - s.time[-1] <= moment]
+    inside = base[(base >= max(started)) & (base <= min(stopped))]
+    return (int(inside[0]), int(inside[-1])) if len(inside) > 1 else (int(base[0]), int(base[-1]))
+
+
+def _require(reading: Reading, profile: Profile) -> None:
+    """Every topic and field that the profile names is there, or say which ones are."""
+    log, topics = reading.contents.path.name, reading.contents.topics
+    for topic, paths in profile.wanted().items():
+        if topic not in topics:
+            raise ChannelMissing(
+                f"{log} has no topic {topic!r}{nearest(topic, topics)}. "
+                f"Topics found: {listed(topics)}.",
+                hint="correct the topic in the ship profile, choose another with --profile, or "
+                "draft one with `shiplog profile LOG`.",
+            )
+        reason = reading.health.undecodable.get(topic)
+        if reason:
+            raise ChannelMissing(
+                f"{log}: the topic {topic!r} cannot be decoded: {reason}.",
+                hint="record it as protobuf, ROS 2 CDR or JSON.",
+            )
+        frame = reading.frames.get(topic)
+        for path in sorted(paths):
+            if frame is not None and path not in frame.columns:
+                known = fields(reading.contents.path, [topic]).get(topic, {})
+                raise ChannelMissing(
+                    f"{log}: the topic {topic!r} has no field {path!r}{nearest(path, known)}. "
+                    f"Fields found: {listed(known)}.",
+                    hint="correct the field in the ship profile.",
+                )
+
+
+def _clock(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
+    """The column that says when a source measured, and the one to hold it against."""
+    if source.clock == "message" and frame["stamp"].null_count() == frame.height:
+        return CLOCKS["log"]  # the message carries no time: the recorder's is all there is
+    return CLOCKS[source.clock]
+
+
+def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
+    """The log without the messages whose stamps cannot be of this voyage, and what they are."""
+    frames, findings = dict(reading.frames), []
+    for source in (*(s for _, s in profile.sensors.items()), *profile.actuators):
+        frame = frames.get(source.topic)
+        if frame is None or frame.height == 0:
+            continue
+        clock, other = _clock(frame, source)
+        known = frame.filter(pl.col(clock).is_not_null())
+        times = known[clock].to_numpy()
+        stray = resampling.strays(times, known[other].to_numpy())
+        if not stray.any():
+            continue
+        frames[source.topic] = known.filter(~stray)
+        off = np.median(times[~stray]) - times[stray].astype(float)
+        far = float(np.abs(off).max()) * 1e-9
+        how = f"{far / resampling.DAY_S:.3g} days" if far > resampling.DAY_S else f"{far:.0f} s"
+        sentence = (
+            f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
+            f"cannot be of this voyage, being up to {how} away."
+        )
+        findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
+    return replace(reading, frames=frames), findings
+
+
+def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
+    """Time [n] ns by the source's clock and SI values [n, k]."""
+    frame = reading.frames.get(source.topic)
+    if frame is None or frame.height == 0:
+        return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
+    times = frame[_clock(frame, source)[0]]
+    values = [
+        (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
+        for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)
+    ]
+    known = times.is_not_null().to_numpy()
+    return times.fill_null(0).to_numpy()[known], np.stack(values, axis=1)[known]
+
+
+def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
+    """A sensor's samples in a form that can be interpolated, spikes marked.
+
+    Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
+    components, since halfway between 359° and 1° is 0°.
+    """
+    sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
+    times, value = _raw(reading, sensor)
+    if kind == "geodetic":
+        value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
+    elif kind in ("sog_cog", "from_bow"):
+        value = frames.earth_velocity(value[:, 0], value[:, 1])
+    elif kind == "enu":
+        value = value[:, ::-1]
+    elif kind in ("quaternion_enu", "quaternion_ned"):
+        value = frames.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
+            :, None
+        ]
+    samples = resampling.ordered(times, value, sensor.tolerance_s)
+    if name == "heading":
+        samples = replace(samples, value=np.unwrap(samples.value, axis=0))
+    metric = _metric(samples.value, kind)
+    spike = fault_detection.spikes(metric, profile.sensors.noise(name))
+    return replace(samples, spike=spike, resolution=fault_detection.resolution(metric))
+
+
+def _metric(value: np.ndarray, kind: str) -> np.ndarray:
+    """Geodetic degrees in metres, roughly: enough to tell a spike from noise."""
+    if kind != "geodetic" or len(value) == 0:
+        return value
+    metre = 111_320.0
+    east = metre * math.cos(math.radians(float(value[0, 0])))
+    return (value - value[0]) * np.array([metre, east])
+
+
+def _motion(
+    grid: Grid, reading: Reading, profile: Profile, sampled: dict[str, resampling.Samples]
+) -> tuple[float, float] | None:
+    """Position, heading, velocity and yaw rate at midship. Returns the datum, if geodetic."""
+    sensors, kind = profile.sensors, profile.sensors.kind
+    heading = grid.place("heading", sampled["heading"])[:, 0]
+    if sensors.yaw_rate is not None:
+        yaw_rate = grid.place("yaw_rate", sampled["yaw_rate"])[:, 0]
+    else:
+        yaw_rate = resampling.onto(grid.times, _differentiated(sampled["heading"])).value[:, 0]
+    position = grid.place("position", sampled["position"])
+    datum = None
+    if kind("position") == "geodetic":
+        datum = _datum(reading, profile, sampled["position"])
+        position = frames.local_plane(position[:, 0], position[:, 1], datum)
+    position = frames.position_at_midship(position, heading, sensors.position.lever_arm_m)
+    velocity = grid.place("velocity", sampled["velocity"])
+    if kind("velocity") != "body":
+        velocity = frames.to_body(velocity, heading)
+    velocity = frames.velocity_at_midship(velocity, yaw_rate, sensors.velocity.lever_arm_m)
+    grid.columns |= {
+        "x0": position[:, 0], "y0": position[:, 1], "heading": frames.wrap(heading),
+        "surge": velocity[:, 0], "sway": velocity[:, 1], "yaw_rate": yaw_rate,
+    }  # fmt: skip
+    return datum
+
+
+def _differentiated(heading: resampling.Samples) -> resampling.Samples:
+    """The yaw rate [rad/s] at the heading's own samples; rows between them hold no more."""
+    rate = np.gradient(heading.value[:, 0], heading.time * 1e-9)
+    return replace(heading, value=rate[:, None])
+
+
+def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> tuple[float, float]:
+    """The log's own datum, else the profile's, else the first fix."""
+    text = reading.contents.metadata.get("voyage", {}).get("datum", "")
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+        return latitude, longitude
+    except ValueError:
+        pass
+    if profile.site.datum is not None:
+        return profile.site.datum
+    if len(position.value) == 0:
+        raise LogUnreadable(
+            f"{reading.contents.path.name} holds no usable position on "
+            f"{profile.sensors.position.topic}.",
+            hint="check the fields in the profile; `shiplog check` lists the topics.",
+        )
+    return float(position.value[0, 0]), float(position.value[0, 1])
+
+
+def _wind(grid: Grid, sensor: Sensor, samples: resampling.Samples) -> None:
+    """Apparent wind at midship: the anemometer's own motion about midship taken out."""
+    components = grid.place("wind", samples)  # ahead and starboard part of "where from"
+    ahead, starboard = sensor.lever_arm_m
+    r = grid.columns["yaw_rate"]
+    moved = components + np.stack((r * starboard, -r * ahead), axis=-1)
+    grid.columns["wind_speed"] = np.linalg.norm(moved, axis=1)
+    grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
+
+
+def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Samples:
+    """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
+    times, value = _raw(reading, actuator)
+    if actuator.circular:
+        value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
+    return resampling.ordered(times, value, actuator.tolerance_s)
+
+
+def _actuator(grid: Grid, actuator: Actuator, samples: resampling.Samples) -> None:
+    """One actuator's column; beyond the profile's limits it is marked, not clipped."""
+    placed = grid.place(actuator.name, samples)
+    column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]
+    grid.columns[actuator.name] = column
+    if actuator.limits is None:
+        return
+    offset, factor = actuator.scale()[0]
+    low, high = sorted((limit - offset) * factor for limit in actuator.limits)
+    slack = 1e-3 * (high - low)
+    beyond = (column < low - slack) | (column > high + slack)
+    grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")

@@ -1,0 +1,387 @@
+"""Sensors against each other, without dynamics: what one measures, another must confirm.
+
+The heading is the clock and the reference. With ψ the heading, P the position of the antenna at
+the lever arm l, V the velocity of the point at the lever arm m, each as measured,
+
+    r(t + τ_r)            = (1 + s) dψ/dt + b
+    d/dt P(t + τ_p)       = R(ψ - δ) V(t + τ_v) / (1 + k) + d/dt [R(ψ - δ) (l - m + a)] + c
+
+hold at every instant of every manoeuvre. All parameters are fitted at once, since a late velocity
+looks like an antenna in another place; c is a nuisance (a log that counts through the water).
+
+Velocity over ground (sog_cog, ned, enu) does not pass through the heading: R V is measured then,
+δ is not observable, τ_p and τ_v only by their difference, and a only as far as position and
+velocity are not of one antenna. What ingest did with the heading is undone first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import polars as pl
+
+from shiplog import channels, frames
+from shiplog.channels import DEGREE, Quality
+from shiplog.logs.health_report import Finding
+from shiplog.profile import Profile
+from shiplog.voyages.fault_detection import stretches
+from shiplog.voyages.resampling import RATE_HZ
+from shiplog.voyages.robust_regression import Fit, Problem, bins, fit, rough, shifted
+
+STEP_S = 1.0 / RATE_HZ
+MOST_ROWS = 36_000  # of a long voyage the liveliest hour says it all
+ROUGH_ROWS = 6_000
+CHUNK = 1_200  # rows that are kept or left out together
+HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
+MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
+SURE = 2.0  # half intervals that a value must be away from none, to be said
+CERTAIN = 4.0  # the same, to be put right where that is asked for
+
+# practical sizes: less is no fault of an instrument that anyone would correct
+CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
+ANTENNA_M, ANTENNA_LENGTHS = 0.03, 0.01
+
+TAU_R, RATE_SCALE, RATE_BIAS = range(3)
+TAU_P, TAU_V, OFFSET, SPEED_SCALE, AHEAD, STARBOARD, DRIFT_X, DRIFT_Y = range(8)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of a voyage with its 90 % interval, in the unit of its finding."""
+
+    kind: str
+    channel: str
+    value: float
+    low: float
+    high: float
+    none: float  # the value that is no fault: 0, or 1 for a scale
+    least: float  # practical size
+    unit: str
+    rival: str = ""  # the channel that may be at fault instead: only the two together are known
+
+    @property
+    def notable(self) -> bool:
+        """Well off none, and large enough to matter."""
+        return self._off > self.least and self._off > SURE * self._half
+
+    @property
+    def certain(self) -> bool:
+        """Beyond doubt, and no doubt about which instrument it is."""
+        return self.notable and self._off > CERTAIN * self._half and not self.rival
+
+    @property
+    def _off(self) -> float:
+        return abs(self.value - self.none)
+
+    @property
+    def _half(self) -> float:
+        return 0.5 * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Unbroken stretches of rows [n] as the instruments measured them, SI; heading unwrapped."""
+
+    starts: np.ndarray  # bool: begins a stretch
+    heading: np.ndarray
+    yaw_rate: np.ndarray
+    position: np.ndarray  # [n, 2], of the antenna
+    velocity: np.ndarray  # [n, 2], in body axes or over ground, of its own lever arm
+
+    def beginning(self, rows: int) -> Motion:
+        return Motion(*(getattr(self, f.name)[:rows] for f in fields(self)))
+
+
+def findings(found: Sequence[Estimate], rows: int, profile: Profile) -> list[Finding]:
+    """What is notable of a voyage of so many rows, in the contract's words."""
+    end = round((rows - 1) * STEP_S, 3)
+    return [
+        Finding(
+            e.kind, e.channel, _sentence(e, profile), start_s=0.0, end_s=end,
+            value=round(e.value, 5), low=round(e.low, 5), high=round(e.high, 5), unit=e.unit,
+        )
+        for e in found
+        if e.notable
+    ]  # fmt: skip
+
+
+def estimates(table: pl.DataFrame, profile: Profile) -> list[Estimate]:
+    """All that the voyage's manoeuvres let be estimated, notable or not: one voyage at 10 Hz."""
+    return of_motion(measured(table, profile), profile)
+
+
+def of_motion(motion: Motion, profile: Profile) -> list[Estimate]:
+    """The same of rows that are chosen already, such as those of a campaign."""
+    return [*_of_yaw_rate(motion, profile), *_of_velocity(motion, profile)]
+
+
+def measured(table: pl.DataFrame, profile: Profile) -> Motion:
+    """The rows to use, and ingest's way to midship undone."""
+    mark = table["quality"].to_numpy()
+    columns = [c.name for c in channels.STATE]
+    values = {name: table[name].fill_null(np.nan).to_numpy() for name in columns}
+    good = (mark & int(channels.UNUSABLE)) == 0
+    for a, b in stretches((mark & int(Quality.HELD)) != 0):
+        good[a : b + 1] &= b - a + 1 < HELD_ROWS
+    for column in values.values():
+        good &= np.isfinite(column)
+    rows = np.flatnonzero(good)
+    if len(rows) > MOST_ROWS:
+        rows = _liveliest(rows, values["yaw_rate"], len(good))
+    starts = np.diff(rows, prepend=-2) != 1
+    starts |= (mark[rows] & int(Quality.JUMP)) != 0
+    used = {name: column[rows] for name, column in values.items()}
+    heading, yaw_rate = np.unwrap(used["heading"]), used["yaw_rate"]
+    position = np.stack((used["x0"], used["y0"]), axis=1)
+    velocity = np.stack((used["surge"], used["sway"]), axis=1)
+    of_position, of_velocity = _arms(profile)
+    position = frames.position_at_midship(position, heading, (-of_position[0], -of_position[1]))
+    velocity = frames.velocity_at_midship(velocity, yaw_rate, (-of_velocity[0], -of_velocity[1]))
+    if not _in_body_axes(profile):
+        velocity = frames.to_body(velocity, -heading)
+    return (
+        Motion(starts, heading, yaw_rate, position - position.mean(0), velocity)
+        if len(rows)
+        else Motion(starts, heading, yaw_rate, position, velocity)
+    )
+
+
+def _liveliest(rows: np.ndarray, yaw_rate: np.ndarray, count: int) -> np.ndarray:
+    """Of usable rows, those of the chunks of time in which the ship turns most."""
+    chunk = rows // CHUNK
+    weight = np.bincount(chunk, yaw_rate[rows] ** 2, count // CHUNK + 1)
+    kept = np.argsort(weight)[-(MOST_ROWS // CHUNK) :]
+    return rows[np.isin(chunk, kept)]
+
+
+def _arms(profile: Profile) -> tuple[tuple[float, float], tuple[float, float]]:
+    return profile.sensors.position.lever_arm_m, profile.sensors.velocity.lever_arm_m
+
+
+def _in_body_axes(profile: Profile) -> bool:
+    return profile.sensors.kind("velocity") == "body"
+
+
+def _separable(profile: Profile) -> bool:
+    """Whether position and velocity each have a delay of their own against the heading."""
+    of_position, of_velocity = _arms(profile)
+    return _in_body_axes(profile) or of_position != of_velocity
+
+
+def _integral(rate: np.ndarray) -> np.ndarray:
+    """[n, c] by the trapezoidal rule, from zero."""
+    out = np.zeros_like(rate)
+    np.cumsum(0.5 * (rate[1:] + rate[:-1]) * STEP_S, axis=0, out=out[1:])
+    return out
+
+
+def _turned(heading: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """R(ψ) times body vectors [n, 2] or one [2]."""
+    c, s = np.cos(heading), np.sin(heading)
+    ahead, aside = vector[..., 0], vector[..., 1]
+    return np.stack((c * ahead - s * aside, s * ahead + c * aside), axis=-1)
+
+
+def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
+    """The yaw rate against the heading's own."""
+    if profile.sensors.yaw_rate is None:
+        return
+
+    def problem(motion: Motion, margin: float) -> Problem:
+        grid = bins(motion.starts, round(margin / STEP_S) + 2)
+        of_heading = grid.change(motion.heading[:, None])
+        turned = _integral(motion.yaw_rate[:, None])
+
+        def late(p: np.ndarray) -> np.ndarray:
+            return grid.change(shifted(turned, p[TAU_R] / STEP_S))
+
+        def model(p: np.ndarray) -> np.ndarray:
+            return late(p) - (1.0 + p[RATE_SCALE]) * of_heading - p[RATE_BIAS]
+
+        def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
+            return {RATE_SCALE: -(late(p) - p[RATE_BIAS]) / (1.0 + p[RATE_SCALE])}
+
+        return Problem(
+            model, grid, steps=np.array([STEP_S, 1e-3, 1e-4]),
+            prior=np.array([2.0, 0.3, 2.0 * DEGREE]),
+            limit=np.array([margin, 0.9, 10.0]), other_side=other_side,
+        )  # fmt: skip
+
+    found = _solved(motion, problem, (TAU_R,))
+    if found is None:
+        return
+    yield _clock("yaw_rate", *found.interval(TAU_R))
+    yield _scale("yaw_rate_scale", "yaw_rate", found.interval(RATE_SCALE))
+    value, low, high = (v / DEGREE for v in found.interval(RATE_BIAS))
+    yield Estimate("yaw_rate_bias", "yaw_rate", value, low, high, 0.0, BIAS_DEGPS, "deg/s")
+
+
+def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
+    """The position's change against the velocity, turned by the heading where it is body-fixed."""
+    body = _in_body_axes(profile)
+    of_position, of_velocity = _arms(profile)
+    arm = np.subtract(of_position, of_velocity)
+    length = profile.ship.length_m
+
+    def problem(motion: Motion, margin: float) -> Problem:
+        grid = bins(motion.starts, round(margin / STEP_S) + 2)
+
+        def sides(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            heading = motion.heading - p[OFFSET]
+            velocity = shifted(motion.velocity, p[TAU_V] / STEP_S)
+            over_ground = _turned(heading, velocity) if body else velocity
+            antenna = _turned(heading, arm + p[[AHEAD, STARBOARD]])
+            travel = shifted(motion.position, p[TAU_P] / STEP_S) - antenna
+            return grid.change(travel) - p[[DRIFT_X, DRIFT_Y]], grid.change(_integral(over_ground))
+
+        def model(p: np.ndarray) -> np.ndarray:
+            travelled, said = sides(p)
+            return travelled - said / (1.0 + p[SPEED_SCALE])
+
+        def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
+            return {SPEED_SCALE: sides(p)[0] / (1.0 + p[SPEED_SCALE])}
+
+        alone, skew = 2.0 if _separable(profile) else 0.0, 10.0 * DEGREE if body else 0.0
+        return Problem(
+            model, grid,
+            steps=np.array([STEP_S, STEP_S, 1e-3, 1e-3, 1e-2, 1e-2, 1e-3, 1e-3]),
+            prior=np.array([alone, 2.0, skew, 0.3, 0.5 * length, 0.5 * length, 1.0, 1.0]),
+            limit=np.array([margin, margin, math.pi, 0.9, *[10.0 * length] * 2, 10.0, 10.0]),
+            other_side=other_side,
+        )  # fmt: skip
+
+    found = _solved(motion, problem, (TAU_P, TAU_V))
+    if found is None:
+        return
+    yield from _gnss_clocks(found, profile)
+    if body:
+        value, low, high = (v / DEGREE for v in found.interval(OFFSET))
+        yield Estimate("heading_offset", "heading", value, low, high, 0.0, HEADING_DEG, "deg")
+    yield _scale("velocity_scale", "velocity", found.interval(SPEED_SCALE))
+    least = max(ANTENNA_M, ANTENNA_LENGTHS * length)
+    for index, channel in ((AHEAD, "position ahead"), (STARBOARD, "position starboard")):
+        value, low, high = found.interval(index)
+        yield Estimate("antenna_offset", channel, value, low, high, 0.0, least, "m")
+
+
+def _gnss_clocks(found: Fit, profile: Profile) -> Iterator[Estimate]:
+    """Delays of position and velocity; as one of `gnss` where both are late by the same.
+
+    Velocities that were turned by the heading when they were recorded keep its turns and not their
+    own time: they look punctual, and the position early by what they are late. No profile tells
+    them from a log's own, so of body velocities only the time between the two is said to be off.
+    """
+    if not _separable(profile):
+        yield _later_of_two(*found.interval(TAU_V))
+        return
+    position, velocity = (
+        _clock("position", *found.interval(TAU_P)), _clock("velocity", *found.interval(TAU_V)),
+    )  # fmt: skip
+    both = found.cov[np.ix_((TAU_P, TAU_V), (TAU_P, TAU_V))]
+    sum_, difference = np.array([0.5, 0.5]), np.array([1.0, -1.0])
+    half = found.quantile * math.sqrt(sum_ @ both @ sum_)
+    value = 0.5 * (position.value + velocity.value)
+    together = _clock("gnss", value, value - half, value + half)
+    apart = found.quantile * math.sqrt(difference @ both @ difference)
+    late = velocity.value - position.value
+    if together.notable and abs(late) < max(CLOCK_S, SURE * apart):
+        yield together
+    elif not _in_body_axes(profile):
+        yield position
+        yield velocity
+    elif velocity.notable:
+        yield velocity
+        if position.notable:
+            yield _clock("position", -late, -late - apart, -late + apart, rival="velocity")
+    else:
+        yield _later_of_two(late, late - apart, late + apart)
+
+
+def _later_of_two(late: float, low: float, high: float) -> Estimate:
+    """Of position and velocity, from how late the velocity is against the position."""
+    if late >= 0:
+        return _clock("velocity", late, low, high, rival="position")
+    return _clock("position", -late, -high, -low, rival="velocity")
+
+
+def _scale(kind: str, channel: str, beyond: tuple[float, float, float]) -> Estimate:
+    """Measured over true, from the share by which it is more."""
+    value, low, high = (1.0 + v for v in beyond)
+    return Estimate(kind, channel, value, low, high, 1.0, SCALE, "1")
+
+
+def _clock(channel: str, value: float, low: float, high: float, rival: str = "") -> Estimate:
+    return Estimate("clock_offset", channel, value, low, high, 0.0, CLOCK_S, "s", rival)
+
+
+def _solved(
+    motion: Motion, problem: Callable[[Motion, float], Problem], clocks: tuple[int, ...]
+) -> Fit | None:
+    """Fit with delays up to the small margin, and again with the large one if that binds.
+
+    It starts from what the first ten minutes say, tried from several delays. What ends at a
+    limit was not found.
+    """
+    beginning = motion.beginning(ROUGH_ROWS)
+    for margin in MARGINS_S:
+        coarse = problem(beginning, margin)
+        starts = [np.zeros(len(coarse.prior))]
+        for clock in set(clocks) & set(coarse.free):
+            for late in (-0.5 * margin, 0.5 * margin):
+                starts.append(np.where(np.arange(len(coarse.prior)) == clock, late, 0.0))
+        try:
+            found = fit(problem(motion, margin), rough(coarse, starts))
+        except np.linalg.LinAlgError:  # a ship at rest, or a log that never turns
+            return None
+        if found is None:
+            return None
+        if (np.abs(found.value[list(clocks)]) < 0.8 * margin).all():
+            return found
+    return None
+
+
+def _sentence(e: Estimate, profile: Profile) -> str:
+    """What a naval engineer reads."""
+    scale, digits = {"1": (100.0, 1), "deg/s": (1.0, 3)}.get(e.unit, (1.0, 2))
+    off = scale * (e.value - e.none)
+    ends = sorted(math.copysign(scale, off) * (end - e.none) for end in (e.low, e.high))
+    size = f"{abs(off):.{digits}f}"
+    range_ = f"({ends[0]:.{digits}f} to {ends[1]:.{digits}f})"
+    more, side = ("more", "starboard") if off > 0 else ("less", "port")
+    match e.kind:
+        case "clock_offset":
+            return _clock_sentence(
+                e, f"{size} s {range_} {'after' if off > 0 else 'before'}", profile
+            )
+        case "yaw_rate_scale":
+            return f"The yaw rate shows {size} % {range_} {more} than the heading turns."
+        case "yaw_rate_bias":
+            return f"The yaw rate shows {size} deg/s {range_} to {side} of what the heading turns."
+        case "heading_offset":
+            return (
+                f"The heading stands {size} deg {range_} to {side} of the axes in which the "
+                "velocity agrees with the position."
+            )
+        case "velocity_scale":
+            return f"The velocity shows {size} % {range_} {more} than the position travels."
+    along = ("ahead" if off > 0 else "astern") if e.channel.endswith("ahead") else f"to {side}"
+    return (
+        f"The position is that of a point {size} m {range_} {along} of where the profile has it, "
+        "against the velocity."
+    )
+
+
+def _clock_sentence(e: Estimate, when: str, profile: Profile) -> str:
+    if e.channel == "gnss":
+        return f"Position and velocity come {when} the heading they belong to."
+    name = e.channel.replace("_", " ")
+    if not e.rival:
+        return f"The {name} comes {when} the heading it belongs to."
+    turned = " where the velocities were turned by the heading when recorded"
+    return (
+        f"The {name} comes {when} the {e.rival} it belongs to; which of the two keeps the "
+        f"heading's time they cannot say{turned if _in_body_axes(profile) else ''}."
+    )

@@ -1,0 +1,139 @@
+"""What the sensors say of each other beyond doubt, put right: by the formulas of the diagnosis.
+
+A row that was no data stays as it was. A row whose value would have to come from where nothing was
+measured (a late clock, at the end of a stretch or before a gap) becomes a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import polars as pl
+
+from shiplog import channels, frames, units
+from shiplog.channels import Quality
+from shiplog.logs.health_report import Finding
+from shiplog.models.causes.sensors import (
+    AntennaOffset,
+    ClockOffset,
+    HeadingOffset,
+    YawRateBias,
+    YawRateScale,
+)
+from shiplog.profile import Profile
+from shiplog.voyages import fault_detection
+from shiplog.voyages.ingest import Voyage
+from shiplog.voyages.recording import Record, reduced
+from shiplog.voyages.sensor_consistency import Estimate
+
+STATE = [c.name for c in channels.STATE]
+MEASURED = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE
+HEADING = 4
+DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # of a channel that the mark does not name
+
+Remedy = Callable[[Record, np.ndarray], Record]
+
+
+def _antenna(ahead: float, starboard: float) -> Remedy:
+    """The position alone moves: it is against the velocity that it stands elsewhere."""
+
+    def read(record: Record, p: np.ndarray) -> Record:
+        moved = AntennaOffset().read(record, p[0] * np.array([ahead, starboard]))
+        state = record.state.copy()
+        state[:, MEASURED["position"]] = moved.state[:, MEASURED["position"]]
+        return replace(record, state=state)
+
+    return read
+
+
+def _velocity_scale(record: Record, p: np.ndarray) -> Record:
+    seen = record.sighted
+    return reduced(record, replace(seen, velocity=seen.velocity / (1.0 + p[0])))
+
+
+REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order of parity's equations, from outside
+    ("clock_offset", "yaw_rate"): ClockOffset("yaw_rate").read,
+    ("clock_offset", "gnss"): ClockOffset("gnss").read,
+    ("clock_offset", "position"): ClockOffset("position").read,
+    ("clock_offset", "velocity"): ClockOffset("velocity").read,
+    ("yaw_rate_bias", "yaw_rate"): YawRateBias().read,
+    ("yaw_rate_scale", "yaw_rate"): YawRateScale().read,
+    ("heading_offset", "heading"): HeadingOffset().read,
+    ("velocity_scale", "velocity"): _velocity_scale,
+    ("antenna_offset", "position ahead"): _antenna(1.0, 0.0),
+    ("antenna_offset", "position starboard"): _antenna(0.0, 1.0),
+}
+
+
+def corrected(voyage: Voyage) -> Voyage:
+    """The voyage with what is certain put right; its findings say so. Rows and times stay."""
+    done = tuple(e for e in voyage.estimates if e.certain)
+    sure = {(e.kind, e.channel) for e in done}
+    table, gaps = put_right(voyage.table, voyage.profile, done)
+    said = [
+        replace(f, sentence=f"{f.sentence} Corrected.") if (f.kind, f.channel) in sure else f
+        for f in voyage.report.findings
+    ]
+    report = replace(voyage.report, findings=(*said, *gaps))
+    return replace(voyage, table=table, report=report, corrected=done)
+
+
+def put_right(
+    table: pl.DataFrame, profile: Profile, faults: Sequence[Estimate]
+) -> tuple[pl.DataFrame, list[Finding]]:
+    """A voyage's table without these faults, and the gaps that this leaves."""
+    if not faults:
+        return table, []
+    record, rows = _record(table, profile)
+    found = {(e.kind, e.channel): e for e in faults}
+    for key, remedy in REMEDIES.items():
+        if e := found.get(key):
+            size = (e.value - e.none) * units.factor(e.unit)  # zero where there is no fault
+            record = remedy(record, np.array([size]))
+    mark = table["quality"].to_numpy().copy()
+    before = _state(table)
+    state = np.full_like(before, np.nan)
+    state[rows[rows >= 0]] = record.state[rows >= 0]
+    state[:, HEADING] = frames.wrap(state[:, HEADING])
+    good = (mark & int(channels.UNUSABLE)) == 0
+    whole, gaps = good.copy(), []
+    for name, columns in MEASURED.items():  # a velocity needs its yaw rate: a row is said once
+        lost = whole & ~np.isfinite(state[:, columns]).all(axis=1)
+        whole &= ~lost
+        spans = [fault_detection.seconds(stretch) for stretch in fault_detection.stretches(lost)]
+        gaps += fault_detection.said("gap", name, spans, "has no sample once clocks are put right")
+    mark[good & ~whole] |= int(Quality.GAP)
+    state = np.where(good[:, None], state, before)
+    put = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]
+    table = table.with_columns(*put, pl.Series("quality", mark))
+    return table.with_columns(pl.col(STATE).fill_nan(None)), gaps
+
+
+def _state(table: pl.DataFrame) -> np.ndarray:
+    """[n, 6], NaN where there is no value."""
+    return table.select(pl.col(STATE).fill_null(np.nan)).to_numpy()
+
+
+def _record(table: pl.DataFrame, profile: Profile) -> tuple[Record, np.ndarray]:
+    """The table as the causes read it, every row, and each stretch between two rows of nothing:
+    what a clock would have to fetch from beyond is not there. `record.read` would bridge it.
+
+    returns  the record, and for each of its rows the table's; -1 for a row of nothing
+    """
+    mark = table["quality"].to_numpy()
+    jumps = np.flatnonzero((mark & int(Quality.JUMP)) != 0)
+    edges = np.unique(np.concatenate(([0], jumps, [table.height])))
+    rows = np.concatenate([np.r_[-1, a:b, -1] for a, b in pairwise(edges.tolist())])
+    starts = (rows < 0) & (np.concatenate(([-1], rows[:-1])) < 0)
+    state = _state(table)[rows]
+    state[(rows < 0) | ((mark[rows] & int(DOUBTFUL)) != 0)] = np.nan
+    none = np.zeros(len(rows))
+    record = Record(
+        profile=profile, names=("",), voyage=none.astype(int), time=none, share=none,
+        starts=starts, seen=rows >= 0, state=state,
+        actuator=np.zeros((len(rows), 0)), wind=np.zeros((len(rows), 2)),
+    )  # fmt: skip
+    return record, rows

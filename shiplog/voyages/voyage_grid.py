@@ -1,0 +1,163 @@
+"""A voyage on its 10 Hz grid while it is being filled, and the faults that only show there.
+
+What is found is marked row by row and said with its times; the values stay as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shiplog import channels
+from shiplog.channels import Quality
+from shiplog.logs.health_report import Finding
+from shiplog.profile import Profile
+from shiplog.voyages import fault_detection, resampling
+
+STEP_S = resampling.STEP_NS * 1e-9
+
+# A step starts a new segment where no rollout could shrug it off: worth seconds of the ship's
+# motion and a tenth of its length, or a heading that is another heading.
+JUMP_S = 3.0
+JUMP_LENGTHS = 0.1
+JUMP_RAD = math.radians(30.0)
+
+
+@dataclass
+class Grid:
+    """Times [m] ns, columns [m] SI, marks [m] of channels.Quality, and what was found."""
+
+    times: np.ndarray
+    columns: dict[str, np.ndarray] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    marks: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.marks = np.zeros(len(self.times), np.int32)
+
+    @property
+    def seconds(self) -> float:
+        """From the first row to the last."""
+        return float(self.times[-1] - self.times[0]) * 1e-9
+
+    def place(self, name: str, samples: resampling.Samples) -> np.ndarray:
+        """A source's values on the grid [m, k]; its gaps, blanks and spikes noted."""
+        placed = resampling.onto(self.times, samples)
+        self.note(placed.blank, Quality.BLANK, "blank", name, "is blank")
+        self.note(placed.spike, Quality.SPIKE, "spike", name, "spikes")
+        self.note(placed.gap, Quality.GAP, "gap", name, "has no sample")
+        return placed.value
+
+    def note(self, mask: np.ndarray, flag: Quality, kind: str, name: str, what: str) -> None:
+        """Mark rows [m] bool, and say each stretch of them."""
+        rows = list(fault_detection.stretches(mask))
+        fault_detection.mark(self.marks, rows, flag)
+        self.findings += fault_detection.said(
+            kind, name, [fault_detection.seconds(i) for i in rows], what
+        )
+
+
+def mark_gaps(grid: Grid) -> None:
+    """A row that lacks any value is a gap, whichever instrument is silent."""
+    missing = np.zeros(len(grid.times), bool)
+    for column in grid.columns.values():
+        missing |= np.isnan(column)
+    known = (grid.marks & int(Quality.GAP | Quality.BLANK)) != 0
+    grid.marks[missing & ~known] |= int(Quality.GAP)
+
+
+def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
+    """Values that repeat although the ship moves; frozen ones, too long to be data.
+
+    What an instrument counts in steps stands still until the ship has gone a step.
+    """
+    speed = np.nan_to_num(np.hypot(grid.columns["surge"], grid.columns["sway"]))
+    turning = np.abs(np.nan_to_num(grid.columns["yaw_rate"]))
+    travel = {"position": np.cumsum(speed) * STEP_S}
+    if profile.sensors.yaw_rate is not None:  # else it is the heading's own derivative
+        travel["heading"] = np.cumsum(turning) * STEP_S
+    for name, samples in sampled.items():
+        runs = fault_detection.repeats(samples.value)
+        if name not in travel:
+            runs = fault_detection.improbable(runs, len(samples.time))
+        least = 3.0 * profile.sensors.noise(name) + samples.resolution
+        rows = fault_detection.held_on_grid(grid.times, samples.time, runs, travel.get(name), least)
+        fault_detection.mark(grid.marks, rows, Quality.HELD)
+        intervals = [fault_detection.seconds(i) for i in rows]
+        lasted = [end - start for start, end in intervals]
+        frozen = [i for i, s in zip(rows, lasted, strict=True) if s > fault_detection.FROZEN_S]
+        fault_detection.mark(grid.marks, frozen, Quality.FROZEN)
+        long = [
+            i for i, s in zip(intervals, lasted, strict=True) if s >= fault_detection.SAID_HELD_S
+        ]
+        grid.findings += fault_detection.said(
+            "held", name, long, "repeats the same value while the ship moves,"
+        )
+        brief = [s for s in lasted if s < fault_detection.SAID_HELD_S]
+        if brief:
+            often = "once" if len(brief) == 1 else f"{len(brief)} times"
+            sentence = f"{name} repeats itself briefly, {often}, {sum(brief):.1f} s in all."
+            grid.findings.append(
+                Finding("held", name, sentence, value=float(len(brief)), unit="times")
+            )
+
+
+def mark_jumps(grid: Grid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
+    """Steps of the position or heading that the velocity and the yaw rate do not explain.
+
+    Looked for from one measured value to the next, not between rows that were interpolated.
+    """
+    columns = {name: np.nan_to_num(column) for name, column in grid.columns.items()}
+    heading, turning = columns["heading"], columns["yaw_rate"]
+    known = np.isfinite(grid.columns["heading"])
+    heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
+    c, s = np.cos(heading), np.sin(heading)
+    u, v = columns["surge"], columns["sway"]
+    over_ground = np.stack((c * u - s * v, s * u + c * v), 1)
+    position = np.stack((columns["x0"], columns["y0"]), 1)
+
+    found = []
+    for row, step in _jumps(grid, profile, sampled, "position", position, over_ground):
+        lost = _worth(step, over_ground[row])
+        if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
+            grid.marks[row] |= int(Quality.JUMP)
+        found.append(_jump("position", row, step, "m", lost))
+    for row, step in _jumps(grid, profile, sampled, "heading", heading[:, None], turning[:, None]):
+        if step > JUMP_RAD:
+            grid.marks[row] |= int(Quality.JUMP)
+        lost = _worth(step, turning[row])
+        found.append(_jump("heading", row, math.degrees(step), "deg", lost))
+    grid.findings += found
+
+
+def _jumps(
+    grid: Grid,
+    profile: Profile,
+    sampled: dict[str, resampling.Samples],
+    name: str,
+    gone: np.ndarray,
+    rate: np.ndarray,
+) -> list[tuple[int, float]]:
+    """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are."""
+    samples = sampled[name]
+    usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
+    every = max(round(samples.period_s / STEP_S), 1)
+    if every > 1:
+        usable &= samples.nearest_rows(grid.times)
+    noise = math.hypot(profile.sensors.noise(name), samples.resolution / math.sqrt(12.0))
+    return fault_detection.jumps(gone, rate, usable, noise, every)
+
+
+def _worth(step: float, rate: np.ndarray | float) -> float:
+    """Seconds of the motion that a step stands for."""
+    speed = float(np.linalg.norm(rate))
+    return step / speed if speed > 0 else math.inf
+
+
+def _jump(name: str, row: int, size: float, unit: str, lost: float) -> Finding:
+    at = round(row * STEP_S, 3)
+    worth = f", as if {lost:.1f} s were missing" if lost < 60.0 else ""
+    sentence = f"{name} steps {size:.3g} {unit} beyond what its rate says at {at:.1f} s{worth}."
+    return Finding("jump", name, sentence, start_s=at, end_s=at, value=round(size, 6), unit=unit)

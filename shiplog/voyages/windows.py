@@ -1,0 +1,137 @@
+"""Windows of I samples: planned as rows (voyage, segment, start, copy), then cut to tensors.
+
+A window never crosses a segment, so never a gap. The paper's reference set is slicing with the
+step S = I; jittering adds noise to the velocities of clean windows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+import torch
+from torch import Tensor
+
+from shiplog import channels
+from shiplog.exceptions import WindowError
+from shiplog.voyages.one_hertz import WINDOW
+
+SIZE = WINDOW
+
+
+@dataclass(frozen=True)
+class Windows:
+    """N windows of I samples, row by row with their plan.
+
+    plan      [N]           voyage, segment, start, copy, elapsed (s into the voyage)
+    state     [N, I, 6]     channels.STATE, SI; heading unwrapped within each window
+    actuator  [N, I, A]     the profile's order, rad, rev/s or 1
+    wind      [N, I, 0|2]   apparent wind speed [m/s] and angle [rad]
+    dt        [N, I - 1]    step lengths, s
+    """
+
+    plan: pl.DataFrame
+    state: Tensor
+    actuator: Tensor
+    wind: Tensor
+    dt: Tensor
+
+    def __len__(self) -> int:
+        return self.state.shape[0]
+
+    @property
+    def velocity(self) -> Tensor:
+        """[N, I, 3] surge, sway, yaw rate."""
+        return self.state[..., list(channels.VELOCITY_IN_STATE)]
+
+    def pick(self, rows: Tensor) -> Windows:
+        """The windows at these row numbers."""
+        return Windows(
+            self.plan[rows.tolist()],
+            self.state[rows],
+            self.actuator[rows],
+            self.wind[rows],
+            self.dt[rows],
+        )
+
+
+def plan(table: pl.LazyFrame, size: int, step: int, copies: int = 0) -> pl.LazyFrame:
+    """One row per window: its voyage, segment, first row and noisy copy, Eqs. 14 and 18.
+
+    `step == size` is the reference dataset (Eq. 12): cutting without overlap is slicing with
+    S = I. `copies` keeps M noisy copies and not the clean original (Eq. 16); 0 is clean.
+    """
+    noisy = list(range(1, copies + 1)) or [0]
+    last = pl.len().cast(pl.Int64) - size  # signed: a segment shorter than I has no window
+    return (
+        table.group_by("voyage", "segment", maintain_order=True)
+        .agg(start=pl.int_range(0, last + 1, step))
+        .explode("start")
+        .drop_nulls("start")
+        .join(pl.LazyFrame({"copy": noisy}), how="cross")
+    )
+
+
+def cut(
+    seconds: pl.DataFrame,
+    planned: pl.DataFrame,
+    size: int,
+    actuators: tuple[str, ...],
+    wind: tuple[str, ...],
+) -> Windows:
+    """Gather planned windows from the sorted 1 Hz table (clean; noise is `jittered`).
+
+    Raises WindowError where nothing was planned, saying how long the longest segment is.
+    """
+    if planned.height == 0:
+        raise WindowError(*_too_long(seconds, size))
+    first = (
+        seconds.with_row_index("row")
+        .group_by("voyage", "segment", maintain_order=True)
+        .agg(first=pl.col("row").first(), begin=pl.col("time").first())
+        .join(seconds.group_by("voyage").agg(departure=pl.col("time").min()), on="voyage")
+    )
+    plan = planned.join(first, on=["voyage", "segment"], how="left", maintain_order="left")
+    begin = (plan["first"].cast(pl.Int64) + plan["start"]).to_numpy()
+    rows = begin[:, None] + np.arange(size)
+    times = seconds["time"].to_physical().to_numpy()[rows]
+    elapsed = (times[:, 0] - plan["departure"].to_physical().to_numpy()) * 1e-9
+
+    def gather(names: tuple[str, ...]) -> Tensor:
+        if not names:
+            return torch.zeros(*rows.shape, 0, dtype=torch.float64)
+        return torch.from_numpy(seconds.select(names).to_numpy()[rows].astype(np.float64))
+
+    state = gather(tuple(c.name for c in channels.STATE))
+    state[..., 4] = torch.from_numpy(np.unwrap(state[..., 4].numpy(), axis=1))
+    return Windows(
+        plan=planned.with_columns(elapsed=pl.Series(elapsed)),
+        state=state,
+        actuator=gather(actuators),
+        wind=gather(wind),
+        dt=torch.from_numpy(np.diff(times, axis=1) * 1e-9),
+    )
+
+
+def jittered(windows: Windows, generator: torch.Generator) -> Windows:
+    """Normal noise on the velocities of every copy above 0, Eq. 15 with Σ_x of Table 5.
+
+    Actuators and wind stay as measured. Noise is independent in time and between copies.
+    """
+    noisy = torch.from_numpy((windows.plan["copy"] > 0).to_numpy()).to(torch.float64)
+    noise = torch.randn(windows.state.shape, generator=generator, dtype=torch.float64)
+    sigma = torch.tensor(channels.JITTER, dtype=torch.float64)
+    return replace(windows, state=windows.state + noise * sigma * noisy[:, None, None])
+
+
+def _too_long(seconds: pl.DataFrame, size: int) -> tuple[str, str]:
+    lengths = seconds.group_by("voyage", "segment").len().sort("len", descending=True)
+    if lengths.height == 0:
+        return "No usable second is left in these voyages.", "see `shiplog check` for why."
+    voyage, _, longest = lengths.row(0)
+    return (
+        f"A window of {size} samples is longer than every segment; the longest, of {voyage}, has "
+        f"{longest} seconds without a gap.",
+        f"choose --window {max(longest // 2, 2)} or shorter, or ingest longer voyages.",
+    )
