@@ -11,7 +11,6 @@ import numpy as np
 import polars as pl
 import torch
 
-from pipelines.prepare import seconds
 from shiplog.channels import STATE
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.models.causes import user
@@ -133,7 +132,7 @@ def evaluate_runs(
     names = _test_voyages(first, store, voyages)
     profile = store.profile(names)
     _same_ship(first, profile.columns, "the chosen voyages")
-    rows = one_hertz.with_elapsed(seconds(store, names, profile))
+    rows = one_hertz.with_elapsed(store.seconds(names, profile))
     size = first.config.window
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)

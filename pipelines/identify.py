@@ -11,7 +11,6 @@ import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
-from pipelines.prepare import seconds
 from shiplog.arguments import refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
@@ -46,7 +45,7 @@ def identify_run(
     used = [*split.training, *split.validation]
     profile = store.profile(used)
     profile.require_actuators()
-    rows = seconds(store, used, profile)
+    rows = store.seconds(used, profile)
     refuse_shared_rows(rows, split)
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))

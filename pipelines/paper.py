@@ -11,7 +11,6 @@ import polars as pl
 
 from pipelines import train
 from pipelines.evaluate import Evaluation, evaluate_runs
-from pipelines.prepare import seconds
 from shiplog.channels import VELOCITY
 from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
 from shiplog.logs.health_report import CONTRACT
@@ -22,10 +21,11 @@ from shiplog.report.paper.style import named
 from shiplog.training import run_folder
 from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.training.run_folder import Run
 from shiplog.voyages import parts
 from shiplog.voyages.split import choose_split, say
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
@@ -144,7 +144,7 @@ def choose_voyages(
 
 def _first_half(store: Store, names: Sequence[str]) -> tuple[str, ...]:
     """Whole voyages with about half of the seconds; of a single one its first half."""
-    rows = seconds(store, names, store.profile(names))
+    rows = store.seconds(names, store.profile(names))
     lengths = {str(n): c for n, c in rows.group_by("voyage").len().iter_rows()}
     begins = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())
     order = sorted(names, key=lambda n: (begins[n], n))
@@ -236,7 +236,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
     plans = {name: run.windows() for name, run in results.runs.items()}
     sizes = sets.sizes(plans, {n: r.config.split.training for n, r in results.runs.items()}, size)
     rows = {
-        name: seconds(store, names, profile)
+        name: store.seconds(names, profile)
         for name, names in (("ref", chosen.reference), ("d-ref", chosen.d_ref),
                             ("validation", chosen.validation), ("test", chosen.test))
     }  # fmt: skip

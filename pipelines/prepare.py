@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import polars as pl
-
 from shiplog import profile as profiles
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.logs.check import check
@@ -17,8 +15,9 @@ from shiplog.logs.read import Contents, contents
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
-from shiplog.voyages import one_hertz, sensor_consistency
+from shiplog.voyages import sensor_consistency
 from shiplog.voyages.ingest import ingest
+from shiplog.voyages.sensor_correction import corrected
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
@@ -67,10 +66,6 @@ def ingest_logs(
                 continue
             voyage = ingest(path, profile_of)
             if correct:
-                from shiplog.voyages.sensor_correction import (
-                    corrected,  # with the causes comes JAX, in a second
-                )
-
                 voyage = corrected(voyage)
             state = store.add(voyage)
         except ShiplogError as error:
@@ -106,11 +101,6 @@ def fitting_profile(found: Contents) -> Profile:
         f"No shipped profile fits {path.name}. Its topics: {topics}.",
         hint=f"draft one with `shiplog profile {path}`, look it over, and give it with --profile.",
     )
-
-
-def seconds(store: Store, names: Sequence[str], profile: Profile) -> pl.DataFrame:
-    """The sorted 1 Hz table of these voyages."""
-    return one_hertz.resample(store.tables(names), profile.columns, profile.circular)
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:

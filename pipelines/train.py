@@ -15,7 +15,6 @@ import polars as pl
 import torch
 
 from pipelines.bars import Bars
-from pipelines.prepare import seconds
 from shiplog import random_streams
 from shiplog.arguments import refuse_taken
 from shiplog.exceptions import RunError, listed
@@ -67,7 +66,7 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
     split = config.split
     profile = store.profile([*split.training, *split.validation])
     profile.require_actuators()
-    rows = seconds(store, [*split.training, *split.validation], profile)
+    rows = store.seconds([*split.training, *split.validation], profile)
     learnt = rows.filter(pl.col("voyage").is_in(split.training))
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     refuse_shared_rows(rows, split)
@@ -75,7 +74,7 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
     names = (profile.actuator_names, profile.wind_names)
     size = config.window
     # it may be a part of a training voyage, which stands there under another name
-    standard = seconds(store, config.standard, profile) if config.standard else learnt
+    standard = store.seconds(config.standard, profile) if config.standard else learnt
     reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
     chosen = plan(learnt, config.data, size)
     windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from shiplog.exceptions import RunError, ShiplogError, UsageError, listed, nearest
 from shiplog.models import MODELS
-from shiplog.training.run_config import AUGMENTATIONS, RECIPES, WIND_INPUTS
+from shiplog.training.run_config import RECIPES, WIND_INPUTS
+from shiplog.voyages.augmentation import AUGMENTATIONS
 
 
 def check_training(

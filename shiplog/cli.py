@@ -510,7 +510,7 @@ def paper(
     Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
     """
     from shiplog.arguments import check_training, check_writable
-    from shiplog.training.run_config import AUGMENTATIONS
+    from shiplog.voyages.augmentation import AUGMENTATIONS
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
     for name in chosen:

@@ -12,22 +12,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from shiplog import channels, units
 from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
 Accuracy = Annotated[float, Field(ge=0)]
-
-
-class Section(BaseModel):
-    """A part of a profile: frozen, every key known, every number finite.
-
-    A lever arm of NaN would empty every position of a voyage without a word.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Ship(Section):
@@ -298,7 +290,7 @@ class Profile(Section):
     sensors: Sensors
     actuators: tuple[Actuator, ...] = ()
     site: Site = Site()
-    table: dict[str, Column] = {}
+    table: dict[str, Column] = Field(default_factory=dict)
     source: str = Field(default="", exclude=True)  # name or path it was loaded from
 
     @model_validator(mode="after")

@@ -20,7 +20,8 @@ from shiplog.diagnosis.trial_voyages import in_ship_time, record_of, windows_of
 from shiplog.exceptions import RunError
 from shiplog.report import verdict as verdicts
 from shiplog.training import run_folder
-from shiplog.training.run_config import Config, Fast, Network, Split
+from shiplog.training.run_config import Config, Fast, Network
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 SEED = 7101

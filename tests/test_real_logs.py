@@ -7,7 +7,6 @@ import polars as pl
 import pytest
 from test_cli import call
 
-from pipelines.prepare import seconds
 from shiplog.voyages import one_hertz
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -56,7 +55,7 @@ def test_values_come_back_to_the_last_digits(trials):
 
 def test_the_trials_give_the_119_windows_and_one_pair_of_twins(trials):
     names = trials.store.select()
-    rows = seconds(trials.store, names, trials.store.profile(names))
+    rows = trials.store.seconds(names, trials.store.profile(names))
     windows = plan(rows, "ref", 100)
     assert windows.filter(pl.col("voyage") != TWIN).height == 119
     assert "berthing_12-Nov-2020_13_37_05" not in windows["voyage"]  # 92 s long
@@ -123,7 +122,7 @@ def test_a_tanker_in_a_tank_whose_rudder_counts_the_other_way(shared_data, tmp_p
     assert answer["loss"] < 0.5 * answer["floors"]["hold"]
     store = Store(tmp_path / "store")
     name = "HSVA_CPMC_KVLCC2_Z_20_10_S"
-    rows = seconds(store, [name], store.profile([name]))
+    rows = store.seconds([name], store.profile([name]))
     later = rows.select(pl.col("rudder"), pl.col("yaw_rate").shift(-8)).drop_nulls()
     assert later.select(pl.corr("rudder", "yaw_rate")).item() > 0.5  # starboard turns to starboard
 

@@ -10,7 +10,8 @@ from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient, run_folder
 from shiplog.training.network_training import paper
-from shiplog.training.run_config import Config, Network, Paper, Split
+from shiplog.training.run_config import Config, Network, Paper
+from shiplog.voyages.split_settings import Split
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))

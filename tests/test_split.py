@@ -3,12 +3,12 @@
 import pytest
 import sailing
 
-from pipelines.prepare import seconds
 from pipelines.train import train_run
 from shiplog.exceptions import StoreError
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.voyages.parts import overlap, parse
 from shiplog.voyages.split import choose_split
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 
@@ -67,10 +67,10 @@ def test_one_voyage_is_split_in_time(tmp_path):
     assert found[0].begin == 0 and found[2].end >= 129
     assert [a.end for a in found[:2]] == [b.begin for b in found[1:]]
     assert [found[0].end, found[1].end] == pytest.approx([91, 111], abs=2)
-    rows = seconds(store, sides, store.profile(sides))
+    rows = store.seconds(sides, store.profile(sides))
     assert set(rows["voyage"]) == set(sides)
     assert rows["time"].is_unique().all()
-    whole = seconds(store, ["only"], store.profile(["only"]))
+    whole = store.seconds(["only"], store.profile(["only"]))
     assert whole.height - 3 <= rows.height <= whole.height  # a second at each seam may be cut
 
 

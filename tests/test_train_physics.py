@@ -21,9 +21,10 @@ from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
 from shiplog.training import output_error as identification
 from shiplog.training import regularisation, run_folder
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.split import choose_physical_split
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 HULL = ("--without", "propeller", "--without", "rudder")  # a hull in the wind compiles quickly

@@ -9,8 +9,8 @@ import torch
 
 from shiplog import random_streams
 from shiplog.exceptions import WindowError
-from shiplog.training.run_config import AUGMENTATIONS
 from shiplog.voyages import windows
+from shiplog.voyages.augmentation import AUGMENTATIONS
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
 STATES = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")

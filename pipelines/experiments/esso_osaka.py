@@ -18,7 +18,8 @@ from pipelines.evaluate import Evaluation, evaluate_runs
 from pipelines.prepare import expand, ingest_logs
 from pipelines.train import train_run
 from shiplog import profile as profiles
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 TRAINING, TEST = "wakita2022_trainTZRBplus", "wakita2022_test"  # columns of runs.csv

@@ -28,8 +28,9 @@ from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
 from shiplog.report import tables, viewer
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.voyages.split import choose_split
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 EQUAL = Split(  # both sides learn from the same two voyages and look at the same third

@@ -17,14 +17,14 @@ import numpy as np
 
 from pipelines.experiments.esso_osaka import trials_store
 from pipelines.experiments.extrapolation import EQUAL
-from pipelines.prepare import seconds
 from shiplog.report import tables
 from shiplog.simulation.sensitivities import losses
 from shiplog.training import regularisation
 from shiplog.training.model_selection import physics
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.training.setup import prepare
 from shiplog.voyages.split import plan
+from shiplog.voyages.split_settings import Split
 
 
 def least(judged: dict[float, np.ndarray]) -> float:
@@ -46,7 +46,7 @@ def ridges(folder: Path, out: Path) -> str:
     names = tuple(n for n in store.select(["random_*"]) if n not in EQUAL.test)
     config = Config(model="mmg", split=Split(training=names, validation=()))
     profile = store.profile(list(names))
-    rows = seconds(store, list(names), profile)
+    rows = store.seconds(list(names), profile)
     planned = plan(rows, config.data, config.window)
     ready = prepare(config, profile, rows, rows.clear(), planned, None)
     voyage = np.array(ready.voyages)

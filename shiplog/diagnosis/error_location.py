@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import polars as pl
 
-from pipelines.prepare import seconds
 from shiplog.diagnosis import (
     external_forces,
     omitted_inputs,
@@ -85,7 +84,7 @@ def uncovered(
     run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
 ) -> list[Interval]:
     """Windows that the training data never came near."""
-    rows = one_hertz.with_elapsed(seconds(store, names, profile))
+    rows = one_hertz.with_elapsed(store.seconds(names, profile))
     seen = covering.of(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",

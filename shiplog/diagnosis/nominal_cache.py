@@ -21,9 +21,10 @@ from shiplog.diagnosis import nominal_campaign, nominal_reference
 from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linearisation import Path
 from shiplog.diagnosis.nominal_campaign import Characteristics
-from shiplog.diagnosis.nominal_reference import Settled, Start
+from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 UNREST = ("noise", "push", "start", "coloured", "fade")

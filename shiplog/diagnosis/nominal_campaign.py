@@ -27,12 +27,13 @@ from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, Unrest
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.measurement_correction import read
-from shiplog.diagnosis.nominal_reference import Reference, Settled, Start
+from shiplog.diagnosis.nominal_reference import Reference, Settled
 from shiplog.diagnosis.parameter_layout import HELD, Columns
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
+from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 ROBUST = 6.0  # medians of χ², from which on a segment counts less

@@ -24,6 +24,7 @@ from shiplog.models.causes import Cause, Setting, constants_of
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
 from shiplog.models.mmg.model import MMG
+from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
@@ -37,20 +38,6 @@ VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
 CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s, of a three-metre ship
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
-
-
-@dataclass(frozen=True)
-class Start:
-    """Coefficients of the base [P] as the run has them, how far off they may be, and their range.
-
-    The run's own values hold them, and not what was known before any data: what these say nothing
-    of stays, and all is linear about where the ship is.
-    """
-
-    values: np.ndarray
-    spread: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.prepare import seconds
 from shiplog.diagnosis.evidence import Trial
-from shiplog.diagnosis.nominal_reference import Start
 from shiplog.exceptions import StoreError
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Setting, constants_of
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import estimate
+from shiplog.models.starting_values import Start
 from shiplog.profile import Profile
 from shiplog.simulation.extended_simulator import ExtendedSimulator, campaign
 from shiplog.training.run_folder import Run
@@ -65,7 +64,7 @@ def in_ship_time(
 
 def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
     """As `evaluate` cuts them; None where no stretch is long enough for one."""
-    rows = one_hertz.with_elapsed(seconds(store, names, profile))
+    rows = one_hertz.with_elapsed(store.seconds(names, profile))
     planned = plan(rows, "ref", run.config.window)
     if planned.height == 0:
         return None

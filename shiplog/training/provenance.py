@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 import torch
 
-from shiplog.training.run_config import Split
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 

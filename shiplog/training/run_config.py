@@ -3,39 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from shiplog.exceptions import RunError
+from shiplog.toml_section import Section
+from shiplog.voyages.split_settings import Split
 
 RECIPES = ("fast", "paper")
 WIND_INPUTS = ("angle", "components")
-
-
-@dataclass(frozen=True)
-class Augmentation:
-    """How many times over the same rows are used: every `step` rows, `copies` noisy ones."""
-
-    step: int
-    copies: int = 0
-
-
-AUGMENTATIONS = {  # Table 4 of the paper: step S and copies M, for windows of I = 100
-    "ref": Augmentation(100), "sli2": Augmentation(50), "sli10": Augmentation(10),
-    "jit2": Augmentation(100, 2), "jit10": Augmentation(100, 10),
-    "sli2xjit2": Augmentation(50, 2), "sli10xjit10": Augmentation(10, 10),
-    "d-ref": Augmentation(100),
-}  # fmt: skip
-
-
-class Section(BaseModel):
-    """A part of the configuration: frozen, and every key known."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Paper(Section):
@@ -85,15 +64,6 @@ class Physics(Section):
     ridges: tuple[Annotated[float, Field(gt=0)], ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
     width: int = Field(default=8, gt=0)  # of the hybrid's residual network
     strengths: tuple[float, ...] = (0.1, 0.3, 1.0)  # of it, to choose from on held-out voyages
-
-
-class Split(Section):
-    """Whole voyages; of a single voyage parts by time (`parts`), which share no second."""
-
-    training: tuple[str, ...]
-    validation: tuple[str, ...]
-    test: tuple[str, ...] = ()
-    chosen_by: str = ""
 
 
 class Config(Section):

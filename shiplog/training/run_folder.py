@@ -39,13 +39,13 @@ from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog.arguments import check_run, refuse_taken
-from shiplog.diagnosis.nominal_reference import Start
 from shiplog.exceptions import RunError, listed
 from shiplog.models import MODELS, compiled_network, mmg
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
+from shiplog.models.starting_values import Start
 from shiplog.profile import Profile, advice
 from shiplog.report.tables import finite
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign

@@ -18,7 +18,9 @@ from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.frames import Axes
 from shiplog.profile import Profile
+from shiplog.voyages import instruments
 from shiplog.voyages.fault_detection import stretches
+from shiplog.voyages.instruments import Sighted
 from shiplog.voyages.resampling import RATE_HZ
 from shiplog.voyages.timescale import THREE_METRES, Timescale
 
@@ -108,16 +110,13 @@ class Record:
 
     @cached_property
     def sighted(self) -> Sighted:
-        """What the instruments saw."""
-        sensors, state = self.profile.sensors, self.state
-        yaw_rate = state[:, 5]
-        ahead, aside = sensors.position.lever_arm_m
-        position = frames.position_at_midship(state[:, [0, 2]], self.axes, (-ahead, -aside))
-        ahead, aside = sensors.velocity.lever_arm_m
-        velocity = frames.velocity_at_midship(state[:, [1, 3]], yaw_rate, (-ahead, -aside))
-        if sensors.kind("velocity") != "body":
-            velocity = frames.to_body(velocity, self.axes.back)
-        return Sighted(position, velocity, state[:, 4], self.axes, yaw_rate)
+        """What the instruments measured."""
+        return instruments.sighted(self.state, self.axes, self.profile.sensors)
+
+    def measured_as(self, seen: Sighted, moved: tuple[float, float] = (0.0, 0.0)) -> Record:
+        """The record of these sights. `moved`: the antenna, from where the profile has it [m]."""
+        state = instruments.at_midship(seen, self.profile.sensors, moved)
+        return replace(self, state=state)
 
     def pick(self, voyages: Sequence[str]) -> Record:
         """The rows of these voyages, shares of the campaign as they were."""
@@ -179,50 +178,3 @@ def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
         "actuator": filled[:, 6 : 6 + count],
         "wind": wind,
     }
-
-
-# --- instruments: ingest's way to midship, undone and done again ----------------------------------
-
-
-@dataclass(frozen=True)
-class Sighted:
-    """What the instruments saw: position of the antenna over ground, its velocity [n, 2] (in body
-    axes or over ground, as the profile says), heading with its axes and yaw rate [n]."""
-
-    position: np.ndarray
-    velocity: np.ndarray
-    heading: np.ndarray
-    axes: Axes
-    yaw_rate: np.ndarray
-
-    def turned(self, angle: float) -> Sighted:
-        """With a heading that is by so much greater [rad]."""
-        return replace(self, heading=self.heading + angle, axes=self.axes.turned(angle))
-
-
-def reduced(
-    record: Record,
-    seen: Sighted,
-    moved: tuple[float, float] = (0.0, 0.0),
-) -> Record:
-    """The record of these sights. `moved`: the antenna, from where the profile has it [m]."""
-    sensors = record.profile.sensors
-    arm = np.array(sensors.position.lever_arm_m)
-    of_velocity = np.array(sensors.velocity.lever_arm_m)
-    shared = bool(np.array_equal(arm, of_velocity))
-    position = frames.position_at_midship(seen.position, seen.axes, tuple(arm + moved))
-    velocity = seen.velocity
-    if sensors.kind("velocity") != "body":
-        velocity = frames.to_body(velocity, seen.axes)
-    velocity = frames.velocity_at_midship(
-        velocity, seen.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
-    )
-    state = np.stack(
-        (
-            position[:, 0], velocity[:, 0], position[:, 1], velocity[:, 1],
-            seen.heading, seen.yaw_rate,
-        ), -1,
-    )  # fmt: skip
-    found = replace(record, state=state)
-    vars(found)["axes"] = seen.axes  # known already
-    return found

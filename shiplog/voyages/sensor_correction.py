@@ -16,17 +16,11 @@ import polars as pl
 from shiplog import channels, frames, units
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
-from shiplog.models.causes.sensors import (
-    AntennaOffset,
-    ClockOffset,
-    HeadingOffset,
-    YawRateBias,
-    YawRateScale,
-)
 from shiplog.profile import Profile
 from shiplog.voyages import fault_detection
+from shiplog.voyages import instrument_faults as faults
 from shiplog.voyages.ingest import Voyage
-from shiplog.voyages.recording import Record, reduced
+from shiplog.voyages.recording import Record
 from shiplog.voyages.sensor_consistency import Estimate
 
 STATE = [c.name for c in channels.STATE]
@@ -34,35 +28,34 @@ MEASURED = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE
 HEADING = 4
 DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # of a channel that the mark does not name
 
-Remedy = Callable[[Record, np.ndarray], Record]
+Remedy = Callable[[Record, float], Record]
 
 
 def _antenna(ahead: float, starboard: float) -> Remedy:
-    """The position alone moves: it is against the velocity that it stands elsewhere."""
+    """The position alone moves: it is against the velocity that the antenna is misplaced."""
 
-    def read(record: Record, p: np.ndarray) -> Record:
-        moved = AntennaOffset().read(record, p[0] * np.array([ahead, starboard]))
+    def without(record: Record, size: float) -> Record:
+        moved = faults.without_antenna_offset(record, size * ahead, size * starboard)
         state = record.state.copy()
         state[:, MEASURED["position"]] = moved.state[:, MEASURED["position"]]
         return replace(record, state=state)
 
-    return read
+    return without
 
 
-def _velocity_scale(record: Record, p: np.ndarray) -> Record:
-    seen = record.sighted
-    return reduced(record, replace(seen, velocity=seen.velocity / (1.0 + p[0])))
+def _clock(channel: str) -> Remedy:
+    return lambda record, late: faults.without_clock_offset(record, channel, late)
 
 
-REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order of parity's equations, from outside
-    ("clock_offset", "yaw_rate"): ClockOffset("yaw_rate").read,
-    ("clock_offset", "gnss"): ClockOffset("gnss").read,
-    ("clock_offset", "position"): ClockOffset("position").read,
-    ("clock_offset", "velocity"): ClockOffset("velocity").read,
-    ("yaw_rate_bias", "yaw_rate"): YawRateBias().read,
-    ("yaw_rate_scale", "yaw_rate"): YawRateScale().read,
-    ("heading_offset", "heading"): HeadingOffset().read,
-    ("velocity_scale", "velocity"): _velocity_scale,
+REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order of the consistency equations
+    ("clock_offset", "yaw_rate"): _clock("yaw_rate"),
+    ("clock_offset", "gnss"): _clock("gnss"),
+    ("clock_offset", "position"): _clock("position"),
+    ("clock_offset", "velocity"): _clock("velocity"),
+    ("yaw_rate_bias", "yaw_rate"): faults.without_yaw_rate_bias,
+    ("yaw_rate_scale", "yaw_rate"): faults.without_yaw_rate_scale,
+    ("heading_offset", "heading"): faults.without_heading_offset,
+    ("velocity_scale", "velocity"): faults.without_velocity_scale,
     ("antenna_offset", "position ahead"): _antenna(1.0, 0.0),
     ("antenna_offset", "position starboard"): _antenna(0.0, 1.0),
 }
@@ -92,7 +85,7 @@ def put_right(
     for key, remedy in REMEDIES.items():
         if e := found.get(key):
             size = (e.value - e.none) * units.factor(e.unit)  # zero where there is no fault
-            record = remedy(record, np.array([size]))
+            record = remedy(record, size)
     mark = table["quality"].to_numpy().copy()
     before = _state(table)
     state = np.full_like(before, np.nan)

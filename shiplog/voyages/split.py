@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import polars as pl
 
-from pipelines.prepare import seconds
 from shiplog.exceptions import StoreError, listed
-from shiplog.training.run_config import AUGMENTATIONS, Split
 from shiplog.voyages import one_hertz, windows
+from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.parts import Part
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ def choose_physical_split(
 def _deal(store: Store, names: list[str], size: int) -> Split:
     profile = store.profile(names)
     profile.require_actuators()
-    rows = seconds(store, names, profile)
+    rows = store.seconds(names, profile)
     whole = plan(rows, "ref", size).group_by("voyage").len()
     counts = dict(whole.iter_rows())
     first = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())

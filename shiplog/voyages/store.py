@@ -33,7 +33,7 @@ from pydantic import ValidationError
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.logs.health_report import CONTRACT, VoyageReport
 from shiplog.profile import Profile, advice
-from shiplog.voyages import parts
+from shiplog.voyages import one_hertz, parts
 
 if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second
     from shiplog.voyages.ingest import Voyage
@@ -225,6 +225,10 @@ class Store:
         Raises StoreError for a voyage whose table is spoilt.
         """
         return [self._table(name) for name in names]
+
+    def seconds(self, names: Sequence[str], profile: Profile) -> pl.DataFrame:
+        """The sorted 1 Hz table of these voyages."""
+        return one_hertz.resample(self.tables(names), profile.columns, profile.circular)
 
     def _table(self, name: str) -> pl.LazyFrame:
         part = self._part(name)

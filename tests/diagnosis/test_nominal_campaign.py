@@ -15,8 +15,9 @@ from shiplog.diagnosis import (
     voyage_effects,
 )
 from shiplog.diagnosis.nominal_campaign import FEWEST, parts_of, prior
-from shiplog.diagnosis.nominal_reference import Settled, Start
+from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.diagnosis.voyage_effects import VoyageEffects
+from shiplog.models.starting_values import Start
 
 
 def cuts(seed: int) -> np.ndarray:

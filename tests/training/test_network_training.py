@@ -10,7 +10,8 @@ from shiplog import random_streams
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient
 from shiplog.training.network_training import fast, paper, shortened
-from shiplog.training.run_config import Config, Fast, Paper, Split
+from shiplog.training.run_config import Config, Fast, Paper
+from shiplog.voyages.split_settings import Split
 
 SHAPE = Shape(3, width=12, depth=2)
 

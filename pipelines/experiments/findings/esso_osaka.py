@@ -10,9 +10,10 @@ from pipelines.experiments.findings.said import diagnosed, variant
 from pipelines.identify import identify_run
 from pipelines.prepare import expand, ingest_logs
 from shiplog.report import tables
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
 from shiplog.voyages import sensor_consistency
 from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 MANOEUVRES = ("berthing", "random", "turn", "zigzag")

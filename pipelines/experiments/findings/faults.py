@@ -22,8 +22,8 @@ from pipelines.experiments.findings.said import parameters, unit
 from pipelines.prepare import expand, ingest_logs
 from shiplog.profile import Profile
 from shiplog.report import tables
-from shiplog.training.run_config import Split
 from shiplog.voyages.ingest import ingest
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 Columns = dict[str, np.ndarray]  # of a voyage's table, as they are to become

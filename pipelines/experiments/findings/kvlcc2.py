@@ -13,7 +13,8 @@ from pipelines.experiments.findings.said import diagnosed
 from pipelines.identify import identify_run
 from pipelines.prepare import expand, ingest_logs
 from shiplog import profile as profiles
-from shiplog.training.run_config import Config, Split
+from shiplog.training.run_config import Config
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 HSVA, MARIN = "hsva_cpmc_zigzag_20hz_model.parquet", "marin_free_fullscale.parquet"

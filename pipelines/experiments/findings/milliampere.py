@@ -16,7 +16,7 @@ from pipelines.prepare import ingest_logs
 from shiplog import frames
 from shiplog import profile as profiles
 from shiplog.report import tables
-from shiplog.training.run_config import Split
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 UNITS = (1, 2, 3, 4)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from shiplog.models.causes.base import Cause, Parameter, Shown
-from shiplog.voyages.recording import Record, reduced
+from shiplog.voyages import instrument_faults as faults
+from shiplog.voyages.recording import Record
 
 
 @dataclass(frozen=True)
@@ -44,13 +45,7 @@ class HeadingOffset(Cause):
         return ("body velocity",) if self.turned else ()
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = record.sighted.turned(-float(p[0]))
-        if self.turned:
-            c, s = np.cos(p[0]), np.sin(p[0])
-            ahead, starboard = seen.velocity[:, 0], seen.velocity[:, 1]
-            was = np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
-            seen = replace(seen, velocity=was)
-        return reduced(record, seen)
+        return faults.without_heading_offset(record, float(p[0]), self.turned)
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."
@@ -70,8 +65,7 @@ class YawRateBias(Cause):
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = record.sighted
-        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate - p[0]))
+        return faults.without_yaw_rate_bias(record, float(p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The yaw rate shows {shown['value'].value:+.3f} deg/s too much."
@@ -90,8 +84,7 @@ class YawRateScale(Cause):
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        seen = record.sighted
-        return reduced(record, replace(seen, yaw_rate=seen.yaw_rate / (1.0 + p[0])))
+        return faults.without_yaw_rate_scale(record, float(p[0]))
 
     def inverse(self, p: np.ndarray) -> np.ndarray:
         return -p / (1.0 + p)
@@ -143,17 +136,7 @@ class ClockOffset(Cause):
         return {"wind": ("wind", "wind force"), "yaw_rate": ("yaw rate",)}.get(self.channel, ())
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        late = float(p[0])
-        if self.channel == "wind":
-            return replace(record, wind=record.later(record.wind, late))
-        seen = record.sighted
-        if self.channel in ("position", "gnss"):
-            seen = replace(seen, position=record.later(seen.position, late))
-        if self.channel in ("velocity", "gnss"):
-            seen = replace(seen, velocity=record.later(seen.velocity, late))
-        if self.channel == "yaw_rate":
-            seen = replace(seen, yaw_rate=record.later(seen.yaw_rate, late))
-        return reduced(record, seen)
+        return faults.without_clock_offset(record, self.channel, float(p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         late = shown["time"].value
@@ -189,7 +172,7 @@ class AntennaOffset(Cause):
         return True
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return reduced(record, record.sighted, (float(p[0]), float(p[1])))
+        return faults.without_antenna_offset(record, float(p[0]), float(p[1]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         x, y = shown["x"].value, shown["y"].value
@@ -217,10 +200,7 @@ class WindDirectionOffset(Cause):
         return True
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        c, s = np.cos(p[0]), np.sin(p[0])
-        ahead, starboard = record.wind[:, 0], record.wind[:, 1]
-        turned = np.stack((c * ahead + s * starboard, c * starboard - s * ahead), -1)
-        return replace(record, wind=turned)
+        return faults.without_wind_direction_offset(record, float(p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return f"The wind's direction shows {shown['angle'].value:+.1f} deg too much."
@@ -244,7 +224,7 @@ class WindSpeedScale(Cause):
         return True
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        return replace(record, wind=record.wind / (1.0 + p[0]))
+        return faults.without_wind_speed_scale(record, float(p[0]))
 
     def inverse(self, p: np.ndarray) -> np.ndarray:
         return -p / (1.0 + p)

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from shiplog import channels
-from shiplog.training.run_config import AUGMENTATIONS
+from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
 BINS = 30  # of a histogram of one channel
