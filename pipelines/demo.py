@@ -12,7 +12,7 @@ from pipelines.evaluate import compare_runs
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
-from shiplog.arguments import sample_logs
+from shiplog.cli.arguments import sample_logs
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split

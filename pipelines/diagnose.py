@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from shiplog.arguments import refuse_taken
+from shiplog import files
+from shiplog.paths import refuse_taken
 from shiplog.diagnosis import (
     baseline_check,
     error_location,
@@ -186,13 +187,13 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
 def _write(done: Diagnosis) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
     (done.folder / "report.md").write_text(page.markdown(done.verdict), encoding="utf-8")
-    run_folder.write_json(done.folder / "verdict.json", done.verdict.as_json())
+    files.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
 def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: float) -> None:
     _write(done)
     split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
-    run_folder.write_json(done.folder / "provenance.json", provenance(store, split, began))
+    files.write_json(done.folder / "provenance.json", provenance(store, split, began))
     if done.recording is not None:
         diagnosis_pictures.save(done, done.recording)
 

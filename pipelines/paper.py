@@ -11,6 +11,7 @@ import polars as pl
 
 from pipelines import train
 from pipelines.evaluate import Evaluation, evaluate_runs
+from shiplog import files
 from shiplog.channels import VELOCITY
 from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
 from shiplog.logs.health_report import CONTRACT
@@ -269,13 +270,9 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
         if name != "ref" and "ref" in results.runs:
             figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
     for name, frame in frames.items():
-        partial = numbers / f"{name}.partial"
-        frame.write_parquet(partial)
-        partial.replace(numbers / f"{name}.parquet")
+        files.write_frame(numbers / f"{name}.parquet", frame)
     text = report_of(results, chosen, sizes)
-    partial = out / "report.partial"
-    partial.write_text(text + "\n", encoding="utf-8")
-    partial.replace(out / "report.md")
+    files.write_text(out / "report.md", text + "\n")
     title = f"{profile.ship.name}: {len(results.runs)} window sets"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
     return text

@@ -16,7 +16,7 @@ import torch
 
 from pipelines.bars import Bars
 from shiplog import random_streams
-from shiplog.arguments import refuse_taken
+from shiplog.paths import refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling

@@ -44,7 +44,7 @@ MENDABLE = (  # what the system says of a path that the user can mend
 def _ask_json(json_to: str | None) -> str | None:
     """Whether --json can be written is known before the work."""
     if json_to and json_to != "-":
-        from shiplog.arguments import check_file
+        from shiplog.paths import check_file
 
         check_file(Path(json_to), "--json")
     return json_to
@@ -161,17 +161,17 @@ def _stopped(number: int, _frame: object) -> NoReturn:
 
 def _answer(text: str, content: dict, json_to: str | None) -> None:
     """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
-    from shiplog.report import tables
+    from shiplog import files  # it loads polars
 
     if json_to == "-":
         typer.echo(text, err=True)
-        typer.echo(json.dumps(tables.finite(content), indent=1))
+        typer.echo(files.json_text(content))
         return
     if text:
         typer.echo(text)
     if json_to:
         try:
-            Path(json_to).write_text(json.dumps(tables.finite(content), indent=1), encoding="utf-8")
+            files.write_text(Path(json_to), files.json_text(content))
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",
@@ -211,7 +211,8 @@ def demo(
 
     Example: shiplog demo --out demo --no-view
     """
-    from shiplog.arguments import check_writable, sample_logs
+    from shiplog.cli.arguments import sample_logs
+    from shiplog.paths import check_writable
 
     check_writable(out, "--out")
     folder = sample_logs(logs)
@@ -254,7 +255,7 @@ def ingest(
 
     Example: shiplog ingest sample_logs --store store
     """
-    from shiplog.arguments import check_writable
+    from shiplog.paths import check_writable
 
     check_writable(store, "--store")
     _check_logs(logs, profile)
@@ -300,7 +301,7 @@ def convert(
 
     Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
     """
-    from shiplog.arguments import check_writable
+    from shiplog.paths import check_writable
 
     check_writable(out, "--out")
     from shiplog import profile as profiles
@@ -333,7 +334,7 @@ def profile(
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
-    from shiplog.arguments import check_file, refuse_taken
+    from shiplog.paths import check_file, refuse_taken
 
     if out is not None:
         refuse_taken(out)
@@ -433,7 +434,8 @@ def train(
     Example: shiplog train --data ref --seeds 3 --out runs/ref
     Example: shiplog train --model mmg --voyages 'trial_*' --out runs/mmg
     """
-    from shiplog.arguments import check_training, check_writable, refuse_taken
+    from shiplog.cli.arguments import check_training
+    from shiplog.paths import check_writable, refuse_taken
 
     physical = {
         "--no-fit": not fit, "--parameters": parameters is not None, "--without": bool(without),
@@ -509,7 +511,8 @@ def paper(
 
     Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
     """
-    from shiplog.arguments import check_training, check_writable
+    from shiplog.cli.arguments import check_training
+    from shiplog.paths import check_writable
     from shiplog.voyages.augmentation import AUGMENTATIONS
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
@@ -575,7 +578,7 @@ def compare(
 
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """
-    from shiplog.arguments import check_file
+    from shiplog.paths import check_file
 
     _check_runs(runs, store, voyages, cause)
     if save is not None:
@@ -611,7 +614,7 @@ def diagnose(
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """
-    from shiplog.arguments import check_writable, refuse_taken
+    from shiplog.paths import check_writable, refuse_taken
 
     _check_runs([run], store, voyages, cause)
     check_writable(out, "--out")
@@ -655,7 +658,7 @@ def _check_runs(
     causes: Sequence[Path] | None,
 ) -> None:
     """Raises ShiplogError for a run, voyage or file that is not there."""
-    from shiplog.arguments import check_causes, check_run
+    from shiplog.paths import check_causes, check_run
 
     for run in runs:
         check_run(run)

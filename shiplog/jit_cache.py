@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 from jax import export
 from jax.core import Tracer
 
-from shiplog import disk_cache
+from shiplog import disk_cache, files
 
 log = logging.getLogger(__name__)
 
@@ -73,11 +72,10 @@ def traced(function: Callable) -> Traced:
 
 
 def _keep(kept: Any, found: export.Exported) -> None:
-    partial = kept.with_name(f"{kept.stem}.{os.getpid()}.partial")
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(found.serialize())
-        partial.replace(kept)
+        with files.whole(kept) as partial:
+            partial.write_bytes(found.serialize())
     except OSError as error:
         log.info("not kept: %s", error)
 

@@ -6,6 +6,7 @@ import sailing
 import torch
 from small_networks import network, windows
 
+from shiplog import files
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient, run_folder
@@ -96,5 +97,5 @@ def test_a_torn_weight_file_is_named(begun):
 
 
 def test_json_has_no_infinity(tmp_path):
-    run_folder.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
+    files.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
     assert (tmp_path / "a.json").read_text().count("null") == 2

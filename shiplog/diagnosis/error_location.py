@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import polars as pl
 
+from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis import (
     external_forces,
     omitted_inputs,
@@ -16,12 +17,11 @@ from shiplog.diagnosis import (
 from shiplog.diagnosis import trial as diagnosis_trial
 from shiplog.diagnosis.evidence import Point, Trial
 from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.profile import Profile
-from shiplog.report import verdict as verdicts
-from shiplog.report.verdict import Interval
 from shiplog.simulation import coverage as covering
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.extended_simulator import campaign
@@ -67,17 +67,16 @@ def by_channel(held: HeldOut) -> list[dict]:
     return [c.as_json() for c in found.channels]
 
 
-def depends_on(trial: Trial, decision: Decision, whole: Linear) -> list[dict]:
+def depends_on(trial: Trial, decision: Decision, whole: Linear) -> tuple[Dependence, ...]:
     """What the model cannot see and the residual depends on."""
     found = residual_acceleration.posterior(
         *trial.left(whole, trial.solved(decision.first, decision.nothing)),
         trial.unrest.louder(decision.nothing.louder), trial.record,
     )  # fmt: skip
     knots = residual_acceleration.table(found, trial.record)
-    rows = omitted_inputs.table(
+    return omitted_inputs.table(
         knots, trial.record.profile, np.random.default_rng(0), knot=trial.grid.knot
     )
-    return [verdicts.unseen_json(row) for row in rows]
 
 
 def uncovered(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 import zipfile
 from collections.abc import Iterable
 from dataclasses import astuple
@@ -16,7 +15,7 @@ from pathlib import Path as File
 import jax
 import numpy as np
 
-from shiplog import disk_cache
+from shiplog import disk_cache, files
 from shiplog.diagnosis import nominal_campaign, nominal_reference
 from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linearisation import Path
@@ -96,12 +95,10 @@ def _settled(arrays: dict) -> Settled:
 
 def _keep(kept: File, arrays: dict) -> None:
     """Whole or not at all; a cache that cannot be written is no fault."""
-    partial = kept.with_name(f"{kept.stem}.{os.getpid()}.partial")
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
+        with files.whole(kept) as partial, partial.open("wb") as file:
             np.savez(file, **arrays)
-        partial.replace(kept)
     except OSError as error:
         log.info("not kept: %s", error)
 

@@ -5,13 +5,13 @@ An MCAP file that ROS 2 recorded is a log already, and needs none of this.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 from pathlib import Path
 
 from mcap.writer import CompressionType, IndexType, Writer
 
+from shiplog import files
 from shiplog.exceptions import LogUnreadable, listed
 from shiplog.logs.write import CHUNK, CONTRACT
 
@@ -43,25 +43,21 @@ def bag_to_log(path: Path, target: Path, ship: str) -> dict[str, str]:
     from rosbags.typesys import Stores, get_typestore
 
     source = path.parent if path.suffix.lower() == SQLITE else path
-    partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:
         with (
+            files.whole(target) as partial,
             AnyReader([source], default_typestore=get_typestore(Stores[USUAL])) as reader,
             partial.open("wb") as stream,
         ):
             left_out = _write(reader, stream, ship, path.name)
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(partial, target)
     except (AnyReaderError, Reader1Error, Reader2Error, OSError) as error:
         raise LogUnreadable(
             f"{path.name} cannot be read as a ROS bag: {error}.",
             hint="a ROS 2 bag is the folder with its metadata.yaml; `ros2 bag reindex` makes one "
             "anew, `rosbag reindex` mends a ROS 1 bag that was cut off.",
         ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            partial.unlink(missing_ok=True)
     return left_out
 
 

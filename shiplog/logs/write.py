@@ -25,6 +25,7 @@ from google.protobuf.descriptor_pb2 import (
 from google.protobuf.timestamp_pb2 import DESCRIPTOR as TIMESTAMP_FILE
 from mcap.writer import CompressionType, IndexType, Writer
 
+from shiplog import files
 from shiplog.exceptions import ShiplogError, listed, nearest
 
 CONTRACT = "1"
@@ -95,19 +96,13 @@ def write_log(
         voyage["datum"] = f"{float(datum[0])!r},{float(datum[1])!r}"
     for key, value in (notes or {}).items():
         voyage.setdefault(key, value)  # ship, datum and contract are not a note's to change
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with open(partial, "wb") as stream:
-            _write(Writer(
-                stream, chunk_size=CHUNK, compression=CompressionType.ZSTD,
-                index_types=IndexType.ALL, enable_crcs=True,
-            ), series, voyage)  # fmt: skip
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(partial, path)
-    except BaseException:  # an interrupt too must leave nothing behind
-        partial.unlink(missing_ok=True)
-        raise
+    with files.whole(path) as partial, open(partial, "wb") as stream:
+        _write(Writer(
+            stream, chunk_size=CHUNK, compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL, enable_crcs=True,
+        ), series, voyage)  # fmt: skip
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def _refuse_twins(series: Sequence[Series]) -> None:

@@ -9,10 +9,11 @@ from pathlib import Path
 from shiplog.diagnosis import error_location, next_manoeuvre, segments
 from shiplog.diagnosis.evidence import Trial
 from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.result import Decision
 from shiplog.report import verdict as verdicts
-from shiplog.report.verdict import Interval, Verdict
+from shiplog.report.verdict import Verdict
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.run_folder import Run
@@ -72,7 +73,7 @@ class Context:
     segment: float = timescale.SECONDS
     uncovered: Sequence[Interval] = ()
     wrong: Sequence[dict] = ()
-    unseen: Sequence[dict] = ()
+    unseen: Sequence[Dependence] = ()
     alone: float | None = None
 
 
@@ -122,7 +123,7 @@ def verdict(
         gain=found if causes else None,
         without="" if held is None else held.left_out,
         wrong=tuple(context.wrong),
-        unseen=tuple(context.unseen),
+        unseen=tuple(verdicts.unseen_json(row) for row in context.unseen),
         limits=verdicts.limits_json(decision, catalogue, setting),
         unavailable=unavailable,
         notes=tuple(notes),

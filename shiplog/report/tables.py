@@ -356,14 +356,3 @@ def voyages_table(answer: dict) -> str:
         for name, v in answer["voyages"].items()
     ]
     return table(("voyage", "windows", "L", "covered"), rows)
-
-
-def finite(value):
-    """JSON has no infinity: null it, at any depth."""
-    if isinstance(value, dict):
-        return {k: finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

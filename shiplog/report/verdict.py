@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shiplog.channels import VELOCITY
+from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.next_manoeuvre import Advice
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import LEAST, PULSES, Decision, Named
@@ -19,23 +20,6 @@ SHARE_SAID = 0.01  # of a ranking
 SURELY = 0.9  # probability from which on a sentence is said without it
 HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
 NINETY = 1.645  # standard deviations to either end of a 90 % interval
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A stretch of a voyage that is another matter: external, gap or coverage."""
-
-    voyage: str
-    start_s: float
-    end_s: float
-    kind: str
-    sentence: str
-
-    def as_json(self) -> dict:
-        return {
-            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
-            "kind": self.kind, "sentence": self.sentence,
-        }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ Killed, it goes on from the finished seeds and, in the paper's recipe, from the 
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -38,7 +37,8 @@ from safetensors.numpy import load_file as load_arrays
 from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
-from shiplog.arguments import check_run, refuse_taken
+from shiplog import files
+from shiplog.paths import check_run, refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.models import MODELS, compiled_network, mmg
 from shiplog.models.causes import CATALOGUE, Cause
@@ -47,7 +47,6 @@ from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
 from shiplog.models.starting_values import Start
 from shiplog.profile import Profile, advice
-from shiplog.report.tables import finite
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.prediction_interval import Band
 from shiplog.simulation.sensitivities import Simulator
@@ -350,9 +349,7 @@ class Run:
         folder.mkdir(exist_ok=True)
         _save(folder / "model.safetensors", _named(progress.best_weights))
         history = pl.DataFrame(progress.history, schema=list(HISTORY), orient="row")
-        partial = folder / "training.partial"
-        history.write_parquet(partial)
-        partial.replace(folder / "training.parquet")  # last: this is what `finished` looks for
+        files.write_frame(folder / "training.parquet", history)  # last: `finished` looks for it
         (folder / "checkpoint.safetensors").unlink(missing_ok=True)
 
     def save_checkpoint(self, seed: int, progress: Progress) -> None:
@@ -398,13 +395,11 @@ class Run:
     def save_evaluation(self, errors: pl.DataFrame, rollouts: pl.DataFrame) -> None:
         """What the latest evaluation found: errors.parquet and rollouts.parquet."""
         for name, frame in (("errors", errors), ("rollouts", rollouts)):
-            partial = self.path / f"{name}.partial"
-            frame.write_parquet(partial)
-            partial.replace(self.path / f"{name}.parquet")
+            files.write_frame(self.path / f"{name}.parquet", frame)
 
     def finish(self, provenance: dict) -> Run:
         """Say where it came from and give it its name."""
-        write_json(self.path / "provenance.json", provenance)
+        files.write_json(self.path / "provenance.json", provenance)
         final = self.path.with_name(self.name)
         self.path.rename(final)
         return Run(final, self.config, self.profile)
@@ -442,16 +437,14 @@ def create(
     windows.write_parquet(partial / "windows.parquet")
     training.write_parquet(partial / "training.parquet")
     validation.write_parquet(partial / "validation.parquet")
-    write_json(partial / "profile.json", profile.model_dump(mode="json"))
+    files.write_json(partial / "profile.json", profile.model_dump(mode="json"))
     if scaling is not None:
         _save(
             partial / "scaling.safetensors",
             {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
         )
     # Last, and whole: a folder with a config is one that can be gone on with.
-    begun = partial / "config.partial"
-    begun.write_text(config.to_toml(), encoding="utf-8")
-    begun.replace(partial / "config.toml")
+    files.write_text(partial / "config.toml", config.to_toml())
     return Run(partial, config, profile)
 
 
@@ -481,8 +474,9 @@ def open_folder(path: Path) -> Run:
     return Run(path, config, profile)
 
 
-def extend(run: Run, out: Path, simulator: ExtendedSimulator, files: Sequence[Path] = ()) -> Run:
-    """A new run: everything of the old one, and the causes. Raises RunError for a taken name."""
+def extend(run: Run, out: Path, simulator: ExtendedSimulator, of: Sequence[Path] = ()) -> Run:
+    """A new run: everything of the old one, and the causes; `of` are the files of those that are
+    not in the catalogue. Raises RunError for a taken name."""
     refuse_taken(out, "--extend")
     partial = out.with_name(f"{out.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
@@ -495,19 +489,12 @@ def extend(run: Run, out: Path, simulator: ExtendedSimulator, files: Sequence[Pa
     )  # fmt: skip
     told, arrays = Extension.kept(simulator, len(simulator.model.base.names))
     own = tuple(cause for cause in simulator.model.causes if cause.user)
-    for i, path in enumerate(files if own else ()):
+    for i, path in enumerate(of if own else ()):
         shutil.copy(path, partial / f"extension-{i}.py")
-    write_json(partial / "extension.json", told | {"base": run.name})
+    files.write_json(partial / "extension.json", told | {"base": run.name})
     _save_arrays(partial / "extension.safetensors", arrays)
     partial.rename(out)
     return Run(out, run.config, run.profile, own)
-
-
-def write_json(path: Path, content: dict) -> None:
-    """JSON, whole or not at all; a number that is not finite becomes null."""
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(finite(content), indent=1, allow_nan=False), encoding="utf-8")
-    partial.replace(path)
 
 
 def _same_rows(partial: Path, training: pl.DataFrame) -> bool:
@@ -570,12 +557,11 @@ def _arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _save_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    partial = path.with_name(f"{path.name}.partial")
-    save_arrays({name: np.array(a, dtype=float, order="C") for name, a in arrays.items()}, partial)
-    partial.replace(path)
+    with files.whole(path) as partial:
+        plain = {name: np.array(a, dtype=float, order="C") for name, a in arrays.items()}
+        save_arrays(plain, partial)
 
 
 def _save(path: Path, tensors: dict[str, torch.Tensor]) -> None:
-    partial = path.with_name(f"{path.name}.partial")
-    save_file(tensors, partial)
-    partial.replace(path)
+    with files.whole(path) as partial:
+        save_file(tensors, partial)

@@ -30,6 +30,7 @@ import polars as pl
 from filelock import FileLock
 from pydantic import ValidationError
 
+from shiplog import files
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.logs.health_report import CONTRACT, VoyageReport
 from shiplog.profile import Profile, advice
@@ -344,9 +345,8 @@ class Store:
         entries = self._scan_folders()
         if entries == self._catalogue():
             return
-        partial = self.path / ".catalogue.parquet"
-        pl.DataFrame([asdict(entry) for entry in entries]).write_parquet(partial)
-        partial.replace(self.path / "catalogue.parquet")
+        rows = pl.DataFrame([asdict(entry) for entry in entries])
+        files.write_frame(self.path / "catalogue.parquet", rows)
 
 
 def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:

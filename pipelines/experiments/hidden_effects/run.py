@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shiplog import files
 from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import program
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
@@ -311,16 +312,12 @@ def _failed(done: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:
-    partial = folder / "steps.json.partial"
-    partial.write_text(json.dumps(steps, indent=1) + "\n", encoding="utf-8")
-    partial.replace(folder / "steps.json")
+    files.write_text(folder / "steps.json", json.dumps(steps, indent=1) + "\n")
 
 
 def _seal_file(path: Path) -> None:
     """NAME.sha256 beside NAME.json, whole or not at all."""
-    partial = path.with_suffix(".sha256.partial")
-    partial.write_text(f"{_sha256(path.read_bytes())}  {path.name}\n", encoding="utf-8")
-    partial.replace(path.with_suffix(".sha256"))
+    files.write_text(path.with_suffix(".sha256"), f"{_sha256(path.read_bytes())}  {path.name}\n")
 
 
 def _sha256(content: bytes) -> str:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from shiplog.arguments import check_causes
+from shiplog.paths import check_causes
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 

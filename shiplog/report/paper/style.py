@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shiplog import files
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -45,9 +47,8 @@ def figure(height: float, path: Path) -> Iterator[Figure]:
         try:
             yield drawn
             for kind in ("svg", "png"):
-                partial = path.with_suffix(f".{kind}.partial")
                 said = {"Date": None} if kind == "svg" else {}
-                drawn.savefig(partial, format=kind, metadata=said)
-                partial.replace(path.with_suffix(f".{kind}"))
+                with files.whole(path.with_suffix(f".{kind}")) as partial:
+                    drawn.savefig(partial, format=kind, metadata=said)
         finally:
             pyplot.close(drawn)

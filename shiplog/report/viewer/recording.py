@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog import files
 from shiplog.exceptions import ShiplogError
 from shiplog.report.comparison_data import Comparison
 from shiplog.report.diagnosis_data import Exhibit
@@ -65,18 +65,15 @@ def whole(title: str, blueprint: rrb.Blueprint, path: Path) -> Iterator[rr.Recor
     recording.send_blueprint(blueprint)
     yield recording
     content = made.read() or b""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(content)
-        partial.replace(path)
+        with files.whole(path) as partial:
+            partial.write_bytes(content)
     except OSError as error:
         raise ShiplogError(
             f"The recording {path} could not be written: {error}.",
             hint="is the disk full, is the folder writable?",
         ) from error
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def layout(picture: Drawn) -> rrb.Blueprint:

@@ -1,0 +1,77 @@
+"""Paths that a command is given, checked before the work and before anything heavy is loaded."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from shiplog.exceptions import RunError, ShiplogError
+
+
+def refuse_taken(path: Path, option: str = "--out") -> None:
+    """Raises RunError where something is there already."""
+    if path.exists():
+        raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
+
+
+def check_writable(path: Path, option: str) -> None:
+    """Raises ShiplogError where there can be no folder of this name to write into."""
+    try:
+        there = path if path.exists() else _above(path)
+        good = there.is_dir() and os.access(there, os.W_OK)
+        why = "is not writable" if there.is_dir() else "is a file, not a folder"
+    except OSError as error:  # a name that is too long
+        raise ShiplogError(
+            f"{option} {path} cannot be used: {error.strerror}.", hint=f"choose another {option}."
+        ) from error
+    if not good:
+        raise ShiplogError(
+            f"{option} {path} cannot be written: {there} {why}.", hint=f"choose another {option}."
+        )
+
+
+def check_file(path: Path, option: str) -> None:
+    """Raises ShiplogError where no file of this name can be written; one that is there can be
+    replaced."""
+    if path.is_dir():
+        raise ShiplogError(
+            f"{option} {path} cannot be written: it is a folder.", hint="give a file's path."
+        )
+    if not path.parent.exists():
+        raise ShiplogError(
+            f"{option} {path} cannot be written: there is no folder {path.parent}.",
+            hint=f"give {option} a path in a folder that exists.",
+        )
+    check_writable(path.parent, option)
+
+
+def check_run(path: Path) -> None:
+    """Raises RunError for what is no finished run."""
+    if (path / "config.toml").is_file():
+        return
+    if path.with_name(f"{path.name}.partial").is_dir():
+        raise RunError(
+            f"The run {path} is not finished.",
+            hint="give the same `shiplog train` again: it goes on.",
+        )
+    if path.exists():
+        raise RunError(
+            f"{path} is no run: there is no config.toml in it.",
+            hint="give the folder that shiplog train --out RUN made.",
+        )
+    raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+
+
+def check_causes(paths: Sequence[Path]) -> None:
+    """Raises RunError for a --cause that is no Python file."""
+    for path in paths:
+        if not path.is_file() or path.suffix != ".py":
+            raise RunError(
+                f"{path} is no Python file.", hint="give --cause a file such as my_cause.py."
+            )
+
+
+def _above(path: Path) -> Path:
+    """The nearest folder above that exists."""
+    return next((p for p in path.absolute().parents if p.exists()), Path.cwd())
