@@ -12,7 +12,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from shiplog import files
-from shiplog.paths import refuse_taken
 from shiplog.diagnosis import (
     baseline_check,
     error_location,
@@ -28,6 +27,7 @@ from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.exceptions import RunError, listed
 from shiplog.models.causes import Cause, user
+from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, Diagnosis

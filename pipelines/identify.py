@@ -11,11 +11,11 @@ import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
-from shiplog.paths import refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models import mmg
 from shiplog.models.hybrid import Hybrid
+from shiplog.paths import refuse_taken
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Series, Simulator, losses, rollout

@@ -16,10 +16,10 @@ import torch
 
 from pipelines.bars import Bars
 from shiplog import random_streams
-from shiplog.paths import refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
+from shiplog.paths import refuse_taken
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
 from shiplog.training import network_gradient, run_folder

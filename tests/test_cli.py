@@ -12,7 +12,7 @@ import sailing
 from typer.testing import CliRunner
 
 from pipelines.experiments import simulated_ship
-from shiplog import cli
+from shiplog.cli import app
 from shiplog.exceptions import ShiplogError
 
 FAST = ("--window", "40", "--width", "12", "--epochs", "8")
@@ -20,7 +20,7 @@ FAST = ("--window", "40", "--width", "12", "--epochs", "8")
 
 def call(*arguments):
     """Exit code, stdout and stderr, with a ShiplogError handled as `main` does."""
-    result = CliRunner().invoke(cli.app, [str(a) for a in arguments])
+    result = CliRunner().invoke(app.app, [str(a) for a in arguments])
     if isinstance(result.exception, ShiplogError):
         return result.exception.exit_code, result.stdout, str(result.exception)
     if result.exception is not None and not isinstance(result.exception, SystemExit):

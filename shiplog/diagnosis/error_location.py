@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import polars as pl
 
-from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis import (
     external_forces,
     omitted_inputs,
@@ -19,6 +18,7 @@ from shiplog.diagnosis.evidence import Point, Trial
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.profile import Profile

@@ -11,6 +11,7 @@ from shiplog.diagnosis.evidence import Trial
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict

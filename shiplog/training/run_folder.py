@@ -38,7 +38,6 @@ from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import load_file, save_file
 
 from shiplog import files
-from shiplog.paths import check_run, refuse_taken
 from shiplog.exceptions import RunError, listed
 from shiplog.models import MODELS, compiled_network, mmg
 from shiplog.models.causes import CATALOGUE, Cause
@@ -46,6 +45,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
 from shiplog.models.starting_values import Start
+from shiplog.paths import check_run, refuse_taken
 from shiplog.profile import Profile, advice
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.prediction_interval import Band

@@ -22,12 +22,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shiplog import files
 from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import program
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from pipelines.experiments.hidden_effects.program import ROOT
 from pipelines.experiments.hidden_effects.score import FAILED
+from shiplog import files
 
 log = logging.getLogger(__name__)
 

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from shiplog.paths import check_causes
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
+from shiplog.paths import check_causes
 
 
 def load(paths: Sequence[Path]) -> tuple[Cause, ...]:

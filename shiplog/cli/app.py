@@ -1,0 +1,73 @@
+"""All commands, in the order in which `shiplog --help` lists them: a line each."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from shiplog.cli import (
+    cache,
+    check,
+    compare,
+    convert,
+    demo,
+    diagnose,
+    evaluate,
+    ingest,
+    paper,
+    profile,
+    train,
+    voyages,
+)
+
+COMMANDS = (
+    demo.demo,
+    check.check,
+    ingest.ingest,
+    convert.convert,
+    profile.profile,
+    voyages.voyages,
+    train.train,
+    paper.paper,
+    evaluate.evaluate,
+    compare.compare,
+    diagnose.diagnose,
+    cache.cache,
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Learn a ship's dynamic model from its logs, and see where it fails.",
+)
+
+
+def _version(asked: bool) -> None:
+    """What runs: versions, and what computes the gradient of a training."""
+    if not asked:
+        return
+    from importlib.metadata import version
+
+    from shiplog.training import kernel
+
+    level = kernel.level()
+    what = f"compiled kernel, {level}" if level else "torch (no compiled kernel)"
+    typer.echo(f"shiplog {version('shiplog')}, torch {version('torch')}, training by: {what}")
+    raise typer.Exit
+
+
+@app.callback()
+def _every(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Versions, and exit."),
+    ] = False,
+) -> None:
+    """Learn a ship's dynamic model from its logs, and see where it fails."""
+
+
+for _command in COMMANDS:
+    app.command()(_command)

@@ -1,0 +1,19 @@
+"""`shiplog check`."""
+
+from __future__ import annotations
+
+from shiplog.cli.inputs import check_paths
+from shiplog.cli.options import JsonOption, Logs, ProfileOption
+from shiplog.cli.output import leave
+
+
+def check(logs: Logs, profile: ProfileOption = None, json_to: JsonOption = None) -> None:
+    """Health of logs without ingesting them: what is readable, lost, late, out of order, and
+    where a profile fits, which sensors disagree.
+
+    Example: shiplog check sample_logs/voyage_1.mcap
+    """
+    check_paths(logs, profile)
+    from pipelines.prepare import check_logs
+
+    leave(check_logs(logs, profile), json_to)

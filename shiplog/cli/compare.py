@@ -1,0 +1,46 @@
+"""`shiplog compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.inputs import check_runs
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.output import LOST, answer, show
+from shiplog.exceptions import ShiplogError
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="One or more trained runs.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the recording here and open nothing.")
+    ] = None,
+    web: Annotated[bool, typer.Option("--web", help="Serve it on 127.0.0.1.")] = False,
+    cause: Causes = None,
+    json_to: JsonOption = None,
+) -> None:
+    """Measured against simulated in Rerun.
+
+    Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
+    """
+    from shiplog.paths import check_file
+
+    check_runs(runs, store, voyages, cause)
+    if save is not None:
+        check_file(save, "--save")
+    from pipelines.evaluate import compare_runs
+    from shiplog.voyages.store import Store
+
+    result = compare_runs(runs, Store(store), voyages or [], save, cause or [])
+    answer(result.text, result.content, json_to)
+    if save is None:
+        try:
+            show(result.recording, web)
+        except ShiplogError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(LOST) from None

@@ -1,0 +1,51 @@
+"""`shiplog convert`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.options import JsonOption
+from shiplog.cli.output import LOST, answer
+
+
+def convert(
+    tables: Annotated[
+        list[Path],
+        typer.Argument(
+            help="CSV or Parquet tables, folders of one table a topic, NMEA 0183 text, ROS bags."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the logs.")],
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--profile",
+            help="The profile whose [table] section names the columns; NMEA and bags need none.",
+        ),
+    ] = None,
+    json_to: JsonOption = None,
+) -> None:
+    """Tables, NMEA 0183 text and ROS bags to contract MCAP.
+
+    Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
+    """
+    from shiplog.paths import check_writable
+
+    check_writable(out, "--out")
+    from shiplog import profile as profiles
+
+    ship = profiles.load(profile) if profile else None
+    from pipelines.convert import convert as convert_tables
+
+    done = convert_tables(tables, ship, out)
+    content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}
+    answer(f"{len(done.logs)} logs in {out}", content | {"lost": done.lost}, json_to)
+    for path, why in done.refused.items():
+        typer.echo(f"{Path(path).name} refused: {why}", err=True)
+    for path, what in done.lost.items():
+        typer.echo(f"{Path(path).name}: not converted: {what}", err=True)
+    if done.refused or done.lost:
+        raise typer.Exit(LOST if done.logs else 1)

@@ -1,0 +1,40 @@
+"""`shiplog demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.options import JsonOption
+from shiplog.cli.output import answer, show
+from shiplog.exceptions import ShiplogError
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="Where store, run and recording go.")] = Path("demo"),
+    view: Annotated[bool, typer.Option("--view/--no-view", help="Open the viewer.")] = True,
+    logs: Annotated[
+        Path | None, typer.Option(help="Sample logs; found beside the source otherwise.")
+    ] = None,
+    json_to: JsonOption = None,
+) -> None:
+    """The main job on sample_logs: ingest, train, evaluate, compare.
+
+    Example: shiplog demo --out demo --no-view
+    """
+    from shiplog.cli.arguments import sample_logs
+    from shiplog.paths import check_writable
+
+    check_writable(out, "--out")
+    folder = sample_logs(logs)
+    from pipelines.demo import run_demo
+
+    result = run_demo(out, folder)
+    answer(result.text, result.content, json_to)
+    if view:
+        try:
+            show(result.recording, web=False)
+        except ShiplogError as error:  # the job is done; only the window is missing
+            typer.echo(f"not shown: {error.message}", err=True)

@@ -1,0 +1,44 @@
+"""`shiplog diagnose`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.inputs import check_runs
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.output import answer
+
+
+def diagnose(
+    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    out: Annotated[Path, typer.Option(help="Folder for the report and its pictures.")] = Path(
+        "diagnosis"
+    ),
+    extend: Annotated[
+        Path | None, typer.Option(help="Write the model with the named causes as this run.")
+    ] = None,
+    cause: Causes = None,
+    json_to: JsonOption = None,
+) -> None:
+    """What the simulation gets wrong, why, the extended model, and the gain on held-out voyages.
+
+    Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
+    """
+    from shiplog.paths import check_writable, refuse_taken
+
+    check_runs([run], store, voyages, cause)
+    check_writable(out, "--out")
+    if extend is not None:
+        refuse_taken(extend, "--extend")
+        check_writable(extend, "--extend")
+    from pipelines.diagnose import diagnose_command
+
+    found = diagnose_command(
+        store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
+    )
+    answer(found.text, found.content, json_to)

@@ -1,0 +1,32 @@
+"""`shiplog evaluate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.inputs import check_runs
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.output import answer
+
+
+def evaluate(
+    run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
+    voyages: Voyages = None,
+    store: StoreOption = STORE,
+    cause: Causes = None,
+    json_to: JsonOption = None,
+) -> None:
+    """L, RMSE per channel, end errors, coverage, against two floors.
+
+    Example: shiplog evaluate runs/ref --voyages voyage_6
+    """
+    check_runs([run], store, voyages, cause)
+    from pipelines.evaluate import evaluate_runs, save
+    from shiplog.voyages.store import Store
+
+    found = evaluate_runs([run], Store(store), voyages or [], cause or [])
+    save(found)
+    answer(found.text(), found.answer(found.runs[0]), json_to)

@@ -1,0 +1,35 @@
+"""`shiplog ingest`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.inputs import check_paths
+from shiplog.cli.options import STORE, JsonOption, Logs, ProfileOption, StoreOption
+from shiplog.cli.output import leave
+
+
+def ingest(
+    logs: Logs,
+    profile: ProfileOption = None,
+    store: StoreOption = STORE,
+    correct: Annotated[
+        bool,
+        typer.Option("--correct", help="Put right what the sensors say of each other for certain."),
+    ] = False,
+    json_to: JsonOption = None,
+) -> None:
+    """Logs into the store: aligned, reduced to midship, faults marked. Idempotent by content.
+
+    Example: shiplog ingest sample_logs --store store
+    """
+    from shiplog.paths import check_writable
+
+    check_writable(store, "--store")
+    check_paths(logs, profile)
+    from pipelines.prepare import expand, ingest_logs
+    from shiplog.voyages.store import Store
+
+    leave(ingest_logs(expand(logs), profile, Store(store), correct), json_to)

@@ -1,0 +1,45 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def _ask_json(json_to: str | None) -> str | None:
+    """Whether --json can be written is known before the work."""
+    if json_to and json_to != "-":
+        from shiplog.paths import check_file
+
+        check_file(Path(json_to), "--json")
+    return json_to
+
+
+Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]
+StoreOption = Annotated[Path, typer.Option("--store", help="Folder of ingested voyages.")]
+ProfileOption = Annotated[
+    str | None, typer.Option("--profile", help="A shipped profile's name, or a TOML's path.")
+]
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.", callback=_ask_json),
+]
+Voyages = Annotated[
+    list[str] | None,
+    typer.Option("--voyages", help="Names or shell patterns; can be given several times."),
+]
+Causes = Annotated[
+    list[Path] | None,
+    typer.Option("--cause", help="A Python file with causes of your own; several times."),
+]
+Window = Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")]
+Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
+Epochs = Annotated[
+    int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
+]
+Validation = Annotated[
+    list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
+]
+STORE = Path("store")

@@ -1,0 +1,77 @@
+"""`shiplog paper`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.inputs import check_voyages
+from shiplog.cli.options import (
+    STORE,
+    Epochs,
+    JsonOption,
+    StoreOption,
+    Validation,
+    Voyages,
+    Width,
+    Window,
+)
+from shiplog.cli.output import LOST, answer
+
+
+def paper(
+    out: Annotated[Path, typer.Option(help="Where runs, tables and figures go.")] = Path("paper"),
+    data: Annotated[
+        list[str] | None,
+        typer.Option("--data", help="Window sets, all eight unless given; several times."),
+    ] = None,
+    voyages: Voyages = None,
+    validation: Validation = None,
+    seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 10,
+    recipe: Annotated[str, typer.Option(help="fast, or paper: the published one, days.")] = "fast",
+    window: Window = 100,
+    width: Width = 256,
+    epochs: Epochs = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Trainings at a time; one a core unless given.")
+    ] = None,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Train on this Ray cluster instead.")
+    ] = None,
+    store: StoreOption = STORE,
+    json_to: JsonOption = None,
+) -> None:
+    """The published experiment: eight window sets, ten seeds each, tables and figures.
+
+    Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
+    """
+    from shiplog.cli.arguments import check_training
+    from shiplog.paths import check_writable
+    from shiplog.voyages.augmentation import AUGMENTATIONS
+
+    chosen = list(dict.fromkeys(data or AUGMENTATIONS))
+    for name in chosen:
+        check_training("feedforward", name, recipe, None, {})
+    check_writable(out, "--out")
+    check_voyages(store, voyages, validation)
+    from pipelines.paper import paper_command
+
+    found = paper_command(
+        store,
+        out,
+        data=chosen,
+        voyages=voyages or [],
+        validation=validation or [],
+        seeds=seeds,
+        recipe=recipe,
+        window=window,
+        width=width,
+        epochs=epochs,
+        jobs=jobs,
+        ray=ray,
+    )
+    answer(found.text, found.content, json_to)
+    if found.content["failures"]:
+        raise typer.Exit(LOST)

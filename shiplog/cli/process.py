@@ -1,0 +1,87 @@
+"""The process of a command: its streams, signals, exit code, and what is said of an exception.
+
+Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fault, 2 wrong usage,
+3 done but something was lost or refused.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import logging
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import typer
+
+from shiplog import disk_cache
+from shiplog.cli.app import app
+from shiplog.exceptions import ShiplogError
+from shiplog.unexpected import unexpected
+
+STOPPED = 130  # by Ctrl-C, as shells have it
+KEPT = "stopped; what was finished is kept"
+MENDABLE = (  # what the system says of a path that the user can mend
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
+    errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
+)  # fmt: skip
+
+
+def main() -> None:
+    """Entry point: settings of this process, then `run`."""
+    # What JAX compiled for one ship serves every later command: some ten seconds each.
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(disk_cache.folder() / "jax"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
+    logging.getLogger("shiplog").setLevel(logging.INFO)
+    logging.getLogger("pipelines").setLevel(logging.INFO)
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, _stopped)
+    sys.exit(run())
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """The exit code of a command line, that of this process unless one is given.
+
+    Whatever goes wrong is a sentence on stderr and never a traceback: a fault of the input says
+    what to mend, and a fault of the program where its trace was written.
+    """
+    for stream in (sys.stdout, sys.stderr):  # a file's name need not be text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        disk_cache.trim()
+        app(arguments)
+    except SystemExit as ended:  # as every command ends
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+        if code == STOPPED:  # as typer has it; SIGTERM has said so itself
+            typer.echo(KEPT, err=True)
+        return code
+    except Exception as error:
+        fault = _fault(error)
+        typer.echo(str(fault), err=True)
+        return fault.exit_code
+    return 0
+
+
+def _fault(error: Exception) -> ShiplogError:
+    """What a user is told of it."""
+    if isinstance(error, ShiplogError):
+        return error
+    if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
+        return ShiplogError(
+            f"{os.fsdecode(error.filename)}: {error.strerror}.",
+            hint="look whether that path is what you meant, may be used, and has room on its disk.",
+        )
+    return unexpected(error)
+
+
+def _stopped(number: int, _frame: object) -> NoReturn:
+    """Asked to end: everything that was started is ended on the way out."""
+    signal.signal(number, signal.SIG_IGN)
+    typer.echo(KEPT, err=True)
+    sys.exit(128 + number)

@@ -1,0 +1,36 @@
+"""`shiplog profile`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def profile(
+    log: Annotated[
+        Path, typer.Argument(help="A log, table, folder of tables, NMEA text or bag of some ship.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="Write the draft here, not to stdout.")] = None,
+    vessel: Annotated[
+        str | None, typer.Option(help="Which ship, where the log holds many: its MMSI or name.")
+    ] = None,
+) -> None:
+    """Draft a ship profile from a log's topics, or a table's columns.
+
+    Example: shiplog profile unknown.mcap --out my-ship.toml
+    """
+    from shiplog.paths import check_file, refuse_taken
+
+    if out is not None:
+        refuse_taken(out)
+        check_file(out, "--out")
+    from pipelines.convert import draft
+
+    text = draft(log, vessel)
+    if out is None:
+        typer.echo(text)
+    else:
+        out.write_text(text, encoding="utf-8")
+        typer.echo(f"draft written to {out}: look over every line that says CHECK")

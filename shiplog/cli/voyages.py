@@ -1,0 +1,46 @@
+"""`shiplog voyages`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from shiplog.cli.options import STORE, JsonOption, StoreOption, Voyages
+from shiplog.cli.output import answer
+from shiplog.exceptions import ShiplogError
+
+
+def voyages(
+    store: StoreOption = STORE,
+    sensors: Annotated[
+        bool, typer.Option("--sensors", help="What the sensors say of each other, all voyages.")
+    ] = False,
+    voyages: Voyages = None,
+    json_to: JsonOption = None,
+) -> None:
+    """What is in the store; with --sensors, what several voyages together say of the instruments.
+
+    Example: shiplog voyages --store store
+    Example: shiplog voyages --sensors --voyages 'zigzag_*'
+    """
+    from dataclasses import asdict
+
+    if sensors:
+        from pipelines.sensors import sensors_command
+
+        found = sensors_command(store, voyages or [])
+        answer(found.text, found.content, json_to)
+        return
+
+    from shiplog.report import tables
+    from shiplog.voyages.store import Store
+
+    if not store.exists():
+        raise ShiplogError(
+            f"There is no store {store}.",
+            hint="ingest logs first: shiplog ingest LOG... --store DIR.",
+        )
+    entries = Store(store).entries()
+    content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
+    answer(tables.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
