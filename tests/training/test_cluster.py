@@ -12,8 +12,8 @@ import polars as pl
 import psutil
 import pytest
 import sailing
+from commands import call
 from safetensors.numpy import load_file
-from test_cli import call
 
 pytest.importorskip("ray", reason="needs Ray: pip install 'shiplog[ray]'")
 

@@ -28,7 +28,7 @@ from pipelines.experiments.simulated_ship.cases import CATALOGUE, OUTSIDE, draw
 from shiplog import profile as profiles
 from shiplog.models.causes import Setting
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 def hidden(**causes):

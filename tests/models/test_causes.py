@@ -8,13 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from shiplog.models.causes.environment import Current, WindForce
-from shiplog.models.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
 
 from shiplog import profile as profiles
 from shiplog.models import causes as catalogue
 from shiplog.models import mmg
 from shiplog.models.causes import CATALOGUE, Setting
+from shiplog.models.causes.environment import Current, WindForce
+from shiplog.models.causes.ship import Payload, RudderDelay, RudderLag, RudderOffset
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
 from shiplog.profile import Profile

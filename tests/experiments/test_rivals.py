@@ -24,7 +24,7 @@ from shiplog.diagnosis.linearisation import Path as Along
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.segments import BIN, Cut
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 OURS = ("pipelines.", "shiplog.")
 START = np.array([2.0, 0.5, 2.0, 0.5, 0.3, 0.2])
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])

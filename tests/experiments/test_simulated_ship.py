@@ -463,7 +463,7 @@ def test_an_effect_of_no_strength_is_no_effect_to_the_last_bit():
 
 def test_the_committed_logs_are_what_she_still_sails(sailed, tmp_path):
     """To a step of resolution: another processor may round the last bit otherwise."""
-    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[3] / "sample_logs"
     for number in (0, 6, 10):  # nothing hidden, and something
         plan, voyage = sailed[number]
         write_voyage(tmp_path / "a.mcap", voyage, seed=SEED + number, start=plan.start)
@@ -648,14 +648,14 @@ def test_the_profile_is_of_this_ship():
 
 
 def test_the_sample_logs_are_small_and_complete():
-    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[3] / "sample_logs"
     names = {f"{plan.name}.mcap" for plan in (*PLANS, *itertools.chain(*SEASONS.values()))}
     assert {p.name for p in folder.glob("*.mcap")} == names
     assert sum(p.stat().st_size for p in folder.glob("*.mcap")) <= 22_000_000
 
 
 def test_the_samples_hide_two_things_nothing_and_something_outside_the_catalogue():
-    folder = Path(simulated_ship.__file__).parents[2] / "sample_logs"
+    folder = Path(simulated_ship.__file__).parents[3] / "sample_logs"
     key = json.loads((folder / "answers" / "key.json").read_text("utf-8"))
     said = {voyage: [cause["name"] for cause in causes] for voyage, causes in key.items()}
     wanted = {2: ["current", "clock_offset"], 3: [], 4: ["tether"]}

@@ -7,8 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
-from shiplog.models.causes.ship import RudderDelay, RudderLag
 
 from shiplog import profile as profiles
 from shiplog.diagnosis import likelihood, linearisation, measurement_correction, segments
@@ -16,6 +14,8 @@ from shiplog.diagnosis.linearisation import Path, Wide
 from shiplog.diagnosis.segments import Cut
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Setting
+from shiplog.models.causes.sensors import AntennaOffset, HeadingOffset
+from shiplog.models.causes.ship import RudderDelay, RudderLag
 from shiplog.voyages.recording import Record
 from shiplog.voyages.timescale import KNOT, NODE_ROWS, Timescale
 

@@ -6,11 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from shiplog.models.causes.environment import Current
 
 from shiplog import disk_cache
 from shiplog.jit_cache import Traced
 from shiplog.models.causes import CATALOGUE
+from shiplog.models.causes.environment import Current
 
 X = np.array([1.0, 2.0, 3.0])
 traces = []

@@ -9,23 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
-from typer.testing import CliRunner
+from commands import call
 
 from pipelines.experiments import simulated_ship
-from shiplog.cli import app
-from shiplog.exceptions import ShiplogError
 
 FAST = ("--window", "40", "--width", "12", "--epochs", "8")
-
-
-def call(*arguments):
-    """Exit code, stdout and stderr, with a ShiplogError handled as `main` does."""
-    result = CliRunner().invoke(app.app, [str(a) for a in arguments])
-    if isinstance(result.exception, ShiplogError):
-        return result.exception.exit_code, result.stdout, str(result.exception)
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.exit_code, result.stdout, result.stderr
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +209,7 @@ def test_an_unknown_log_without_a_profile_says_how_to_draft_one(tmp_path):
 
 
 def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(tmp_path):
-    whole = (Path(__file__).parents[1] / "sample_logs" / "voyage_5.mcap").read_bytes()
+    whole = (Path(__file__).parents[2] / "sample_logs" / "voyage_5.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
     code, _, _ = call("ingest", cut, "--store", tmp_path / "s", "--json", tmp_path / "a.json")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_identify import Straight, driven, measured, noisy
+from test_output_error import Straight, driven, measured, noisy
 
 from shiplog.simulation import sensitivities
 from shiplog.simulation.sensitivities import Series

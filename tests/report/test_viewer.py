@@ -26,7 +26,7 @@ from shiplog.report.viewer import (
     trajectory,
 )
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 SECONDS = 201
 TURNING = math.radians(6.0)  # rad/s: passes north every minute
 

@@ -5,7 +5,7 @@ import json
 import polars as pl
 import pytest
 import sailing
-from test_cli import call
+from commands import call
 
 from pipelines.paper import choose_voyages
 from shiplog.exceptions import StoreError

@@ -529,7 +529,7 @@ Rudder = { channel = "rudder", unit = "deg" }
 
 
 def test_a_converted_log_says_in_json_what_became_of_it(tmp_path):
-    from test_cli import call
+    from commands import call
 
     (tmp_path / "empty.csv").write_text("a,b\n")
     code, said, _ = call("convert", tmp_path / "empty.csv", "--out", tmp_path, "--json", "-")

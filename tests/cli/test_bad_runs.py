@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sailing
+from own_causes import GOOD
 from safetensors.numpy import load_file, save_file
 from test_bad_input import judge
-from test_user_causes import GOOD
 
 from pipelines.experiments import simulated_ship
 from shiplog import cli

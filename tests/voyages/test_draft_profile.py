@@ -16,7 +16,7 @@ from shiplog.voyages.ingest import ingest
 from shiplog.voyages.split import choose_split
 from shiplog.voyages.store import Store
 
-SAMPLE = Path(__file__).parents[1] / "sample_logs" / "voyage_1.mcap"
+SAMPLE = Path(__file__).parents[2] / "sample_logs" / "voyage_1.mcap"
 
 
 def test_a_contract_log_drafts_the_profile_it_was_recorded_with():

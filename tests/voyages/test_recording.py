@@ -190,7 +190,7 @@ def test_sights_are_reduced_as_ingest_does(profile):
     """`reduced` undoes `sighted`, and both are the formulas of `midship`."""
     seen = closed.record(profile)
     sight = seen.sighted
-    again = recording.reduced(seen, sight)
+    again = seen.measured_as(sight)
     assert again.state == pytest.approx(seen.state, abs=1e-12)
     arm = profile.sensors.position.lever_arm_m
     at = frames.position_at_midship(sight.position, seen.state[:, 4], arm)
@@ -217,7 +217,7 @@ def test_an_antenna_that_is_sighted_moves_as_its_velocity_says():
 def test_an_antenna_elsewhere_takes_its_velocity_along():
     seen = closed.record(PROFILE)
     sight = seen.sighted
-    found = recording.reduced(seen, sight, (0.4, -0.1))
+    found = seen.measured_as(sight, (0.4, -0.1))
     c, s, r = np.cos(seen.state[:, 4]), np.sin(seen.state[:, 4]), seen.state[:, 5]
     back = found.state - seen.state
     assert back[:, 0] == pytest.approx(-(0.4 * c + 0.1 * s), abs=1e-12)

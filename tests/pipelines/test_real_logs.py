@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import polars as pl
 import pytest
-from test_cli import call
+from commands import call
 
 from shiplog.voyages import one_hertz
 from shiplog.voyages.split import plan

@@ -11,9 +11,9 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
+from commands import call
+from own_causes import GOOD
 from safetensors.numpy import load_file, save_file
-from test_cli import call
-from test_user_causes import GOOD
 
 from pipelines.experiments import simulated_ship
 from pipelines.identify import identify_run

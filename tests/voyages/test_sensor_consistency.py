@@ -16,7 +16,7 @@ from shiplog.channels import Quality
 from shiplog.voyages import sensor_consistency
 from shiplog.voyages.ingest import ingest
 
-SAMPLES = Path(__file__).parent.parent / "sample_logs"
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
 DEGREE = np.pi / 180.0
 VECTWIN = profile.load("esso-vectwin")
 BODY = sailing.profile(

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 import numpy as np
 import polars as pl
 import pytest
-from test_cli import call
-from test_parity import BODY, DEGREE, VECTWIN, in_body_axes
+from commands import call
+from test_sensor_consistency import BODY, DEGREE, VECTWIN, in_body_axes
 
 from pipelines.experiments.simulated_ship import Effects, Wind, cases, sail, write_voyage
 from shiplog.channels import UNUSABLE, Quality

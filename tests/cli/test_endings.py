@@ -9,11 +9,11 @@ from pathlib import Path
 
 import psutil
 import pytest
-from test_cli import call
+from commands import call
 
 from pipelines.experiments import simulated_ship
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")

@@ -5,28 +5,10 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from own_causes import GOOD
 
 from shiplog.exceptions import RunError
 from shiplog.models.causes import user
-
-GOOD = '''
-import jax.numpy as jnp
-from shiplog.models.causes import Cause, Parameter
-
-
-class Tide(Cause):
-    """Pulls north, always."""
-
-    name = "tide_gate"
-    kind = "environment"
-    story = "Something pulls."
-    equation = "X = {north:.1f} N along the earth's axes"
-    parameters = (Parameter("north", "N", 2.0, 0.1),)
-
-    def force(self, p, state, at):
-        c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
-        return jnp.stack((c * p[0], -s * p[0], 0.0 * c), -1)
-'''
 
 
 def write(folder, text, name="mine.py"):

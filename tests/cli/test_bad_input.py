@@ -408,7 +408,7 @@ def test_wrong_words_are_answered_before_anything_heavy_is_loaded(desk):
         (1, ["ingest", desk.log, "--profile", "x"]),
     ):  # fmt: skip
         done = subprocess.run(
-            [sys.executable, "-c", program, *map(str, arguments)], cwd=Path(__file__).parent.parent,
+            [sys.executable, "-c", program, *map(str, arguments)], cwd=Path(__file__).parents[2],
             check=False, capture_output=True, text=True,
         )  # fmt: skip
         assert done.returncode == code, (arguments, done.stderr)
