@@ -15,6 +15,13 @@ def folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shiplog"
 
 
+def keep_compiled() -> None:
+    """What JAX compiles for one ship serves every later process, where a user has not said
+    otherwise: some ten seconds each. To be called before JAX is imported."""
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder() / "jax"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+
+
 def files() -> list[tuple[float, int, Path]]:
     """Time of last change, bytes and path of all that is kept, oldest first. Another process may
     remove a file at any time: what is gone is passed over."""

@@ -32,9 +32,7 @@ MENDABLE = (  # what the system says of a path that the user can mend
 
 def main() -> None:
     """Entry point: settings of this process, then `run`."""
-    # What JAX compiled for one ship serves every later command: some ten seconds each.
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(disk_cache.folder() / "jax"))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    disk_cache.keep_compiled()
     logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)

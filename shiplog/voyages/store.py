@@ -227,6 +227,10 @@ class Store:
         """
         return [self._table(name) for name in names]
 
+    def voyages(self) -> pl.DataFrame:
+        """One row a voyage: name, start, length, usable seconds and windows, findings, source."""
+        return pl.DataFrame([asdict(entry) for entry in self.entries()])
+
     def seconds(self, names: Sequence[str], profile: Profile) -> pl.DataFrame:
         """The sorted 1 Hz table of these voyages."""
         return one_hertz.resample(self.tables(names), profile.columns, profile.circular)

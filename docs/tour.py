@@ -1,0 +1,45 @@
+# %% [markdown]
+# # From logs to a verdict, in Python
+#
+# Run this from a clone of shiplog, as a script or cell by cell. The ship of `sample_logs` is
+# simulated, and its key is in `sample_logs/README.md`. What you see of your own ship is what its
+# logs hold.
+
+# %%
+import shiplog
+
+# %% [markdown]
+# MCAP logs become voyages in a store: one 10 Hz table a voyage, reduced to midship, faults marked.
+
+# %%
+taken = shiplog.ingest("sample_logs", "tour/store")
+print(taken)
+store = taken.store
+store.voyages()  # a polars frame
+
+# %% [markdown]
+# A model of the ship as it was in season 1. `model` is `mmg` (physics, identified), `feedforward`
+# (the published network) or `hybrid`.
+
+# %%
+run = shiplog.train(store, "tour/mmg", model="mmg", voyages=["voyage_1", "voyage_2"], folds=0)
+
+# %% [markdown]
+# The model against a voyage that it has not seen, beside two baselines.
+
+# %%
+scored = shiplog.evaluate(run, store, "voyage_6")
+print(scored)
+scored.errors
+
+# %%
+pictures = shiplog.compare(run, store, "voyage_6", save="tour/compare.rrd")
+print(f"rerun {pictures.recording}")
+
+# %% [markdown]
+# What the model gets wrong half a year later, why, and what is gained by putting it right.
+
+# %%
+found = shiplog.diagnose(run, store, "season2_*", out="tour/diagnosis", extend="tour/mmg2")
+print(found)
+found.ranking

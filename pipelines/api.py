@@ -1,0 +1,256 @@
+"""What `import shiplog` gives: the commands as functions, on the same code.
+
+A store is a `Store` or its folder, a run a `Run` or its folder. Results are dataclasses that hold
+polars frames; printed, they say what the command says, and a notebook shows that as Markdown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from pipelines import diagnose as diagnosing
+from pipelines import evaluate as evaluating
+from pipelines import prepare
+from shiplog.exceptions import ShiplogError
+from shiplog.logs.health_report import VoyageReport
+from shiplog.report import page, tables
+from shiplog.report.verdict import Verdict
+from shiplog.training import run_folder
+from shiplog.training.run_config import Config, Physics
+from shiplog.training.run_folder import Run
+from shiplog.voyages.store import Store
+
+Paths = str | Path | Iterable[str | Path]
+Names = str | Sequence[str]
+
+
+class _Shown:
+    """Prints as the command's text; a notebook shows it as Markdown."""
+
+    def _repr_markdown_(self) -> str:
+        return str(self)
+
+
+@dataclass(frozen=True, repr=False)
+class Ingested(_Shown):
+    """What became of logs: `store` holds those in `reports`; `refused` says why of the others."""
+
+    store: Store
+    reports: list[VoyageReport]
+    refused: dict[str, ShiplogError]
+
+    def __str__(self) -> str:
+        lines = [line for report in self.reports for line in tables.voyage_lines(report)]
+        lines += [f"{Path(path).name} refused: {error}" for path, error in self.refused.items()]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, repr=False)
+class Evaluation(_Shown):
+    """Runs on measured voyages.
+
+    errors     one row a run, seed and window: L, RMSE a channel, end errors
+    rollouts   the simulated states, one row a run, seed, voyage, window and second
+    coverage   one row a window: share of its seconds inside the training data
+    """
+
+    errors: pl.DataFrame
+    rollouts: pl.DataFrame
+    coverage: pl.DataFrame
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(_Shown):
+    """`recording` is a Rerun file of measured and simulated voyages; `text` what it shows."""
+
+    recording: Path
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(_Shown):
+    """What the simulation gets wrong, and why.
+
+    verdict    named, none, undecided, unknown, coverage or external, with its sentence
+    causes     one row a named cause: name, probability and sentence
+    ranking    one row a hypothesis: name and probability
+    report     the page, as Markdown; recording: its pictures, where there are any
+    extended   the run with the causes in it, where one was asked for and something is named
+    """
+
+    verdict: Verdict
+    causes: pl.DataFrame
+    ranking: pl.DataFrame
+    report: Path
+    recording: Path | None
+    extended: Run | None
+
+    def __str__(self) -> str:
+        return page.markdown(self.verdict)
+
+
+def ingest(
+    logs: Paths, store: str | Path = "store", *, profile: str | None = None, correct: bool = False
+) -> Ingested:
+    """MCAP logs, or folders of them, into a store: a 10 Hz table a voyage, its faults marked.
+
+    profile   a shipped profile's name or a TOML's path; found by the log's topics unless given
+    correct   also put right what the sensors say of each other for certain
+
+    Raises ShiplogError where no log could be taken.
+    """
+    into = Store(Path(store))
+    found = prepare.expand(map(Path, [logs] if isinstance(logs, str | Path) else logs))
+    done = prepare.ingest_logs(found, profile, into, correct)
+    if done.refused and not done.reports:
+        raise next(iter(done.refused.values()))
+    return Ingested(into, done.reports, done.refused)
+
+
+def open_store(path: str | Path) -> Store:
+    """Voyages that were ingested. Raises StoreError where there is no store."""
+    store = Store(Path(path))
+    store.select([])
+    return store
+
+
+def train(
+    store: Store | str | Path,
+    out: str | Path,
+    *,
+    model: str = Config.model_fields["model"].default,
+    voyages: Names = (),
+    validation: Names = (),
+    data: str = "ref",
+    seeds: int = 1,
+    window: int = 100,
+    recipe: str = "fast",
+    width: int = 256,
+    wind_input: str | None = None,
+    epochs: int | None = None,
+    fit: bool = True,
+    parameters: str | Path | None = None,
+    without: Sequence[str] = (),
+    free: Sequence[str] = (),
+    folds: int = Physics.model_fields["folds"].default,
+) -> Run:
+    """A model of the voyages, as the run folder `out`. Arguments are those of `shiplog train`.
+
+    Raises ShiplogError for voyages that cannot be trained on and for a folder that is taken.
+    """
+    place, into = _path(store), Path(out)
+    shared = {
+        "model": model, "data": data, "voyages": _names(voyages),
+        "validation": _names(validation), "seeds": seeds, "window": window,
+    }  # fmt: skip
+    if model == "feedforward":
+        from pipelines.train import train_command
+
+        train_command(
+            place, into, **shared, recipe=recipe, width=width, wind_input=wind_input, epochs=epochs
+        )
+    else:
+        from pipelines.identify import identify_command
+
+        given = None if parameters is None else Path(parameters)
+        identify_command(
+            place, into, **shared, fit=fit, parameters=given, without=without, free=free,
+            folds=folds,
+        )  # fmt: skip
+    return run_folder.load(into)
+
+
+def load(path: str | Path, causes: Sequence[str | Path] = ()) -> Run:
+    """A finished run. `causes`: Python files of its causes that are not in the catalogue, which
+    are executed. Raises RunError."""
+    from shiplog.models.causes import user
+
+    return run_folder.load(Path(path), user.load([Path(cause) for cause in causes]))
+
+
+def evaluate(
+    runs: Run | str | Path | Sequence[Run | str | Path],
+    store: Store | str | Path,
+    voyages: Names = (),
+) -> Evaluation:
+    """Simulated against measured, window by window, with baselines. Without `voyages`, those that
+    the run kept for its test. Raises ShiplogError."""
+    found = evaluating.evaluate_runs(_runs(runs), Store(_path(store)), _names(voyages))
+    return Evaluation(found.errors, found.rollouts, found.coverage, found.text())
+
+
+def compare(
+    runs: Run | str | Path | Sequence[Run | str | Path],
+    store: Store | str | Path,
+    voyages: Names = (),
+    *,
+    save: str | Path | None = None,
+) -> Comparison:
+    """The same as a Rerun recording: `save`, or compare.rrd in the first run. Raises
+    ShiplogError."""
+    to = None if save is None else Path(save)
+    done = evaluating.compare_runs(_runs(runs), Store(_path(store)), _names(voyages), to)
+    return Comparison(done.recording, done.text)
+
+
+def diagnose(
+    run: Run | str | Path,
+    store: Store | str | Path,
+    voyages: Names = (),
+    *,
+    out: str | Path = "diagnosis",
+    extend: str | Path | None = None,
+    causes: Sequence[str | Path] = (),
+) -> Diagnosis:
+    """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
+
+    extend   write the model with the named causes as this run
+    causes   Python files with causes of your own, which are executed
+
+    Raises ShiplogError.
+    """
+    files = [Path(cause) for cause in causes]
+    to = None if extend is None else Path(extend)
+    (path,) = _runs(run)
+    done = diagnosing.diagnose_run(
+        path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=files
+    )
+    said = done.verdict.as_json()
+    named = [(c["name"], c.get("probability"), c.get("sentence")) for c in said["causes"]]
+    ranked = [(r["name"], r["probability"]) for r in said["ranking"]]
+    return Diagnosis(
+        done.verdict,
+        pl.DataFrame(
+            named,
+            {"name": pl.String, "probability": pl.Float64, "sentence": pl.String},
+            orient="row",
+        ),
+        pl.DataFrame(ranked, {"name": pl.String, "probability": pl.Float64}, orient="row"),
+        done.folder / "report.md",
+        done.recording,
+        load(to, causes) if to is not None and to.exists() else None,
+    )
+
+
+def _path(store: Store | str | Path) -> Path:
+    return store.path if isinstance(store, Store) else Path(store)
+
+
+def _names(voyages: Names) -> list[str]:
+    return [voyages] if isinstance(voyages, str) else list(voyages)
+
+
+def _runs(runs: Run | str | Path | Sequence[Run | str | Path]) -> list[Path]:
+    every = [runs] if isinstance(runs, Run | str | Path) else list(runs)
+    return [run.path if isinstance(run, Run) else Path(run) for run in every]

@@ -1,0 +1,53 @@
+"""The notebook of the documentation, executed as a user does, on fewer logs."""
+
+import runpy
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+import shiplog
+from shiplog.exceptions import ShiplogError
+
+ROOT = Path(__file__).parents[2]
+LOGS = ("voyage_1", "voyage_2", "voyage_6", "season2_1")
+
+
+@pytest.fixture(scope="module")
+def tour(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tour")
+    (folder / "sample_logs").mkdir()
+    for name in LOGS:
+        (folder / "sample_logs" / f"{name}.mcap").symlink_to(ROOT / "sample_logs" / f"{name}.mcap")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        yield folder, runpy.run_path(str(ROOT / "docs" / "tour.py"))
+
+
+def test_its_results_are_frames_and_files(tour):
+    folder, cells = tour
+    assert cells["store"].voyages()["name"].to_list() == sorted(LOGS)
+    assert set(cells["scored"].errors["voyage"]) == {"voyage_6"}
+    assert (folder / cells["pictures"].recording).read_bytes()[:4] == b"RRF2"
+    found = cells["found"]
+    assert isinstance(found.ranking, pl.DataFrame)
+    assert found.ranking["probability"].sum() <= 1.0 + len(found.causes)
+    assert found.verdict.said in str(found) and str(found) == found._repr_markdown_()
+    assert (folder / found.report).read_text(encoding="utf-8").startswith("# Diagnosis")
+
+
+def test_what_was_made_opens_again(tour):
+    folder, cells = tour
+    again = shiplog.load(folder / "tour" / "mmg")
+    assert again.name == cells["run"].name
+    assert shiplog.open_store(folder / "tour" / "store").select() == sorted(LOGS)
+    if cells["found"].causes.height:
+        assert shiplog.load(folder / "tour" / "mmg2").name == "mmg2"
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(ShiplogError, match="no voyage in the store"):
+        shiplog.open_store(tmp_path / "none")
+    with pytest.raises(AttributeError, match="has no attribute 'fit'"):
+        shiplog.fit  # noqa: B018
+    assert {"ingest", "diagnose"} <= set(dir(shiplog))
