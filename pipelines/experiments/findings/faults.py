@@ -70,8 +70,9 @@ OTHER_TRIAL = ("nominal_4", "nominal_6")
 
 def esso_osaka(folder: Path, out: Path) -> str:
     """Two random voyages of 22 minutes together; the six others are the nominal campaign."""
-    store = trials_store(folder, out)
-    return _table(store, expand([out / "logs"]), "random_*", ESSO_TRIAL, out / "faults")
+    own = out / "faults"  # with faults written into voyages, no other finding reads this store
+    store = trials_store(folder, own)
+    return _table(store, expand([own / "logs"]), "random_*", ESSO_TRIAL, own)
 
 
 def other_ship(folder: Path, out: Path) -> str:
