@@ -282,7 +282,7 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
     columns = np.concatenate([f.columns for f in found.families])
     assert columns.tolist() == list(range(7, 7 + found.count))
 
-    monkeypatch.setattr(discrepancy.structure, "at_knots", lambda cut, g: at)
+    monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: at)
     pushed = found.pushed(None, None)  # type: ignore[arg-type]
     assert pushed.shape == (4, 15, found.count)
     features = np.concatenate([f.features(at) for f in found.families], -1)

@@ -495,7 +495,7 @@ def test_the_web_viewer_listens_on_this_machine_only(saved):
 @pytest.mark.viewer
 def test_a_server_ends_with_the_command_whatever_ends_that(saved):
     program = (
-        "import sys; from shiplog import viewer\n"
+        "import sys; from shiplog.report import viewer\n"
         "with viewer.serve(sys.argv[1], port=0) as served:\n"
         "    print('ready', flush=True); served.wait()\n"
     )
