@@ -30,7 +30,7 @@ from shiplog.models.causes import Cause, user
 from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
-from shiplog.report.answer import Context, Diagnosis
+from shiplog.report.answer import Context, DiagnosedTrial
 from shiplog.training import run_folder
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.run_folder import Run
@@ -52,7 +52,7 @@ def diagnose_run(
     *,
     extend: Path | None = None,
     cause_files: Sequence[Path] = (),
-) -> Diagnosis:
+) -> DiagnosedTrial:
     """The whole way. Raises ShiplogError."""
     began = time.time()
     if extend is not None:
@@ -72,7 +72,7 @@ def diagnose_run(
     nominal = _nominal(run, store, profile) if before_effect else None
     nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
     if not answer.enough(recorded):
-        done = Diagnosis(answer.too_little(run, recorded, before_effect), out)
+        done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
         _write(done)
         return done
     if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
@@ -83,7 +83,7 @@ def diagnose_run(
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
         detailed = log.isEnabledFor(logging.DEBUG)
         log.info("no path of the model can be computed: %s", error, exc_info=detailed)
-        done = Diagnosis(answer.runs_away(run, before_effect), out)
+        done = DiagnosedTrial(answer.runs_away(run, before_effect), out)
     _save(done, run, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
@@ -106,7 +106,7 @@ class Campaigns:
     before_effect: bool
 
 
-def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
+def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
     run, store, names, profile = of.run, of.store, of.names, of.profile
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = []
@@ -173,7 +173,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> Diagnosis:
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    return Diagnosis(verdict, out, decision, tried, seen, whole, held, after)
+    return DiagnosedTrial(verdict, out, decision, tried, seen, whole, held, after)
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
@@ -184,13 +184,13 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     return trial_voyages.record_of(store, there, profile)
 
 
-def _write(done: Diagnosis) -> None:
+def _write(done: DiagnosedTrial) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
     (done.folder / "report.md").write_text(page.markdown(done.verdict), encoding="utf-8")
     files.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
-def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: float) -> None:
+def _save(done: DiagnosedTrial, run: Run, store: Store, names: Sequence[str], began: float) -> None:
     _write(done)
     split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
     files.write_json(done.folder / "provenance.json", provenance(store, split, began))
@@ -198,7 +198,7 @@ def _save(done: Diagnosis, run: Run, store: Store, names: Sequence[str], began: 
         diagnosis_pictures.save(done, done.recording)
 
 
-def _extend(run: Run, done: Diagnosis, out: Path, cause_files: Sequence[Path]) -> None:
+def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Path]) -> None:
     """The named causes as a run of its own; none, and nothing is written."""
     if done.after is None:
         log.info("nothing was named that a model can take in: %s is not written", out)

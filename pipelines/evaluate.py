@@ -15,7 +15,7 @@ from shiplog.channels import STATE
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.models.causes import user
 from shiplog.report import tables
-from shiplog.report.comparison_data import BAND, Actuator, Comparison
+from shiplog.report.comparison_data import BAND, ComparisonData, DrawnActuator
 from shiplog.report.judgement import MEANING, Judgement, force_line, judge
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class EvaluatedRuns:
     """Every run and both floors on the same test windows.
 
     errors     run, seed, voyage, window, elapsed, wind_speed (mean apparent, m/s) and
@@ -113,7 +113,7 @@ def evaluate_runs(
     store: Store,
     voyages: Sequence[str],
     cause_files: Sequence[Path] = (),
-) -> Evaluation:
+) -> EvaluatedRuns:
     """Roll every run's models out over the chosen voyages. Raises ShiplogError.
 
     cause_files   Python files of the causes of the user's own that are in these runs
@@ -143,7 +143,7 @@ def evaluate_runs(
         scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
         scored += [(run, seed, one) for seed, one in scores.items()]
         bands[run.name] = _half_widths(run, models, scores, cut)
-    return Evaluation(
+    return EvaluatedRuns(
         runs=opened,
         voyages=tuple(names),
         too_short=tuple(sorted(set(names) - set(cut.plan["voyage"]))),
@@ -161,24 +161,24 @@ def evaluate_runs(
     )
 
 
-def save(evaluation: Evaluation) -> None:
+def save(evaluation: EvaluatedRuns) -> None:
     """errors.parquet and rollouts.parquet into each run's folder."""
     for run in evaluation.runs:
         mine = pl.col("run") == run.name
         run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
 
 
-def comparison(evaluation: Evaluation, title: str) -> Comparison:
+def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
     """What the viewer shows of an evaluation."""
     run = evaluation.runs[0]
     labels = {r.name: f"{r.name} ({r.config.kind})" for r in evaluation.runs}
     profile = run.profile
-    return Comparison(
+    return ComparisonData(
         title=title,
         ship_length=profile.ship.length_m,
         ship_breadth=profile.ship.breadth,
         ship_outline=profile.ship.outline or (),
-        actuators=tuple(Actuator(a.name, a.kind, a.si_unit) for a in profile.actuators),
+        actuators=tuple(DrawnActuator(a.name, a.kind, a.si_unit) for a in profile.actuators),
         has_wind=profile.has_wind,
         measured=evaluation.rows.select(
             "voyage", pl.col("elapsed").alias("time"), *profile.columns

@@ -18,7 +18,7 @@ from shiplog.models.hybrid import Hybrid
 from shiplog.paths import refuse_taken
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
-from shiplog.simulation.sensitivities import Series, Simulator, losses, rollout
+from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
 from shiplog.training import identifiability, run_folder
 from shiplog.training.cross_validation import CrossValidated, cross_validate
 from shiplog.training.model_selection import choose_network, choose_ridge, physics
@@ -79,7 +79,7 @@ def identify_run(
     chosen, found, said = choose_ridge(ready, config.physics)
     kept = {ready.data.weight.tobytes(): found}
 
-    def refit(part: Series) -> Identified:
+    def refit(part: WindowSeries) -> Identified:
         """The physics without some windows: asked for again by every strength of a network."""
         key = part.weight.tobytes()
         if key not in kept:

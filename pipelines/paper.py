@@ -10,7 +10,7 @@ from pathlib import Path
 import polars as pl
 
 from pipelines import train
-from pipelines.evaluate import Evaluation, evaluate_runs
+from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from shiplog import files
 from shiplog.channels import VELOCITY
 from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
@@ -70,7 +70,7 @@ class Results:
     losses: pl.DataFrame
     histories: pl.DataFrame
     compared: pl.DataFrame
-    evaluation: Evaluation
+    evaluation: EvaluatedRuns
 
 
 def paper_command(

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Ingested:
+class IngestedLogs:
     """What became of each log: its report, or why it was refused."""
 
     reports: list[VoyageReport]
@@ -42,7 +42,7 @@ class Ingested:
 
 def ingest_logs(
     paths: Sequence[Path], profile: str | None, store: Store, correct: bool = False
-) -> Ingested:
+) -> IngestedLogs:
     """Each log into the store; one that cannot be taken does not stop the others.
 
     correct  put right what the sensors say of each other beyond doubt
@@ -76,7 +76,7 @@ def ingest_logs(
             continue
         reports.append(voyage.report)
         log.info("%s: %s", voyage.name, state)
-    return Ingested(reports, refused)
+    return IngestedLogs(reports, refused)
 
 
 def fitting_profile(found: Contents) -> Profile:
@@ -111,7 +111,7 @@ def expand(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
+def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLogs:
     """The health of each log by itself, and of its sensors by each other; nothing is stored."""
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
@@ -126,7 +126,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> Ingested:
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
-    return Ingested(reports, refused)
+    return IngestedLogs(reports, refused)
 
 
 def _parity(path: Path, chosen: Profile | None) -> list[Finding]:

@@ -13,14 +13,14 @@ from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.training.provenance import Answer
 from shiplog.voyages import campaign_consistency, parts
-from shiplog.voyages.campaign_consistency import Campaign
+from shiplog.voyages.campaign_consistency import SensorCampaign
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
 
-def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[Campaign, Profile]]:
+def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[SensorCampaign, Profile]]:
     """Voyages of one ship, apart where none was sailed for a season. Raises StoreError."""
     chosen = store.select(list(voyages) or None)
     starts = {entry.name: datetime.fromisoformat(entry.start) for entry in store.entries()}
@@ -62,7 +62,7 @@ def _cell(e: Estimate) -> str:
     return f"{e.value:.3f} ({e.low:.3f} to {e.high:.3f})"
 
 
-def _json(one: Campaign, profile: Profile) -> dict:
+def _json(one: SensorCampaign, profile: Profile) -> dict:
     return {
         "voyages": list(one.voyages),
         "estimates": [

@@ -14,7 +14,7 @@ from pathlib import Path
 from shiplog import disk_cache
 from shiplog.exceptions import ShiplogError
 
-SHOWN = 300  # letters of an exception's own words; some libraries quote whole files
+QUOTED_LETTERS = 300  # letters of an exception's own words; some libraries quote whole files
 
 
 class Unexpected(ShiplogError):
@@ -27,7 +27,7 @@ def unexpected(error: BaseException, doing: str = "") -> Unexpected:
     doing   what the program was at, such as the name of a log; the command's name otherwise
     """
     words = " ".join(str(error).split())
-    words = words if len(words) <= SHOWN else words[:SHOWN] + "..."
+    words = words if len(words) <= QUOTED_LETTERS else words[:QUOTED_LETTERS] + "..."
     kind = type(error).__name__
     where = _write("".join(traceback.format_exception(error)))
     kept = f"its trace is in {where}" if where else "its trace could not be written"

@@ -32,7 +32,7 @@ from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Cause, Parameter, Setting
 from shiplog.voyages.recording import Record
-from shiplog.voyages.timescale import KNOT, SECONDS
+from shiplog.voyages.timescale import KNOT, SEGMENT_S
 
 PROFILE = profiles.load("esso-vectwin")
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
@@ -77,7 +77,7 @@ CAUSES = (Two(), One("drag"), One("clock", "wind"), One("clock", "gnss"), One("l
 def sailed(count: int, voyages: int = 2, seed: int = 0) -> Record:
     """A record of `count` segments of 30 s each, in `voyages` of equal length, at 2 Hz."""
     rng = np.random.default_rng(seed)
-    rows = round(SECONDS / STEP)
+    rows = round(SEGMENT_S / STEP)
     each = count // voyages * rows + 1
     t = STEP * np.arange(each)
     state, orders = [], []

@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 
 from pipelines.convert import convert
-from pipelines.evaluate import Evaluation, evaluate_runs
+from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from pipelines.prepare import expand, ingest_logs
 from pipelines.train import train_run
 from shiplog import profile as profiles
@@ -48,7 +48,7 @@ def trials_store(folder: Path, out: Path) -> Store:
     return store
 
 
-def run(folder: Path, out: Path, seeds: int, recipe: str) -> Evaluation:
+def run(folder: Path, out: Path, seeds: int, recipe: str) -> EvaluatedRuns:
     """Convert, ingest, train and evaluate; what stands in `out` already is not done again."""
     split, store = published_split(folder), trials_store(folder, out)
     path = out / f"feedforward-{recipe}"

@@ -23,7 +23,7 @@ from shiplog.exceptions import ShiplogError
 from shiplog.unexpected import unexpected
 
 STOPPED = 130  # by Ctrl-C, as shells have it
-KEPT = "stopped; what was finished is kept"
+STOPPED_SENTENCE = "stopped; what was finished is kept"
 MENDABLE = (  # what the system says of a path that the user can mend
     errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
     errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
@@ -57,7 +57,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as ended:  # as every command ends
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
         if code == STOPPED:  # as typer has it; SIGTERM has said so itself
-            typer.echo(KEPT, err=True)
+            typer.echo(STOPPED_SENTENCE, err=True)
         return code
     except Exception as error:
         fault = _fault(error)
@@ -81,5 +81,5 @@ def _fault(error: Exception) -> ShiplogError:
 def _stopped(number: int, _frame: object) -> NoReturn:
     """Asked to end: everything that was started is ended on the way out."""
     signal.signal(number, signal.SIG_IGN)
-    typer.echo(KEPT, err=True)
+    typer.echo(STOPPED_SENTENCE, err=True)
     sys.exit(128 + number)

@@ -21,7 +21,7 @@ import numpy as np
 
 from shiplog.diagnosis import segment_nodes
 from shiplog.diagnosis.segment_nodes import Knots
-from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.profile import Profile
 
 SEEN = ("motion", "controls", "wind")  # by a model of forces
@@ -83,7 +83,7 @@ class Discrepancy:
     def count(self) -> int:
         return sum(len(family.columns) for family in self.families)
 
-    def pushed(self, cut: Cut, g: Grid) -> np.ndarray:
+    def pushed(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
         if not self.families:
             return np.zeros((len(cut), 3 * g.knots, 0))

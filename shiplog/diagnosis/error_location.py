@@ -14,7 +14,7 @@ from shiplog.diagnosis import (
     unrecorded_thruster,
 )
 from shiplog.diagnosis import trial as diagnosis_trial
-from shiplog.diagnosis.evidence import Point, Trial
+from shiplog.diagnosis.evidence import Point, TrialEvidence
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
@@ -36,7 +36,7 @@ PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
 PULSE_APART = 2.5  # knots that one pulse may pause for
 
 
-def pushed(trial: Trial, point: Point, whole: Linear) -> list[Interval]:
+def pushed(trial: TrialEvidence, point: Point, whole: Linear) -> list[Interval]:
     """Stretches that no force of the ship explains; the trial judges no hypothesis on them."""
     ref = trial.reference
     base, _ = trial.scan(point, (), trial.fixed)
@@ -67,7 +67,7 @@ def by_channel(held: HeldOut) -> list[dict]:
     return [c.as_json() for c in found.channels]
 
 
-def depends_on(trial: Trial, decision: Decision, whole: Linear) -> tuple[Dependence, ...]:
+def depends_on(trial: TrialEvidence, decision: Decision, whole: Linear) -> tuple[Dependence, ...]:
     """What the model cannot see and the residual depends on."""
     found = residual_acceleration.posterior(
         *trial.left(whole, trial.solved(decision.first, decision.nothing)),
@@ -107,7 +107,7 @@ def uncovered(
     return found
 
 
-def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
+def pulses(trial: TrialEvidence, decision: Decision, found: Pulses) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
     force, sd = unrecorded_thruster.pulse_force(trial, decision.point, decision.base, found)
     strongest = float(np.quantile(np.abs(force), 0.98))

@@ -16,7 +16,7 @@ from shiplog.diagnosis.likelihood import Modes, Weighed
 from shiplog.diagnosis.linearisation import Linear, Path
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_reference import Reference
-from shiplog.diagnosis.parameter_layout import HELD
+from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.models.causes import Cause
 from shiplog.models.compiled_network import Network
 from shiplog.voyages.recording import Record
@@ -91,7 +91,7 @@ class Level:
     value: float  # log evidence of the base
 
 
-class Trial:
+class TrialEvidence:
     """Voyages under question, against a reference. `unrest` grows a pulse when one is found.
 
     first    where it was linearised first
@@ -292,7 +292,10 @@ class Trial:
         known[:count, :count] = information
         known[count:, count:] = np.diag(
             np.concatenate(
-                [np.full(len(columns.of[n]), HELD if n in self.fixed else 1.0) for n in included]
+                [
+                    np.full(len(columns.of[n]), HELD_INFORMATION if n in self.fixed else 1.0)
+                    for n in included
+                ]
                 or [np.zeros(0)]
             )
         )

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from shiplog.diagnosis import sign_conventions
-from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision
 from shiplog.models.causes import constants_of
@@ -19,7 +19,9 @@ from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.simulation.sensitivities import series
 from shiplog.voyages.windows import Windows
 
-LOST = 2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+SIMULATES_NOTHING = (
+    2.0  # times the L of keeping all velocities, from which on a model simulates nothing
+)
 TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
@@ -64,7 +66,7 @@ class HeldOut(Rollouts):
     """The same with the trial whose causes are judged on them; `own` of a network, whose causes
     another model found."""
 
-    trial: Trial
+    trial: TrialEvidence
     own: Own | None = None
 
     def states_after(self, decision: Decision) -> np.ndarray:
@@ -98,7 +100,7 @@ class HeldOut(Rollouts):
             {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
         )  # fmt: skip
 
-    def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
+    def simulated(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
         """The model that is simulated on the trial's segments, with what is named in it."""
         return (self.trial, decision) if self.own is None else self.own.beside(decision)
 
@@ -134,7 +136,7 @@ class HeldOut(Rollouts):
         other, turned = sign_conventions.best(self.before, self.cut)
         if turned < min(TURNED * after, hold):
             return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
-        if own <= LOST * hold or after <= hold:
+        if own <= SIMULATES_NOTHING * hold or after <= hold:
             return ""
         return (
             f"The model is worse than one that keeps its velocities (L {own:.0f}, that one "

@@ -17,7 +17,7 @@ import numpy as np
 from shiplog.diagnosis import segment_nodes
 from shiplog.diagnosis.likelihood import Modes
 from shiplog.diagnosis.segment_nodes import Knots
-from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.compiled_network import Network
 
 SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary unrest
@@ -39,7 +39,7 @@ class Misfit:
     def count(self) -> int:
         return self.axes.shape[-1]
 
-    def pushed(self, cut: Cut, g: Grid) -> np.ndarray:
+    def pushed(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
         waves = _features(self.network, segment_nodes.at_knots(cut, g))
         return np.concatenate([waves @ axes for axes in self.axes], axis=1)
@@ -50,7 +50,7 @@ class Misfit:
 
 
 def of(
-    network: Network, cut: Cut, g: Grid, modes: Modes, known: np.ndarray,
+    network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
     unit: np.ndarray, push: np.ndarray,
 ) -> Misfit:  # fmt: skip
     """Of the size that is likeliest beside numbers [C] in `unit`s [C], of which so much is `known`

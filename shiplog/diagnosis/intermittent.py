@@ -10,10 +10,10 @@ import numpy as np
 
 from shiplog.diagnosis import unrecorded_thruster
 from shiplog.diagnosis.nominal_campaign import Campaign
-from shiplog.diagnosis.segments import Grid
+from shiplog.diagnosis.segments import SegmentGrid
 
 
-def usual_push(campaign: Campaign, g: Grid) -> np.ndarray | None:
+def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     """Acceleration [3], root mean square, of the nominal process noise at one place, where it is
     likelier to push at one place than in each channel by itself; None where it is not.
 

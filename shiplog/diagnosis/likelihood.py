@@ -21,8 +21,8 @@ from shiplog.voyages.timescale import BIN, KNOT
 SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
 LEAP = 16.0  # steps at once, at most
-ENOUGH = 8  # unbroken segments, fewer of which do not show it
-LEAST = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
+ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it
+LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
     seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
     knots = (linear.z.shape[-1] - 6) // 3
     inverse = np.linalg.inv(_decay(unrest.knot * np.arange(knots), unrest.time))
-    least = np.log(np.concatenate((LEAST, np.full(3, 1e-12))))
+    least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
 
     def at(sizes: np.ndarray) -> Unrest:
         return replace(unrest, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
@@ -337,7 +337,7 @@ def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
     was seen; its size goes with that."""
     used = linear.cut.used
     whole = used.all((1, 2))
-    if whole.sum() < ENOUGH:
+    if whole.sum() < ENOUGH_SEGMENTS:
         return unrest
     z, error = linear.z[whole], left[whole]
     white = _Whitening(used[whole], unrest)
@@ -358,7 +358,7 @@ def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
                 if cost < best:
                     best, coloured[channel], fade[channel] = cost, share, time
                     noise[channel] = np.sqrt(variance)
-    return replace(unrest, noise=np.maximum(noise, LEAST), coloured=coloured, fade=fade)
+    return replace(unrest, noise=np.maximum(noise, LEAST_NOISE), coloured=coloured, fade=fade)
 
 
 def starts_and_knots(

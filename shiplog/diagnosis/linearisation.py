@@ -22,16 +22,16 @@ import numpy as np
 from jax import Array
 
 from shiplog.diagnosis import variational_equations
-from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.jit_cache import traced
 from shiplog.simulation.sensitivities import Physical, rate
 
 jax.config.update("jax_enable_x64", True)
 
-CHUNK = 64  # segments at a time
-LEAST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
+SEGMENTS_AT_A_TIME = 64  # segments at a time
+STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
-FAR = 10.0  # times what a path may be off its measurement, beyond which the model has run away
+RUN_AWAY = 10.0  # times what a path may be off its measurement, beyond which the model has run away
 
 
 class Smooth(Physical, Protocol):
@@ -121,7 +121,7 @@ class Path:
     start: np.ndarray
     push: np.ndarray
 
-    def at_nodes(self, g: Grid) -> np.ndarray:
+    def at_nodes(self, g: SegmentGrid) -> np.ndarray:
         return np.einsum("scj,kj->skc", self.push, g.weights)
 
     @property
@@ -200,7 +200,7 @@ class Wide:
     push: np.ndarray
 
 
-def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: Grid) -> Path:
+def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) -> Path:
     """From the measured path itself: its acceleration less the model's."""
     y = segments.y
     centre = (np.arange(g.bins) + 0.5) * g.bin
@@ -244,7 +244,7 @@ def pulled(
     model: Smooth,
     theta: np.ndarray,
     segments: Cut,
-    g: Grid,
+    g: SegmentGrid,
     wide: Wide,
     path: Path | None = None,
     rounds: int = 2,
@@ -288,7 +288,7 @@ def linear(
     model: Smooth,
     theta: np.ndarray,
     segments: Cut,
-    g: Grid,
+    g: SegmentGrid,
     path: Path,
     moved: np.ndarray,
     shown: np.ndarray,
@@ -329,19 +329,19 @@ def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) 
         width = np.hypot(wide.start, wide.noise)[KIND].max(-1)
     with np.errstate(invalid="ignore", over="ignore"):
         off = np.where(segments.used, np.abs(segments.y - y), 0.0).max(1)
-        near = (off <= FAR * np.maximum(width, LEAST)).all(-1)
+        near = (off <= RUN_AWAY * np.maximum(width, STILLEST)).all(-1)
     return ~(near & np.isfinite(y).all((1, 2)) & np.isfinite(columns).all((1, 2, 3)))
 
 
 def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
     """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
     up: one compilation serves all."""
-    for at in range(0, count, CHUNK):
-        part = slice(at, min(at + CHUNK, count))
+    for at in range(0, count, SEGMENTS_AT_A_TIME):
+        part = slice(at, min(at + SEGMENTS_AT_A_TIME, count))
 
         def filled(values: np.ndarray, part: slice = part) -> np.ndarray:
             own = values[part]
-            lack = CHUNK - len(own)
+            lack = SEGMENTS_AT_A_TIME - len(own)
             return np.concatenate((own, np.repeat(own[-1:], lack, axis=0))) if lack else own
 
         yield part, filled

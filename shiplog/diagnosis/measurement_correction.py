@@ -15,7 +15,9 @@ from shiplog.models.extended import Extended
 from shiplog.voyages.recording import Record
 
 SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
-STEP = 0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
+READ_STEP = (
+    0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
+)
 
 
 def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:
@@ -51,7 +53,7 @@ def read(
         moving = before.smoothed(SMOOTH) if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
-            step[i] = STEP * sizes[cause.label][i]
+            step[i] = READ_STEP * sizes[cause.label][i]
             # not beyond what it may be: a lag that is negative sharpens steps and noise
             ends = np.minimum(here + step, high), np.maximum(here - step, low)
             apart = ends[0][i] - ends[1][i]

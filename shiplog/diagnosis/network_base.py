@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shiplog.diagnosis import nominal_reference
-from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial_voyages import constants_for
 from shiplog.models.extended import Extended
@@ -15,7 +15,7 @@ from shiplog.training.run_folder import Run
 class Own:
     """The run's own network on the segments of a trial that another model judges."""
 
-    def __init__(self, run: Run, trial: Trial) -> None:
+    def __init__(self, run: Run, trial: TrialEvidence) -> None:
         self.judge = trial
         extension = run.extension
         self.numbers = run.extension_numbers()
@@ -24,9 +24,9 @@ class Own:
         setting = trial.reference.setting
         model = Extended(base, self.held, stand_in, values, constants_for(run, self.held, setting))
         self.reference = nominal_reference.assume(model, setting, start, trial.record, False, base)
-        self._known: dict[tuple, tuple[Trial, Decision]] = {}
+        self._known: dict[tuple, tuple[TrialEvidence, Decision]] = {}
 
-    def beside(self, decision: Decision) -> tuple[Trial, Decision]:
+    def beside(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
         """A trial of the network with what is named in it, and the decision there: its numbers
         are the judge's and stay, what else there is of points and hypotheses the network's."""
         key = tuple((n.cause.label, n.numbers.tobytes()) for n in decision.named)
@@ -42,9 +42,9 @@ class Own:
             nothing=seen.nothing,
         )
 
-    def _beside(self, decision: Decision) -> tuple[Trial, Decision]:
+    def _beside(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
         causes = (*self.held, *(n.cause for n in decision.named))
-        trial = Trial(
+        trial = TrialEvidence(
             nominal_reference.beside(self.reference, causes),
             self.judge.record,
             [c.label for c in causes],

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import likelihood, linearisation, segments
-from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.result import Named
-from shiplog.simulation.sensitivities import Series, rollout
+from shiplog.simulation.sensitivities import WindowSeries, rollout
 from shiplog.voyages.recording import Record
 
-SECONDS = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time
-STEP = 0.5  # s of the simulation
+MANOEUVRE_S = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time
+STEP_S = 0.5  # s of the simulation
 HARD = np.radians(35.0)  # farther no rudder is laid, and no thruster turned
-FAR = 1e3  # m, m/s: a simulation beyond has left the pond
+OFF_THE_POND = 1e3  # m, m/s: a simulation beyond has left the pond
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Advice:
 
 
 def advice(
-    trial: Trial, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
+    trial: TrialEvidence, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
 ) -> dict[str, Advice]:
     """Label → what would tell it best from all that these data cannot tell it from.
 
@@ -109,11 +109,11 @@ def advice(
         }
         if worth:
             best = max(worth, key=lambda words: worth[words])
-            found[label] = Advice(best, factor * SECONDS, worth[best])
+            found[label] = Advice(best, factor * MANOEUVRE_S, worth[best])
     return found
 
 
-def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
+def apart(trial: TrialEvidence, gram: np.ndarray, one: Named, other: str) -> float:
     """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units."""
     columns = trial.reference.columns
     own, rival = columns.of[one.cause.label], columns.of[other]
@@ -125,7 +125,7 @@ def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
     return 0.5 * float(p @ left[np.ix_(own, own)] @ p - imitated @ np.linalg.solve(free, imitated))
 
 
-def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
+def sailed(trial: TrialEvidence, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
     """[1 + C, 1 + C] of each manoeuvre, in units; None where the model runs away in it."""
     ref = trial.reference
     numbers = dict(fixed)
@@ -147,24 +147,24 @@ def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | N
     return found
 
 
-def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
+def simulated(trial: TrialEvidence, theta: np.ndarray) -> tuple[Record, np.ndarray]:
     """All manoeuvres in the trial's mean wind, a voyage each; which stayed in the pond [M]."""
     record, model = trial.record, trial.reference.model
     factor = record.timescale.factor
-    time = np.arange(0.0, factor * SECONDS + STEP, STEP)
+    time = np.arange(0.0, factor * MANOEUVRE_S + STEP_S, STEP_S)
     actuator = np.stack([driven(record, m, time / factor) for m in MANOEUVRES])
     count, rows = actuator.shape[:2]
     wind = np.broadcast_to(record.true_wind[record.seen].mean(0), (count, rows, 2))
     share = np.full((count, rows, 1), record.share[-1])
-    series = Series(
+    series = WindowSeries(
         np.zeros((count, rows, 6)), np.concatenate((actuator, share), -1), np.array(wind),
-        np.full((count, rows - 1), STEP), np.ones(count),
+        np.full((count, rows - 1), STEP_S), np.ones(count),
     )  # fmt: skip
     with np.errstate(all="ignore"):
         states = rollout(model, theta, series)
-    kept = np.abs(states).max((1, 2)) < FAR
+    kept = np.abs(states).max((1, 2)) < OFF_THE_POND
     states = np.where(kept[:, None, None], states, 0.0)
-    fine = np.arange(0.0, factor * SECONDS, record.step)
+    fine = np.arange(0.0, factor * MANOEUVRE_S, record.step)
 
     def between(values: np.ndarray) -> np.ndarray:
         every = [np.interp(fine, time, column) for one in values for column in one.T]

@@ -28,7 +28,7 @@ from shiplog.diagnosis.likelihood import Modes, Unrest
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_reference import Reference, Settled
-from shiplog.diagnosis.parameter_layout import HELD, Columns
+from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
 from shiplog.models.compiled_network import Network
@@ -38,7 +38,7 @@ from shiplog.voyages.recording import Record
 
 ROBUST = 6.0  # medians of χ², from which on a segment counts less
 PART = 20  # segments of one part of a campaign: 10 minutes of a three-metre ship
-FEWEST = 4  # parts that a campaign is cut into, where it has twice as many segments
+FEWEST_PARTS = 4  # parts that a campaign is cut into, where it has twice as many segments
 NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 
@@ -81,7 +81,7 @@ class Campaign:
                      self.reference.counts)  # fmt: skip
 
 
-def parts_of(voyage: np.ndarray, part: int = PART, fewest: int = FEWEST) -> list[np.ndarray]:
+def parts_of(voyage: np.ndarray, part: int = PART, fewest: int = FEWEST_PARTS) -> list[np.ndarray]:
     """Rows of contiguous segments that belong together: no part crosses two voyages.
 
     voyage   [S] of each segment, in order
@@ -269,7 +269,7 @@ def learn(
     every = products(whole, made.rows, unit, weight)
     deviation, size = np.zeros(len(known)), known**-0.5
     for name, where in _groups(model, columns, families).items():
-        deviation[where] = found.deviation.get(name, voyage_effects.LEAST)
+        deviation[where] = found.deviation.get(name, voyage_effects.LEAST_DEVIATION)
     for family in families.families:
         size[family.columns] = found.size[family.name]
     effects = VoyageEffects(deviation, size)
@@ -407,7 +407,7 @@ def assumed(
     found = characteristics(model, setting, start, record, at)
     whole = learn(model, setting, start, record, at, found)
     columns, known = whole.reference.columns, whole.effects.size**-2.0
-    known[columns.base : columns.linearised] = HELD
+    known[columns.base : columns.linearised] = HELD_INFORMATION
     if given:
         known[: columns.base] = nominal_reference.GIVEN**-2.0
     made = replace(

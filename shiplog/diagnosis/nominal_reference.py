@@ -19,7 +19,7 @@ from shiplog.diagnosis.input_misfit import Misfit
 from shiplog.diagnosis.likelihood import Modes, Unrest
 from shiplog.diagnosis.linearisation import Linear, Path, Wide
 from shiplog.diagnosis.measurement_correction import read
-from shiplog.diagnosis.parameter_layout import HELD, Columns
+from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.models.causes import Cause, Setting, constants_of
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
@@ -28,7 +28,7 @@ from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 ROUNDS = 6  # of moving the coefficients to where they are linearised
-FARTHEST = 0.7  # plausible spreads that a coefficient moves in one round
+LONGEST_MOVE = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 5.0  # nats, for which they are not moved on
 ON_THE_WAY, AT_REST = 2, 3  # rounds in which the sizes of noise and unrest are learnt
 FREE = 2.0  # times the unrest that a path's knots may be pulled by
@@ -160,10 +160,10 @@ def settled(
         hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
         found, gain = solved(linear, unrest, columns, held)
         far = float(np.abs(found[:base]).max(initial=0.0))
-        if round_ == rounds or (gain < NEAR and far < FARTHEST):
+        if round_ == rounds or (gain < NEAR and far < LONGEST_MOVE):
             unrest = likelihood.learnt(linear, found * unit, unrest, rounds=AT_REST)
             break
-        moved_to = theta + (found * unit)[:base] * min(1.0, FARTHEST / far)
+        moved_to = theta + (found * unit)[:base] * min(1.0, LONGEST_MOVE / far)
         edge = 1e-6 * (start.high - start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         theta = np.clip(moved_to, start.low + edge, start.high - edge)
@@ -303,7 +303,7 @@ def assume(
     information = np.diag(columns.known.copy())
     causes = slice(columns.base, columns.linearised)
     # no cause has a usual size where nothing was usual
-    information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD
+    information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD_INFORMATION
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
         adapts=not given, learned=inputs is not None,
@@ -329,7 +329,7 @@ def beside(reference: Reference, causes: Sequence[Cause]) -> Reference:
             first, tuple(causes),
             np.concatenate((columns.unit[:first], *sizes, columns.unit[last:])), columns.misfit,
         ),
-        information=np.diag(widened(np.diag(reference.information), HELD)),
+        information=np.diag(widened(np.diag(reference.information), HELD_INFORMATION)),
         pull=widened(reference.pull, 0.0),
         anchor=widened(reference.anchor, 0.0),
     )  # fmt: skip

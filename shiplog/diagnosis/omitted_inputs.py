@@ -20,12 +20,12 @@ from shiplog.profile import Profile
 from shiplog.voyages.timescale import KNOT
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
-LEAST = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
+LEAST_R2 = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
 BEYOND = 4.0  # standard deviations of what chance reaches
 SHIFTS = 20
 APART = 30  # knots, the least shift: what pushes a ship at random is forgotten by then
-PIECE = 300.0  # s, exchanged to make time mean nothing
-FOLDS = 8  # more voyages are left out in groups
+EXCHANGED_S = 300.0  # s, exchanged to make time mean nothing
+VOYAGE_FOLDS = 8  # more voyages are left out in groups
 PLACES = 12
 OUTLIER = 6.0  # robust standard deviations; a ship that is pushed by hand must not decide this
 PENALTIES = 10.0 ** np.arange(-4.0, 2.0)  # of the mean square of a feature
@@ -111,7 +111,7 @@ def table(
         lucky = np.maximum(null, 0.0)  # how much worse than nothing a bad guess is does not count
         limit = np.maximum(lucky.max(0), lucky.mean(0) + BEYOND * lucky.std(0))
         acts_on = tuple(
-            c for c, a, b in zip(CHANNELS, r2, np.maximum(limit, LEAST), strict=True) if a > b
+            c for c, a, b in zip(CHANNELS, r2, np.maximum(limit, LEAST_R2), strict=True) if a > b
         )
         found.append(Dependence(variable, _three(r2), _three(null.max(0)), acts_on, folds))
     return tuple(found)
@@ -159,10 +159,12 @@ def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
     count = int(runs.max()) + 1
     if count == 1:
         return (np.arange(len(runs)) >= len(runs) // 2).astype(int), "halves"
-    if count <= FOLDS:
+    if count <= VOYAGE_FOLDS:
         return runs, "voyages"
     ends = np.cumsum(np.bincount(runs)) - 1
-    return np.unique(ends * FOLDS // len(runs), return_inverse=True)[1][runs], "groups of voyages"
+    return np.unique(ends * VOYAGE_FOLDS // len(runs), return_inverse=True)[1][
+        runs
+    ], "groups of voyages"
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
@@ -232,7 +234,7 @@ def _shifted(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> In
 
 def _exchanged(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> Indices:
     """Pieces of the campaign in another order: within a voyage the campaign hardly ages."""
-    begins = (np.diff(runs, prepend=-1) != 0) | (np.diff(time // PIECE, prepend=-1.0) != 0)
+    begins = (np.diff(runs, prepend=-1) != 0) | (np.diff(time // EXCHANGED_S, prepend=-1.0) != 0)
     pieces = np.split(np.arange(len(runs)), np.flatnonzero(begins)[1:])
     return np.concatenate([pieces[i] for i in rng.permutation(len(pieces))])
 

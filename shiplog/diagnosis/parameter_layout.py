@@ -10,7 +10,7 @@ import numpy as np
 
 from shiplog.models.causes import Cause
 
-HELD = 1e8  # information that leaves a number where it is
+HELD_INFORMATION = 1e8  # information that leaves a number where it is
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Columns:
         whole = np.ones(len(self.unit))
         for cause in self.causes:
             if not cause.usual:
-                whole[self.of[cause.label]] = HELD
+                whole[self.of[cause.label]] = HELD_INFORMATION
         return whole
 
     def numbers(self, given: Mapping[str, np.ndarray]) -> np.ndarray:

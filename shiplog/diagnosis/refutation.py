@@ -18,7 +18,7 @@ from shiplog.diagnosis.search import Search
 from shiplog.simulation.error_reduction import Gain
 
 
-class HeldOut(Protocol):
+class Judge(Protocol):
     """Windows on which a decision is judged, its numbers fitted without each fold."""
 
     def gain(self, decision: Decision) -> Gain:
@@ -31,7 +31,7 @@ class HeldOut(Protocol):
 
 
 def judged(
-    search: Search, held: HeldOut | None
+    search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
     """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.
 

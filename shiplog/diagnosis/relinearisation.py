@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from shiplog.diagnosis.evidence import Found, Point, Trial
+from shiplog.diagnosis.evidence import Found, Point, TrialEvidence
 from shiplog.diagnosis.linearisation import Path
 
-ROUNDS = 10  # of linearising again, at most: a map whose ends are held takes nine
+RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
-FALLS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
+STEP_NATS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
 SHORTER = 3  # times that a step is halved where the fit runs away
-REST = 0.02  # of a number's size: it rests
+AT_REST = 0.02  # of a number's size: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
 def settle(
-    trial: Trial,
+    trial: TrialEvidence,
     included: Sequence[str],
     numbers: Mapping[str, np.ndarray],
     path: Path | None,
@@ -39,7 +39,7 @@ def settle(
         lately = louder
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
-    for _ in range(ROUNDS):
+    for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, louder)
             if np.abs(point.linear.e).max() > AWAY:
@@ -59,7 +59,7 @@ def settle(
             continue
         near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
-            lowest = max(lowest, base.evidence - FALLS)
+            lowest = max(lowest, base.evidence - STEP_NATS)
         louder = lately = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit ran away
@@ -68,7 +68,7 @@ def settle(
         far = trial.apart(moved, numbers)
         numbers = moved
         lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
-        if far < REST:
+        if far < AT_REST:
             trial.rested[key] = (numbers, point.path, louder)
             break
         if lost and np.isfinite(before):
@@ -79,7 +79,7 @@ def settle(
 
 
 def _within_bounds(
-    trial: Trial, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
+    trial: TrialEvidence, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
 ) -> dict[str, np.ndarray]:
     """Numbers of a hypothesis as its causes allow them."""
     by = {cause.label: cause for cause in trial.reference.model.causes}

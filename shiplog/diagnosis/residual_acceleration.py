@@ -16,7 +16,7 @@ from shiplog.diagnosis.likelihood import Unrest, starts_and_knots
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.voyages.recording import Record
 
-HALF = 8  # knots: half a segment
+HALF_SEGMENT = 8  # knots: half a segment
 ACCELERATIONS = ("surge_acceleration", "sway_acceleration", "yaw_acceleration")
 
 
@@ -48,7 +48,7 @@ def covering(record: Record) -> np.ndarray:
     """
     size = segments.grid(record).rows
     begins = segments.begins(record)
-    between = begins + HALF * round(record.timescale.knot / record.step)
+    between = begins + HALF_SEGMENT * round(record.timescale.knot / record.step)
     between = between[between + size <= record.lasts[begins]]
     ends = np.append(np.flatnonzero(record.starts)[1:], len(record)) - 1 - size
     lasts = ends[(ends >= 0) & (record.firsts[np.maximum(ends, 0)] == record.firsts[ends + size])]

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.evidence import Found, Point, Told, Trial
+from shiplog.diagnosis.evidence import Found, Point, Told, TrialEvidence
 from shiplog.diagnosis.relinearisation import settle
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause, Shown
 
 PULSES = "side_thrust"
-LEAST = 5.0  # nats from which on a cause would show in these data
+SHOWS_NATS = 5.0  # nats from which on a cause would show in these data
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Decision:
     adapted: bool = False
 
 
-def without(trial: Trial, decision: Decision, one: Named) -> Decision:
+def without(trial: TrialEvidence, decision: Decision, one: Named) -> Decision:
     """The same verdict with one cause less, the others fitted again."""
     named = tuple(n for n in decision.named if n is not one)
     labels = tuple(n for n in decision.base.numbers if n != one.cause.label)

@@ -21,15 +21,17 @@ from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Tr
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; what is left then is far behind
-KEPT = 6  # linearisations that are kept; another one is made again where it is asked for
-WINDOW = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
+KEPT_LINEARISATIONS = (
+    6  # linearisations that are kept; another one is made again where it is asked for
+)
+SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
-FALLS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
+FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
 
 
-SHOWN = 5.0  # nats that a cause would have to bring to be seen at all
+SEEN_NATS = 5.0  # nats that a cause would have to bring to be seen at all
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +95,7 @@ class Search:
             self.weigh((), {}, self.first)
         while len(self._tried) < self._most:
             best = self.ranked()
-            near = [h for h in best if h.score > best[0].score - WINDOW]
+            near = [h for h in best if h.score > best[0].score - SEARCH_NATS]
             fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
             if not fresh:
                 return
@@ -121,7 +123,9 @@ class Search:
     def _forget(self) -> None:
         """Linearisations of all but the best hypotheses: each takes 50 MB and more."""
         best = [self.nothing, *self.ranked()]
-        kept = list(dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point)))[:KEPT]
+        kept = list(dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point)))[
+            :KEPT_LINEARISATIONS
+        ]
         for key, one in self.found.items():
             if isinstance(one.point, Point) and id(one.point) not in kept:
                 place = Place(one.point.numbers, one.point.path)
@@ -135,7 +139,7 @@ class Search:
         one = self.recalled(one)
         best = self.ranked()[0].score
         for labels, numbers, predicted in self._additions(one):
-            worth = predicted > best - WINDOW or not one.causes
+            worth = predicted > best - SEARCH_NATS or not one.causes
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 self.weigh(labels, numbers, self.point(one))
         for label in one.causes if len(one.causes) > 1 else ():
@@ -177,7 +181,7 @@ class Search:
 
     def _say_what_would_not_show(self) -> None:
         """What the model's misfit and these voyages cost, before anything is looked for."""
-        shares = {name: told.together(SHOWN) for name, told in self.told.items()}
+        shares = {name: told.together(SEEN_NATS) for name, told in self.told.items()}
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("of what is realistic would not show: %s", ", ".join(dict.fromkeys(blind)))
@@ -195,7 +199,7 @@ class Search:
         trial.remainder = Remainder(RAISED)
         point, near = at, None
         if labels:
-            lowest = self.nothing.evidence - FALLS
+            lowest = self.nothing.evidence - FAILED_NATS
             both = self.fixed | dict(numbers)
             point, base = settle(trial, self._included(labels), both, at.path, lowest=lowest)
             if not math.isfinite(base.evidence):
@@ -216,7 +220,7 @@ class Search:
         best = max((self.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
         changed = [self._changed(point, included, levels, family) for family in trial.families]
         scores = [self._score(c.value, labels, c.remainder.kind) for c in changed]
-        near = max((best.score, *(score - WINDOW for score in scores)))
+        near = max((best.score, *(score - SEARCH_NATS for score in scores)))
         for one, score in zip(changed, scores, strict=True):
             self._change(point, labels, one, best, score >= near)
         if self._best(levels, RAISED).louder > RAISED_FROM:

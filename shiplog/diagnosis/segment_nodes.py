@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis.linearisation import resampled
-from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Knots:
     driven: np.ndarray
 
 
-def at_knots(segments: Cut, g: Grid) -> Knots:
+def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
     every = round(g.knot / (g.step * g.every))
     state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)

@@ -48,7 +48,7 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Grid:
+class SegmentGrid:
     """What is the same for every segment: nodes, bins, knots."""
 
     step: float  # s between rows
@@ -71,13 +71,13 @@ class Grid:
         return np.maximum(1.0 - np.abs(at[:, None] - np.arange(self.knots)), 0.0)
 
 
-def grid(record: Record) -> Grid:
+def grid(record: Record) -> SegmentGrid:
     """Of a record's rows, in its ship's time scale."""
     of = record.timescale
     rows = round(of.seconds / record.step)
     bins, knots = round(of.seconds / of.bin), round(of.seconds / of.knot) + 1
     nodes = rows // of.node_rows + 1
-    return Grid(record.step, rows, nodes, bins, knots, of.bin, of.knot, of.node_rows)
+    return SegmentGrid(record.step, rows, nodes, bins, knots, of.bin, of.knot, of.node_rows)
 
 
 def begins(record: Record) -> np.ndarray:

@@ -33,7 +33,7 @@ from shiplog.diagnosis.nominal_campaign import (
     robust_weights,
     squares,
 )
-from shiplog.diagnosis.parameter_layout import HELD
+from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.voyages.recording import Record
 
@@ -60,7 +60,7 @@ class Remainder:
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
 
-class Trial(evidence.Trial):
+class Trial(evidence.TrialEvidence):
     """Voyages in question, against a campaign."""
 
     def __init__(self, campaign: Campaign, record: Record, fixed: Sequence[str] = ()) -> None:
@@ -175,7 +175,7 @@ class Trial(evidence.Trial):
         total, logdet = share * total, share * logdet
         extra = [columns.of[name] for name in included]
         family = self.families.get(self.remainder.kind, np.zeros(0, int))
-        held = [np.full(len(c), HELD if n in self.fixed else 1.0)
+        held = [np.full(len(c), HELD_INFORMATION if n in self.fixed else 1.0)
                 for n, c in zip(included, extra, strict=True)]  # fmt: skip
         held.append(np.full(len(family), self.remainder.size**-2.0))
         count = len(pull)

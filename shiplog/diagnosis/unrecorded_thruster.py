@@ -12,14 +12,14 @@ import numpy as np
 from scipy.optimize import minimize
 
 from shiplog.diagnosis import likelihood
-from shiplog.diagnosis.evidence import LOUDER, Found, Point, Trial
+from shiplog.diagnosis.evidence import LOUDER, Found, Point, TrialEvidence
 from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
-REACH = 0.5  # lengths from midship
+REACH_LENGTHS = 0.5  # lengths from midship
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,9 @@ class Pulses:
     unit: np.ndarray
 
 
-def pulses(trial: Trial, point: Point, base: Found, usual: np.ndarray | None = None) -> Pulses:
+def pulses(
+    trial: TrialEvidence, point: Point, base: Found, usual: np.ndarray | None = None
+) -> Pulses:
     """A force to the side that comes and goes at one place along the ship, unrecorded: its
     accelerations go together as those of no other unrest do. Judged on what is left.
 
@@ -86,7 +88,8 @@ def pulses_of(
     lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
     finer = minimize(  # beside the place itself a part of the force would be another cause's
         lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
-        bounds=((-REACH, REACH), (None, None)), options={"xatol": 0.005, "fatol": 0.1},
+        bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None)),
+        options={"xatol": 0.005, "fatol": 0.1},
     )  # fmt: skip
     lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
     one = -float(finer.fun)
@@ -94,7 +97,7 @@ def pulses_of(
 
 
 def pulse_force(
-    trial: Trial, point: Point, base: Found, pulses: Pulses
+    trial: TrialEvidence, point: Point, base: Found, pulses: Pulses
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
     unrest = trial.unrest.louder(base.louder)

@@ -17,11 +17,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-ROUNDS = 6  # of three steps of expectation-maximisation each
+EM_ROUNDS = 6  # of three steps of expectation-maximisation each
 LEAP = 16.0  # steps at once, at most
 BOUNDS = (-16.0, 10.0)  # of the logarithm of a variance: 3e-4 to 150 plausible sizes
-FIRST = 0.1  # standard deviation at which it begins, in units of a number's plausible size
-LEAST = 0.02  # that one pseudo-part contributes: no two voyages are alike to better than that
+FIRST_DEVIATION = (
+    0.1  # standard deviation at which it begins, in units of a number's plausible size
+)
+LEAST_DEVIATION = (
+    0.02  # that one pseudo-part contributes: no two voyages are alike to better than that
+)
 
 
 @dataclass(frozen=True)
@@ -66,13 +70,13 @@ def learn(
     groups   columns that share one variance; other columns have none
     sized    columns whose prior size (the same in every part) is learned too
     """
-    problem = _Problem(
+    problem = _EffectsProblem(
         [(g[1:, 1:], g[1:, 0]) for g in each], known, pull, list(groups), list(sized)
     )
-    sizes = np.log(np.full(len(problem.groups) + len(problem.sized), FIRST**2))
+    sizes = np.log(np.full(len(problem.groups) + len(problem.sized), FIRST_DEVIATION**2))
     for at, columns in enumerate(problem.sized, len(problem.groups)):
         sizes[at] = -math.log(known[columns[0]])
-    for _ in range(ROUNDS):
+    for _ in range(EM_ROUNDS):
         one, _ = problem.step(sizes)
         two, _ = problem.step(one)
         first, second = one - sizes, two - one
@@ -84,7 +88,7 @@ def learn(
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _EffectsProblem:
     """Parts (M, g) with what is known of θ, and which columns share one variance."""
 
     parts: list[tuple[np.ndarray, np.ndarray]]
@@ -134,4 +138,4 @@ class _Problem:
 
 def _mean(total: float, count: int) -> float:
     """Mean square, one pseudo-observation of LEAST among the others."""
-    return (total + LEAST**2) / (count + 1.0)
+    return (total + LEAST_DEVIATION**2) / (count + 1.0)

@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog import files
 from shiplog.exceptions import LogUnreadable, listed
-from shiplog.logs.write import CHUNK, CONTRACT
+from shiplog.logs.write import CHUNK_BYTES, CONTRACT
 
 log = logging.getLogger(__name__)
 
@@ -21,7 +21,7 @@ BAG = ".bag"
 SQLITE = ".db3"
 HEADER = "std_msgs/msg/Header"
 # Bags of ROS 2 before Iron hold no definitions; those of its own messages have hardly changed.
-USUAL = "ROS2_HUMBLE"
+USUAL_TYPES = "ROS2_HUMBLE"
 
 
 def is_bag(path: Path) -> bool:
@@ -46,7 +46,7 @@ def bag_to_log(path: Path, target: Path, ship: str) -> dict[str, str]:
     try:
         with (
             files.whole(target) as partial,
-            AnyReader([source], default_typestore=get_typestore(Stores[USUAL])) as reader,
+            AnyReader([source], default_typestore=get_typestore(Stores[USUAL_TYPES])) as reader,
             partial.open("wb") as stream,
         ):
             left_out = _write(reader, stream, ship, path.name)
@@ -71,7 +71,7 @@ def _write(reader, stream, ship: str, name: str) -> dict[str, str]:
         store = get_typestore(Stores.EMPTY)
         store.register({**reader.typestore.fielddefs, HEADER: header})
     writer = Writer(
-        stream, chunk_size=CHUNK, compression=CompressionType.ZSTD, index_types=IndexType.ALL,
+        stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=IndexType.ALL,
         enable_crcs=True,
     )  # fmt: skip
     writer.start(profile="")

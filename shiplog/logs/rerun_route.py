@@ -29,7 +29,9 @@ from .tables import Tables, Tally
 log = logging.getLogger(__name__)
 
 WORKER = Path(__file__).with_name("rerun_worker.py")
-LEAST = 20_000  # wanted messages: the process takes as long to start as 35 000 take to decode here,
+LEAST_MESSAGES = (
+    20_000  # wanted messages: the process takes as long to start as 35 000 take to decode here,
+)
 LEAST_WARM = 2_000  # which the next log gets back; once it runs, a request costs 15 ms and no more
 PATIENCE = 30.0  # s, of which it needs 1 to start, more on a busy machine
 PACE = 20_000  # messages/s that must at least come back; 600 000 do
@@ -59,7 +61,7 @@ def preflight(found: container.Survey) -> Tally | None:
 def worth_it(tables: Tables) -> bool:
     """Whether a log says that it has enough wanted messages of the right kind."""
     counts = tables.found.statistics.channel_message_counts if tables.found.statistics else {}
-    least = LEAST_WARM if worker().runs else LEAST
+    least = LEAST_WARM if worker().runs else LEAST_MESSAGES
     return sum(counts[number] for number in _suitable(tables)) >= least
 
 

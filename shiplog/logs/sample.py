@@ -12,19 +12,19 @@ from .json_text import Json
 from .messages import Decoder
 from .tables import Tables
 
-SAMPLE = 200  # messages of a topic that are decoded
+SAMPLE_MESSAGES = 200  # messages of a topic that are decoded
 
 
 def sample(found: Survey, topics: Iterable[str] | None) -> dict[str, dict[str, pl.DataType]]:
     """Leaf fields by topic; JSON inside a text adds `leaf.field`. Undecodable topics are absent."""
     tables = Tables(found, None if topics is None else dict.fromkeys(topics, ()))
     stated = found.statistics.channel_message_counts if found.statistics else {}
-    missing = {number: min(count, SAMPLE) for number, count in stated.items() if count}
+    missing = {number: min(count, SAMPLE_MESSAGES) for number, count in stated.items() if count}
     met: dict[int, list[bytes]] = {}
     for chunk in salvage.messages(found):
         for message in chunk:
             payloads = met.setdefault(message.channel_id, [])
-            if len(payloads) < SAMPLE:
+            if len(payloads) < SAMPLE_MESSAGES:
                 payloads.append(message.data)
         if missing and all(number in met for number in missing):
             break

@@ -29,7 +29,7 @@ from shiplog import files
 from shiplog.exceptions import ShiplogError, listed, nearest
 
 CONTRACT = "1"
-CHUNK = 1024 * 1024  # bytes before compression
+CHUNK_BYTES = 1024 * 1024  # bytes before compression
 SECOND = 1_000_000_000
 
 LOCATION_FIX = "foxglove.LocationFix"
@@ -98,7 +98,7 @@ def write_log(
         voyage.setdefault(key, value)  # ship, datum and contract are not a note's to change
     with files.whole(path) as partial, open(partial, "wb") as stream:
         _write(Writer(
-            stream, chunk_size=CHUNK, compression=CompressionType.ZSTD,
+            stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD,
             index_types=IndexType.ALL, enable_crcs=True,
         ), series, voyage)  # fmt: skip
         stream.flush()

@@ -17,7 +17,7 @@ from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.wind import apparent
 
 ANCHORS = 200  # training samples that stand for all of them in the distance
-REACH = 2.0  # limits of the coverage figure beyond the training data, where nothing is left
+FADE_LIMITS = 2.0  # limits of the coverage figure beyond the training data, where nothing is left
 
 
 @partial(
@@ -105,7 +105,7 @@ class Hybrid:
         net = self.residual
         square = ((z[..., None, :] - net.anchors) ** 2).sum(-1).min(-1)
         beyond = jnp.sqrt(jnp.maximum(square, 1e-12)) - net.radius
-        share = jnp.clip(1.0 - beyond / (REACH * net.limit), 0.0, 1.0)
+        share = jnp.clip(1.0 - beyond / (FADE_LIMITS * net.limit), 0.0, 1.0)
         return share * share * (3.0 - 2.0 * share)
 
     def network(self, theta: Array, z: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.diagnosis import error_location, next_manoeuvre, segments
-from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linearisation import Linear
@@ -28,7 +28,7 @@ LEAST_S = 240.0  # of unbroken record, below which nothing can be said
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosedTrial:
     """The verdict and what it rests on.
 
     seen    trial and decision of the model that is simulated: for a network, not those that judge
@@ -40,8 +40,8 @@ class Diagnosis:
     verdict: Verdict
     folder: Path
     decision: Decision | None = None
-    trial: Trial | None = None
-    seen: tuple[Trial, Decision] | None = None
+    trial: TrialEvidence | None = None
+    seen: tuple[TrialEvidence, Decision] | None = None
     whole: Linear | None = None
     held: HeldOut | None = None
     after: ExtendedSimulator | None = None
@@ -72,7 +72,7 @@ class Context:
     lost: str = ""
     notes: Sequence[str] = ()
     pushed: Sequence[Interval] = ()
-    segment: float = timescale.SECONDS
+    segment: float = timescale.SEGMENT_S
     uncovered: Sequence[Interval] = ()
     wrong: Sequence[dict] = ()
     unseen: Sequence[Dependence] = ()
@@ -80,7 +80,11 @@ class Context:
 
 
 def verdict(
-    trial: Trial, decision: Decision, found: Gain | None, held: HeldOut | None, context: Context
+    trial: TrialEvidence,
+    decision: Decision,
+    found: Gain | None,
+    held: HeldOut | None,
+    context: Context,
 ) -> Verdict:
     """What was decided, in the contract's words.
 
@@ -132,7 +136,7 @@ def verdict(
     )
 
 
-def of_physics(run: Run, trial: Trial, found: Gain | None) -> list[str]:
+def of_physics(run: Run, trial: TrialEvidence, found: Gain | None) -> list[str]:
     """Whom the causes of a network were asked of, and what they are worth there."""
     where = "these voyages" if trial.reference.adapts else "the voyages that it was made on"
     said = [

@@ -16,7 +16,7 @@ BAND = ("_low", "_high")  # of a simulated state: the ends of its 90 % band
 
 
 @dataclass(frozen=True, slots=True)
-class Actuator:
+class DrawnActuator:
     """One actuator's column: its name, what it is, and the SI unit it is in."""
 
     name: str
@@ -31,7 +31,7 @@ class Actuator:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparisonData:
     """Measured voyages beside what every model and seed made of them.
 
     measured    voyage, time [s from the voyage's start], the six states, one column per
@@ -50,7 +50,7 @@ class Comparison:
     title: str
     ship_length: float  # m
     ship_breadth: float  # m
-    actuators: tuple[Actuator, ...]
+    actuators: tuple[DrawnActuator, ...]
     has_wind: bool
     measured: pl.DataFrame
     simulated: pl.DataFrame

@@ -14,26 +14,26 @@ from shiplog.diagnosis import (
     residual_acceleration,
     unrecorded_thruster,
 )
-from shiplog.diagnosis.evidence import Trial
+from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.measurement_correction import corrected
 from shiplog.diagnosis.residual_acceleration import around
 from shiplog.diagnosis.result import PULSES, Decision
 from shiplog.exceptions import listed
 from shiplog.report import page, viewer
-from shiplog.report.answer import Diagnosis
+from shiplog.report.answer import DiagnosedTrial
 from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 
-FARTHEST = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
+OFF_THE_POND = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
 
 
-def save(done: Diagnosis, path: Path) -> None:
+def save(done: DiagnosedTrial, path: Path) -> None:
     """The recording of a diagnosis that came to a decision."""
     viewer.save_diagnosis(exhibit(done), path)
 
 
-def exhibit(done: Diagnosis) -> Exhibit:
+def exhibit(done: DiagnosedTrial) -> Exhibit:
     """Of a diagnosis that came to a decision."""
     trial, decision = done.trial, done.decision
     assert trial is not None and decision is not None
@@ -67,7 +67,7 @@ def _measured(record: Record) -> pl.DataFrame:
 # --- forces ---------------------------------------------------------------------------------------
 
 
-def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
+def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
     assert done.seen is not None and done.whole is not None
     (trial, decision), whole = done.seen, done.whole
@@ -99,7 +99,7 @@ def _residual(done: Diagnosis) -> tuple[pl.DataFrame, tuple[str, ...]]:
     return pl.concat(tables), tuple(names)
 
 
-def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
+def _caused(trial: TrialEvidence, decision: Decision, rows: np.ndarray) -> np.ndarray:
     """ν̇ [n, 3] that the named causes add where the ship was: a wrong instrument adds none."""
     ref = trial.reference
     fixed = dict(decision.first.numbers)
@@ -125,7 +125,7 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     return acceleration(fixed | named) - acceleration(fixed)
 
 
-def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
+def _pulses(trial: TrialEvidence, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
     force, _ = unrecorded_thruster.pulse_force(
@@ -140,7 +140,7 @@ def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
 # --- windows --------------------------------------------------------------------------------------
 
 
-def _before_and_after(done: Diagnosis) -> tuple[pl.DataFrame, pl.DataFrame]:
+def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]:
     """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
     held, decision = done.held, done.decision
     if held is None or decision is None:
@@ -167,7 +167,7 @@ def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows
     """A row a sample; what has left the pond is null."""
     count, size, _ = states.shape
     since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt.double().numpy(), 1)), 1)
-    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < FARTHEST), axis=1)
+    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < OFF_THE_POND), axis=1)
     states = np.where(gone[..., None], np.nan, states)
     index = numbered[np.repeat(np.arange(count), size)]
     return (

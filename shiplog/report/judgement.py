@@ -10,7 +10,7 @@ import polars as pl
 
 from shiplog.simulation import error_reduction
 
-FEWEST = 6  # windows, fewer of which give no interval: three blocks of two are drawn from
+FEWEST_WINDOWS = 6  # windows, fewer of which give no interval: three blocks of two are drawn from
 BASELINES = {"hold": "holding the velocity", "least_squares": "quadratic least squares"}
 MEANING = (
     "L is the time integral of the weighted squared errors of surge, sway and yaw rate over a "
@@ -72,7 +72,7 @@ class Judgement:
             return f"{found}: every one of them ran away."
         said = [one.sentence for one in self.against]
         found = f"{found}: {'; '.join(said)}." if said else f"{found}."
-        if self.windows - self.lost < FEWEST:
+        if self.windows - self.lost < FEWEST_WINDOWS:
             found += " Too few windows for an interval."
         if self.lost:
             found += f" Windows that ran away, in none of these figures: {self.lost}."
@@ -121,7 +121,7 @@ def _against(
     if not kept.any() or baseline[kept].sum() <= 0.0:
         return None
     low = high = None
-    if kept.sum() >= FEWEST:
+    if kept.sum() >= FEWEST_WINDOWS:
         of = [voyage for voyage, keep in zip(voyages, kept, strict=True) if keep]
         low, high = error_reduction.shares(baseline[kept], loss[kept], of)
     return Against(name, float(loss[kept].sum() / baseline[kept].sum()), low, high)

@@ -11,11 +11,11 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
-from shiplog.report.judgement import FEWEST
+from shiplog.report.judgement import FEWEST_WINDOWS
 from shiplog.voyages.one_hertz import WINDOW
 
 if TYPE_CHECKING:
-    from shiplog.voyages.store import Entry
+    from shiplog.voyages.store import CatalogueEntry
 
 MOST_FINDINGS = 16  # lines on one log
 MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
@@ -128,7 +128,7 @@ def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object])
     }
 
 
-def catalogue(entries: Sequence[Entry]) -> str:
+def catalogue(entries: Sequence[CatalogueEntry]) -> str:
     """What is in a store; figures that an older program did not write down stay open."""
     rows = [
         (
@@ -352,7 +352,12 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
 def voyages_table(answer: dict) -> str:
     """L, windows and coverage of each voyage; of a few windows no share is said."""
     rows = [
-        (name, v["windows"], v["loss"], f"{v['coverage']:.0%}" if v["windows"] >= FEWEST else "-")
+        (
+            name,
+            v["windows"],
+            v["loss"],
+            f"{v['coverage']:.0%}" if v["windows"] >= FEWEST_WINDOWS else "-",
+        )
         for name, v in answer["voyages"].items()
     ]
     return table(("voyage", "windows", "L", "covered"), rows)

@@ -10,7 +10,7 @@ from shiplog.channels import VELOCITY
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.next_manoeuvre import Advice
 from shiplog.diagnosis.omitted_inputs import Dependence
-from shiplog.diagnosis.result import LEAST, PULSES, Decision, Named
+from shiplog.diagnosis.result import PULSES, SHOWS_NATS, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
@@ -19,7 +19,7 @@ from shiplog.simulation.error_reduction import Gain
 SHARE_SAID = 0.01  # of a ranking
 SURELY = 0.9  # probability from which on a sentence is said without it
 HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
-NINETY = 1.645  # standard deviations to either end of a 90 % interval
+NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -
     peak, sd = (found.force, found.force) if strongest is None else (
         abs(strongest["force_N"]), strongest["sd_N"],
     )  # fmt: skip
-    low, high = max(peak - NINETY * sd, 0.0), peak + NINETY * sd
+    low, high = max(peak - NINETY_SPREADS * sd, 0.0), peak + NINETY_SPREADS * sd
     size = {"value": peak, "low": low, "high": high, "unit": "N"}
     where = "ahead of" if found.lever >= 0.0 else "abaft"
     return {
@@ -192,7 +192,7 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     by = {c.label: c for c in causes}
     found = []
     for label, told in decision.told.items():
-        cause, least = by[label], told.least(LEAST)
+        cause, least = by[label], told.least(SHOWS_NATS)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
@@ -200,7 +200,9 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
         else:  # as many as the ship has rudders, or the map places
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
-        found.append({"name": cause.name, "share": told.together(LEAST), "parameters": numbers})
+        found.append(
+            {"name": cause.name, "share": told.together(SHOWS_NATS), "parameters": numbers}
+        )
         if label != cause.name:
             key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
             found[-1][key] = label.partition(":")[2]

@@ -19,7 +19,7 @@ from shiplog.channels import VELOCITY
 from shiplog.voyages.wind_histogram import ANGLE_BIN, SPEED_BIN
 
 QUANTILE = 0.95  # of the distances that training seconds have from other voyages' or blocks'
-BLOCK = 100  # rows; neighbours within one block are one manoeuvre, not independent data
+BLOCK_ROWS = 100  # rows; neighbours within one block are one manoeuvre, not independent data
 WIND_ANGLE_BIN = math.radians(ANGLE_BIN)
 BINS_PER_STD = 4.0
 NEVER_SEEN = 0.25  # share of a window outside the histogram above which a channel is named
@@ -96,7 +96,7 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
 
 def independent_distance(features: np.ndarray) -> float:
     """How far all but 5 % of samples [n, Z] lie from the nearest of another stretch of time."""
-    even = (np.arange(len(features)) // BLOCK) % 2 == 0
+    even = (np.arange(len(features)) // BLOCK_ROWS) % 2 == 0
     if even.all():  # less than two blocks: nothing to compare with but itself
         even = np.arange(len(features)) % 2 == 0
     apart = np.concatenate(

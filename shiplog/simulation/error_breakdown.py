@@ -13,11 +13,11 @@ import polars as pl
 
 from shiplog import channels
 from shiplog.profile import Profile
-from shiplog.simulation.sensitivities import VELOCITY, Series, apparent_wind
+from shiplog.simulation.sensitivities import VELOCITY, WindowSeries, apparent_wind
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 MINUTE = 60.0  # s
-RARE = 0.03  # of the time: what is seen less often is an incident, not a regime
+RARE_SHARE = 0.03  # of the time: what is seen less often is an incident, not a regime
 STANDS_OUT = 0.05  # nats of `_score`: 20 % of the error in 15 % of the time
 FINER = 1.2  # how much more a second or third condition must say
 CONDITIONS = 3
@@ -29,7 +29,7 @@ WIDTHS = (0.5, 1.0, 2.0, 5.0)  # m/s, of a bin of wind speed
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class ChannelError:
     """One velocity's part in the error. `within` of it arises in `occurs` of the time."""
 
     channel: str
@@ -55,13 +55,15 @@ class Minute:
 class Wrong:
     """`channels` in order of their share; `diverged`: windows that ran away, left out of all."""
 
-    channels: tuple[Channel, ...]
+    channels: tuple[ChannelError, ...]
     worst: Minute | None
     timeline: pl.DataFrame
     diverged: int
 
 
-def explain(error: np.ndarray, data: Series, windows: pl.DataFrame, profile: Profile) -> Wrong:
+def explain(
+    error: np.ndarray, data: WindowSeries, windows: pl.DataFrame, profile: Profile
+) -> Wrong:
     """Of N windows, rolled out and measured.
 
     error    [N, I, 6]  simulated less measured, channels.STATE
@@ -71,7 +73,7 @@ def explain(error: np.ndarray, data: Series, windows: pl.DataFrame, profile: Pro
     """
     finite = np.isfinite(error).all((1, 2))
     rows = timeline(error, data, windows)
-    kept = Series(*(values[finite] for values in data))
+    kept = WindowSeries(*(values[finite] for values in data))
     cost = _cost(error[finite], kept)
     total = cost.sum()
     if not total:
@@ -80,12 +82,12 @@ def explain(error: np.ndarray, data: Series, windows: pl.DataFrame, profile: Pro
     found = []
     for i, name in enumerate(CHANNELS):
         where, within, occurs = _where(cost[..., i], kept.steps, regimes)
-        found.append(Channel(name, float(cost[..., i].sum() / total), where, within, occurs))
+        found.append(ChannelError(name, float(cost[..., i].sum() / total), where, within, occurs))
     found.sort(key=lambda c: -c.share)
     return Wrong(tuple(found), worst_minute(rows), rows, int((~finite).sum()))
 
 
-def timeline(error: np.ndarray, data: Series, windows: pl.DataFrame) -> pl.DataFrame:
+def timeline(error: np.ndarray, data: WindowSeries, windows: pl.DataFrame) -> pl.DataFrame:
     """One row a sample of a window: voyage, window, time_s (into the voyage), the error of surge,
     sway [m/s] and yaw_rate [rad/s], and loss: what the sample adds to L."""
     count, size = error.shape[:2]
@@ -125,7 +127,7 @@ def worst_minute(rows: pl.DataFrame) -> Minute | None:
     return best
 
 
-def _cost(error: np.ndarray, data: Series) -> np.ndarray:
+def _cost(error: np.ndarray, data: WindowSeries) -> np.ndarray:
     """[N, I, 3] of L."""
     weighted = error[..., VELOCITY] * np.array(channels.VELOCITY_WEIGHTS)
     return data.steps[..., None] * weighted**2
@@ -171,13 +173,13 @@ def _score(cost: np.ndarray, steps: np.ndarray, inside: np.ndarray) -> float:
     heard = np.arange(len(cost)) != of_cost.argmax()
     all_cost, all_time = cost[heard].sum(), steps[heard].sum()
     within, time = of_cost[heard].sum(), of_time[heard].sum()
-    if not within or time < RARE * all_time:
+    if not within or time < RARE_SHARE * all_time:
         return 0.0
     share = within / all_cost
     return float(share * np.log(share * all_time / time))
 
 
-def _regimes(data: Series, windows: pl.DataFrame, profile: Profile) -> Iterator[Regime]:
+def _regimes(data: WindowSeries, windows: pl.DataFrame, profile: Profile) -> Iterator[Regime]:
     """All that can be said of a sample, kind by kind, in the order in which it is said."""
     _, u, _, v, _, r = np.moveaxis(data.measured, -1, 0)
     usual = max(float(np.sqrt((u**2 + v**2).mean())), 1e-9)
@@ -203,7 +205,7 @@ def _regimes(data: Series, windows: pl.DataFrame, profile: Profile) -> Iterator[
         yield "campaign", f"in the {name} third of the campaign", mask
 
 
-def _controls(data: Series, profile: Profile) -> Iterator[Regime]:
+def _controls(data: WindowSeries, profile: Profile) -> Iterator[Regime]:
     angles = [i for i, a in enumerate(profile.actuators) if a.kind in ("rudder", "azimuth")]
     drives = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     if angles:
@@ -229,7 +231,7 @@ def _controls(data: Series, profile: Profile) -> Iterator[Regime]:
         yield "power", f"{name} at high power", strong
 
 
-def _wind(data: Series) -> Iterator[Regime]:
+def _wind(data: WindowSeries) -> Iterator[Regime]:
     """The apparent wind, which the force comes from."""
     apparent = apparent_wind(data.measured, data.wind)
     speed, side = apparent[..., 0], _quarter(apparent[..., 1])
@@ -242,7 +244,7 @@ def _wind(data: Series) -> Iterator[Regime]:
         yield "wind speed", words, (speed >= low) & (speed < low + width)
 
 
-def _place(data: Series, geodetic: bool) -> Iterator[Regime]:
+def _place(data: WindowSeries, geodetic: bool) -> Iterator[Regime]:
     """Quarters of where it was, and of where it looked. A local frame need not face north."""
     x0, y0 = data.measured[..., 0], data.measured[..., 2]
     north, east = x0 >= np.median(x0), y0 >= np.median(y0)

@@ -9,8 +9,8 @@ import numpy as np
 
 from shiplog.channels import VELOCITY, VELOCITY_IN_STATE, VELOCITY_WEIGHTS
 
-BLOCK = 2  # windows in a row that are drawn together: 200 s
-DRAWS = 4000
+BLOCK_WINDOWS = 2  # windows in a row that are drawn together: 200 s
+BOOTSTRAP_DRAWS = 4000
 RUNAWAY = 1e9  # L of a window whose rollout left the pond
 
 
@@ -58,13 +58,13 @@ def shares(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> tup
     of windows that never join two voyages (Künsch 1989)."""
     blocks: list[list[int]] = []
     for i, name in enumerate(voyages):
-        fresh = not blocks or voyages[blocks[-1][0]] != name or len(blocks[-1]) == BLOCK
+        fresh = not blocks or voyages[blocks[-1][0]] != name or len(blocks[-1]) == BLOCK_WINDOWS
         if fresh:
             blocks.append([])
         blocks[-1].append(i)
     of = np.array([[before[b].sum(), after[b].sum()] for b in blocks])
     rng = np.random.default_rng(0)
-    drawn = of[rng.integers(len(of), size=(DRAWS, len(of)))].sum(1)
+    drawn = of[rng.integers(len(of), size=(BOOTSTRAP_DRAWS, len(of)))].sum(1)
     low, high = np.quantile(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-12), (0.05, 0.95))
     return float(low), float(high)
 

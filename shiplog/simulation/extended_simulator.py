@@ -17,11 +17,11 @@ from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
 from shiplog.profile import Profile
-from shiplog.simulation.sensitivities import Series, rollout, series, state_losses
+from shiplog.simulation.sensitivities import WindowSeries, rollout, series, state_losses
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 
-DRAWS = 12  # of the causes' numbers, for the spread of the states
+NUMBER_DRAWS = 12  # of the causes' numbers, for the spread of the states
 SEED = 0
 
 Shares = Mapping[str, tuple[float, float]]  # voyage → share of the campaign at its start and end
@@ -57,7 +57,7 @@ class ExtendedSimulator:
             was = cause.read(was, numbers[cause.label])
         shape = windows.state.shape
         driven = np.concatenate((was.actuator, was.share[:, None]), 1)
-        data = Series(
+        data = WindowSeries(
             was.state.reshape(shape),
             driven.reshape(*shape[:2], -1),
             was.true_wind.reshape(*shape[:2], 2),
@@ -118,7 +118,7 @@ class ExtendedSimulator:
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         many = [
             self.states(windows, self.theta + root @ rng.standard_normal(len(self.theta)))
-            for _ in range(DRAWS)
+            for _ in range(NUMBER_DRAWS)
         ]
         with np.errstate(all="ignore"):
             return np.nan_to_num(np.std(np.stack(many), axis=0), nan=np.inf)

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LEVEL = 0.9
-MOST = 0.95  # quantile of the held-out ratios, where voyages are too few for a conformal one
+BAND_LEVEL = 0.9
+FEW_VOYAGES_QUANTILE = (
+    0.95  # quantile of the held-out ratios, where voyages are too few for a conformal one
+)
 SMOOTHED = 11  # s over which the growth of the error is averaged
 
 
@@ -34,7 +36,9 @@ class Band:
         return self.factor * np.sqrt(spread**2 + self.growth**2)
 
 
-def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float = LEVEL) -> Band:
+def calibrate(
+    error: np.ndarray, spread: np.ndarray, groups: int, level: float = BAND_LEVEL
+) -> Band:
     """From errors [N, I, 6] of held-out rollouts and the model's own spread there.
 
     groups   voyages they are of. The quantile is that of a split conformal interval (Vovk et al.
@@ -56,7 +60,7 @@ def calibrate(error: np.ndarray, spread: np.ndarray, groups: int, level: float =
     growth[0] = 0.0
     total = np.sqrt(spread[:, 1:] ** 2 + growth[1:] ** 2)
     ratio = np.abs(error[:, 1:]) / np.maximum(total, 1e-12)
-    wanted = min(MOST, level * (1.0 + 1.0 / max(groups, 1)))
+    wanted = min(FEW_VOYAGES_QUANTILE, level * (1.0 + 1.0 / max(groups, 1)))
     return Band(growth, np.quantile(ratio.reshape(-1, ratio.shape[-1]), wanted, axis=0))
 
 

@@ -24,7 +24,7 @@ from shiplog.voyages.windows import Windows
 jax.config.update("jax_enable_x64", True)
 
 VELOCITY = np.array(VELOCITY_IN_STATE)
-CHUNK = 128  # windows at a time: their sensitivities to 60 parameters are 45 MB
+WINDOWS_AT_A_TIME = 128  # windows at a time: their sensitivities to 60 parameters are 45 MB
 
 
 class Physical(Protocol):
@@ -46,7 +46,7 @@ class Physical(Protocol):
     ) -> Array: ...
 
 
-class Series(NamedTuple):
+class WindowSeries(NamedTuple):
     """What drives N rollouts, and what was measured. The wind is the true one.
 
     A simulation of a ship that moves otherwise than the measured one feels another apparent
@@ -72,11 +72,11 @@ class Series(NamedTuple):
         return np.pad(half, ((0, 0), (1, 0))) + np.pad(half, ((0, 0), (0, 1)))
 
 
-def series(windows: Windows) -> Series:
+def series(windows: Windows) -> WindowSeries:
     """Windows as physical models take them."""
     measured = windows.state.double().numpy()
     wind = windows.wind.double().numpy()
-    return Series(
+    return WindowSeries(
         measured,
         windows.actuator.double().numpy(),
         true_wind(measured, wind) if wind.shape[-1] else np.zeros((*measured.shape[:2], 2)),
@@ -145,7 +145,7 @@ def _fine(actuator, wind, dt, substeps: int):
     return tuple(jnp.repeat(values, substeps, axis=1) for values in held)
 
 
-def rollout(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
+def rollout(model: Physical, theta: np.ndarray, data: WindowSeries) -> np.ndarray:
     """Explicit Euler (Eq. 9) from the first measured state: states [N, I, 6].
 
     The paper's step is the sampling interval; a model with `substeps` cuts it, inputs held.
@@ -156,15 +156,19 @@ def rollout(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
     return np.asarray(states)[: len(data.measured), :: model.substeps]
 
 
-def padded(data: Series) -> Series:
+def padded(data: WindowSeries) -> WindowSeries:
     """Filled up with windows of weight 0 to the next power of two (multiples of CHUNK above):
     a shape that has been compiled once serves every selection of voyages."""
     count = len(data.measured)
-    size = -(-count // CHUNK) * CHUNK if count > CHUNK else max(8, 1 << (count - 1).bit_length())
+    size = (
+        -(-count // WINDOWS_AT_A_TIME) * WINDOWS_AT_A_TIME
+        if count > WINDOWS_AT_A_TIME
+        else max(8, 1 << (count - 1).bit_length())
+    )
     if size == count:
         return data
     last = data._replace(weight=np.zeros(count))
-    return Series(
+    return WindowSeries(
         *(
             np.concatenate((values, np.repeat(filler[-1:], size - count, axis=0)))
             for values, filler in zip(data, last, strict=True)
@@ -224,7 +228,9 @@ def _linearised(model, theta, start, actuator, wind, dt, *, free=None):
     return states[:, :: model.substeps], path[:, :: model.substeps]
 
 
-def linearised(model: Physical, theta: np.ndarray, data: Series) -> tuple[np.ndarray, np.ndarray]:
+def linearised(
+    model: Physical, theta: np.ndarray, data: WindowSeries
+) -> tuple[np.ndarray, np.ndarray]:
     """States [N, I, 6] and their derivatives by θ [N, I, 6, P], exact for the Euler rollout."""
     whole = padded(data)
     states, slopes = _linearised(
@@ -264,7 +270,7 @@ class Normal:
 
 
 def normal(
-    model: Physical, theta: np.ndarray, data: Series, free: tuple[int, ...] | None = None
+    model: Physical, theta: np.ndarray, data: WindowSeries, free: tuple[int, ...] | None = None
 ) -> Normal:
     """Loss, gradient and Gauss-Newton matrix in flat memory, CHUNK windows at a time.
 
@@ -275,22 +281,25 @@ def normal(
         _normal(
             model,
             theta,
-            *(values[at : at + CHUNK] for values in (*whole[:4], whole.steps, whole.weight)),
+            *(
+                values[at : at + WINDOWS_AT_A_TIME]
+                for values in (*whole[:4], whole.steps, whole.weight)
+            ),
             free=free,
         )
-        for at in range(0, len(whole.measured), CHUNK)
+        for at in range(0, len(whole.measured), WINDOWS_AT_A_TIME)
     ]
     count = len(data.measured)
     loss, pull = (np.concatenate([p[i] for p in parts])[:count] for i in (0, 1))
     return Normal(loss, pull, np.sum([p[2] for p in parts], axis=0))
 
 
-def losses(model: Physical, theta: np.ndarray, data: Series) -> np.ndarray:
+def losses(model: Physical, theta: np.ndarray, data: WindowSeries) -> np.ndarray:
     """L of each window [N], infinite where the rollout diverges."""
     return state_losses(rollout(model, theta, data), data)
 
 
-def state_losses(states: np.ndarray, data: Series) -> np.ndarray:
+def state_losses(states: np.ndarray, data: WindowSeries) -> np.ndarray:
     """The same of states [N, I, 6] that are simulated already."""
     error = states[..., VELOCITY] - data.measured[..., VELOCITY]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -298,16 +307,18 @@ def state_losses(states: np.ndarray, data: Series) -> np.ndarray:
     return np.where(np.isfinite(each), each, np.inf)
 
 
-def pick(data: Series, rows: Sequence[int] | np.ndarray | slice) -> Series:
+def pick(data: WindowSeries, rows: Sequence[int] | np.ndarray | slice) -> WindowSeries:
     """Some of the windows."""
-    return Series(*(values[rows] for values in data))
+    return WindowSeries(*(values[rows] for values in data))
 
 
-def spread(model: Physical, theta: np.ndarray, covariance: np.ndarray, data: Series) -> np.ndarray:
+def spread(
+    model: Physical, theta: np.ndarray, covariance: np.ndarray, data: WindowSeries
+) -> np.ndarray:
     """Standard deviation of the states [N, I, 6] that the parameters' uncertainty alone makes."""
     parts = []
-    for at in range(0, len(data.measured), CHUNK):
-        part = pick(data, slice(at, at + CHUNK))
+    for at in range(0, len(data.measured), WINDOWS_AT_A_TIME):
+        part = pick(data, slice(at, at + WINDOWS_AT_A_TIME))
         slopes = linearised(model, theta, part)[1]
         with np.errstate(over="ignore", invalid="ignore"):
             variance = np.einsum("nkip,pq,nkiq->nki", slopes, covariance, slopes, optimize=True)

@@ -16,7 +16,7 @@ from shiplog.exceptions import ShiplogError
 from shiplog.training.job import Training
 from shiplog.training.network_training import Progress
 
-PIECE = 500  # epochs of the paper's recipe that are done at a time
+PIECE_EPOCHS = 500  # epochs of the paper's recipe that are done at a time
 PATIENCE_S = 2.0  # between two looks at the cluster
 
 
@@ -34,7 +34,7 @@ def _piece(training: Training, resume: Progress | None) -> Progress:
     import torch
 
     torch.set_num_threads(1)
-    return training.run(resume, pause=PIECE)
+    return training.run(resume, pause=PIECE_EPOCHS)
 
 
 def work(

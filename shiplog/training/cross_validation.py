@@ -8,7 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.simulation.sensitivities import Series, Simulator, pick, rollout, spread, state_losses
+from shiplog.simulation.sensitivities import (
+    Simulator,
+    WindowSeries,
+    pick,
+    rollout,
+    spread,
+    state_losses,
+)
 
 FOLDS = 5
 WORKERS = 2  # fits at a time; compiled rollouts leave Python's lock
@@ -45,7 +52,10 @@ def folds(groups: Sequence[str], count: int = FOLDS) -> list[np.ndarray]:
 
 
 def cross_validate(
-    fit: Callable[[Series], Simulator], data: Series, groups: Sequence[str], count: int = FOLDS
+    fit: Callable[[WindowSeries], Simulator],
+    data: WindowSeries,
+    groups: Sequence[str],
+    count: int = FOLDS,
 ) -> CrossValidated | None:
     """Fit without each fold and roll it out there; None where there is nothing to hold out.
 

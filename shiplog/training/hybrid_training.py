@@ -10,7 +10,7 @@ from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.hybrid import Hybrid, Residual, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG
 from shiplog.simulation.coverage import independent_distance
-from shiplog.simulation.sensitivities import Series, apparent_wind
+from shiplog.simulation.sensitivities import WindowSeries, apparent_wind
 from shiplog.training.cross_validation import as_good
 from shiplog.training.output_error import Identified, identify
 
@@ -18,7 +18,7 @@ STRETCH = 5  # s over which an acceleration is differenced, so that noise does n
 EVALUATIONS = 25  # a network's last per cent does not survive held-out voyages
 
 
-def residual(physics: MMG, data: Series, width: int) -> Residual:
+def residual(physics: MMG, data: WindowSeries, width: int) -> Residual:
     """What is fixed of the network, from the windows with weight alone."""
     chosen = data.weight > 0
     state, actuator, wind = data.measured[chosen], data.actuator[chosen], data.wind[chosen]
@@ -48,7 +48,7 @@ def residual(physics: MMG, data: Series, width: int) -> Residual:
 def fit(
     physics: MMG,
     found: Identified,
-    data: Series,
+    data: WindowSeries,
     *,
     width: int,
     strength: float,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog import random_streams as streams
-from shiplog.simulation.sensitivities import Series, Simulator, losses, series
+from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, series
 from shiplog.training import hybrid_training, output_error, regularisation
 from shiplog.training.cross_validation import CrossValidated, cross_validate
 from shiplog.training.output_error import Identified
@@ -33,7 +33,7 @@ class Chosen:
 
 def physics(
     ready: Prepared,
-    part: Series,
+    part: WindowSeries,
     factor: float = regularisation.PLAUSIBLE,
     begin: np.ndarray | None = None,
 ) -> Identified:
@@ -82,14 +82,16 @@ def _ridge_sentence(chosen: Chosen) -> str:
 def choose_network(
     ready: Prepared,
     settings: Physics,
-    refit: Callable[[Series], Identified],
+    refit: Callable[[WindowSeries], Identified],
     by_voyage: CrossValidated | None,
     seed: int,
 ) -> tuple[Chosen, Simulator, Identified, str, CrossValidated | None]:
     """Choose how much the network may say on voyages it has not seen, then fit it on all."""
     found = refit(ready.data)
 
-    def fitted(part: Series, physics: Identified, strength: float) -> tuple[Simulator, Identified]:
+    def fitted(
+        part: WindowSeries, physics: Identified, strength: float
+    ) -> tuple[Simulator, Identified]:
         model, done = hybrid_training.fit(
             ready.model, physics, part,
             width=settings.width, strength=strength,

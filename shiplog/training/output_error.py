@@ -15,11 +15,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shiplog.exceptions import ModelError, listed
-from shiplog.simulation.sensitivities import Physical, Series, losses, normal
+from shiplog.simulation.sensitivities import Physical, WindowSeries, losses, normal
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
 TINY = 1e-12  # noise of data that a model fits exactly
-ROUNDS = 3  # of weighing the ridge by the noise that the fit before it left
+REWEIGHTINGS = 3  # of weighing the ridge by the noise that the fit before it left
 TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit rests
 MOST_EVALUATIONS = 60
 
@@ -55,14 +55,14 @@ def identify(
     model: Physical,
     start: np.ndarray,
     spread: np.ndarray,
-    data: Series,
+    data: WindowSeries,
     *,
     bounds: tuple[np.ndarray, np.ndarray] | None = None,
     free: np.ndarray | None = None,
     begin: np.ndarray | None = None,
     factor: float = 1.0,
     most: int = MOST_EVALUATIONS,
-    rounds: int = ROUNDS,
+    rounds: int = REWEIGHTINGS,
 ) -> Identified:
     """Fit θ by rollout error over all windows with weight.
 
@@ -132,7 +132,7 @@ def _from_short_windows(
     model: Physical,
     start: np.ndarray,
     spread: np.ndarray,
-    data: Series,
+    data: WindowSeries,
     bounds: tuple[np.ndarray, np.ndarray],
     free: np.ndarray,
     values: np.ndarray,
@@ -240,7 +240,7 @@ def covariance(
     model: Physical,
     values: np.ndarray,
     spread: np.ndarray,
-    data: Series,
+    data: WindowSeries,
     free: np.ndarray,
     noise: float,
     factor: float = 1.0,

@@ -44,7 +44,7 @@ class Fast(Section):
     most_windows: int = Field(default=256, gt=0)  # of a set with more, each seed takes as many
 
 
-class Network(Section):
+class NetworkSettings(Section):
     width: int = Field(default=256, gt=0)
     depth: int = Field(default=4, gt=0)
     wind_input: Literal["angle", "components"]
@@ -76,7 +76,9 @@ class Config(Section):
     seeds: tuple[int, ...] = (0,)
     split: Split
     standard: tuple[str, ...] = ()  # voyages whose means scale the network; all training ones
-    network: Network = Field(default_factory=lambda: Network(wind_input="components"))
+    network: NetworkSettings = Field(
+        default_factory=lambda: NetworkSettings(wind_input="components")
+    )
     paper: Paper = Paper()
     fast: Fast = Fast()
     physics: Physics = Physics()

@@ -56,7 +56,7 @@ from shiplog.training.network_training import HISTORY, Progress
 from shiplog.training.run_config import Config
 from shiplog.voyages.recording import Record
 
-HELD = 1e-9  # spread of numbers that a diagnosis leaves where they are
+HELD_SPREAD = 1e-9  # spread of numbers that a diagnosis leaves where they are
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,9 @@ class Run:
         # a hybrid's network stays as it was trained, and so do terms that the run did not have
         start = Start(
             simulator.theta,
-            np.concatenate((place.vector(known["spread"].to_numpy(), HELD), np.full(more, HELD))),
+            np.concatenate(
+                (place.vector(known["spread"].to_numpy(), HELD_SPREAD), np.full(more, HELD_SPREAD))
+            ),
             np.concatenate((usual.low, np.full(more, -np.inf))),
             np.concatenate((usual.high, np.full(more, np.inf))),
         )

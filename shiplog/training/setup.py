@@ -14,7 +14,7 @@ import polars as pl
 from shiplog.exceptions import RunError, WindowError, listed, nearest
 from shiplog.models import mmg
 from shiplog.profile import Profile
-from shiplog.simulation.sensitivities import Series, losses, series
+from shiplog.simulation.sensitivities import WindowSeries, losses, series
 from shiplog.training.run_config import Config
 from shiplog.voyages import one_hertz, windows
 from shiplog.voyages.split import plan
@@ -35,7 +35,7 @@ class Prepared:
 
     model: mmg.MMG
     start: mmg.Parameters
-    data: Series
+    data: WindowSeries
     voyages: list[str]
     days: list[str]
     free: np.ndarray
@@ -93,7 +93,7 @@ def _refuse_none(planned: pl.DataFrame, size: int, voyages: Sequence[str]) -> No
         )
 
 
-def _stable(model: mmg.MMG, values: np.ndarray, data: Series) -> mmg.MMG:
+def _stable(model: mmg.MMG, values: np.ndarray, data: WindowSeries) -> mmg.MMG:
     """With as many Euler steps a second as a small, quick ship needs to hold every window."""
     for substeps in (1, 2, 4, 8):
         finer = mmg.MMG(model.geometry, max(substeps, model.substeps))

@@ -17,10 +17,10 @@ import polars as pl
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import sensor_consistency
-from shiplog.voyages.sensor_consistency import SURE, Estimate, Motion
+from shiplog.voyages.sensor_consistency import SURE_HALF_INTERVALS, Estimate, Motion
 
 SEASON_DAYS = 90.0  # days without a voyage, after which instruments may have been set anew
-MOST_ROWS = 72_000  # of a campaign at 10 Hz: every voyage gives its share of two hours
+CAMPAIGN_ROWS = 72_000  # of a campaign at 10 Hz: every voyage gives its share of two hours
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Deviating:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class SensorCampaign:
     """Estimates over several voyages, each with the voyages that deviate from it."""
 
     voyages: tuple[str, ...]
@@ -61,7 +61,7 @@ def seasons(begins: Mapping[str, float]) -> list[list[str]]:
 def together(motions: Sequence[Motion]) -> Motion:
     """Voyages one after another, each beginning a stretch of its own. Long ones give their first
     rows, so that all together have MOST_ROWS at most."""
-    most = max(MOST_ROWS // max(len(motions), 1), 1)
+    most = max(CAMPAIGN_ROWS // max(len(motions), 1), 1)
     parts = [motion.beginning(most) for motion in motions]
     arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Motion)}
     at = np.cumsum([0, *(len(p.starts) for p in parts[:-1])])
@@ -70,7 +70,7 @@ def together(motions: Sequence[Motion]) -> Motion:
     return Motion(**arrays)
 
 
-def campaign(tables: Mapping[str, pl.DataFrame], profile: Profile) -> Campaign:
+def campaign(tables: Mapping[str, pl.DataFrame], profile: Profile) -> SensorCampaign:
     """Of voyages at 10 Hz that were read through one profile: voyage → its table."""
     motions = {name: sensor_consistency.measured(table, profile) for name, table in tables.items()}
     found = tuple(sensor_consistency.of_motion(together(list(motions.values())), profile))
@@ -81,11 +81,11 @@ def campaign(tables: Mapping[str, pl.DataFrame], profile: Profile) -> Campaign:
             key = one.kind, one.channel
             if key in of and deviates(one, of[key]):
                 deviating.setdefault(key, []).append(Deviating(name, one))
-    return Campaign(tuple(tables), found, {k: tuple(v) for k, v in deviating.items()})
+    return SensorCampaign(tuple(tables), found, {k: tuple(v) for k, v in deviating.items()})
 
 
 def deviates(one: Estimate, other: Estimate) -> bool:
     """Whether two estimates are surely apart, and by enough to matter."""
     half = 0.5 * math.hypot(one.high - one.low, other.high - other.low)
     apart = abs(one.value - other.value)
-    return apart > SURE * half and apart > one.least
+    return apart > SURE_HALF_INTERVALS * half and apart > one.least

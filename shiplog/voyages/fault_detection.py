@@ -17,11 +17,11 @@ from shiplog.voyages.resampling import STEP_NS
 LISTED = 20  # stretches of one kind on one channel that are said one by one; the rest is counted
 FROZEN_S = 3.0  # a value held longer than this is stale, not data
 SAID_HELD_S = 0.5
-SAME = 1e-9  # of the span of a channel: values nearer than that are one value
+SAME_SPAN = 1e-9  # of the span of a channel: values nearer than that are one value
 FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
-RARE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
+RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
 
 
 def stretches(mask: np.ndarray) -> Iterator[tuple[int, int]]:
@@ -64,7 +64,9 @@ def resolution(value: np.ndarray) -> float:
         levels = np.sort(column)
         apart: np.ndarray = levels[1:] - levels[:-1]
         span = float(apart.sum())
-        apart = apart[apart > SAME * span]  # what rounding of the arithmetic made is no difference
+        apart = apart[
+            apart > SAME_SPAN * span
+        ]  # what rounding of the arithmetic made is no difference
         if len(apart) < FEWEST_STEPS:  # it hardly moved
             continue
         step = float(apart.min())
@@ -84,7 +86,9 @@ def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]
     if count == 0 or repeated == 0 or repeated > 0.5 * count:
         return []
     share = repeated / count
-    return [(a, b) for a, b in runs if (b - a + 1) * np.log(share) < np.log(RARE) and b - a >= 2]
+    return [
+        (a, b) for a, b in runs if (b - a + 1) * np.log(share) < np.log(RARE_CHANCE) and b - a >= 2
+    ]
 
 
 def said(kind: str, channel: str, intervals: list[tuple[float, float]], what: str) -> list[Finding]:

@@ -21,7 +21,7 @@ from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import fault_detection, resampling, sensor_consistency
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
-from shiplog.voyages.voyage_grid import Grid, mark_gaps, mark_holds, mark_jumps
+from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
 CLOCKS = {  # of a source: its column, and the one that it is held against
     "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
@@ -79,7 +79,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
             hint="set another `clock` for the heading in the profile, or record the log again "
             "with a clock that runs.",
         )
-    grid = Grid(resampling.grid(start, end))
+    grid = VoyageGrid(resampling.grid(start, end))
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
@@ -245,7 +245,7 @@ def _metric(value: np.ndarray, kind: str) -> np.ndarray:
 
 
 def _motion(
-    grid: Grid, reading: Reading, profile: Profile, sampled: dict[str, resampling.Samples]
+    grid: VoyageGrid, reading: Reading, profile: Profile, sampled: dict[str, resampling.Samples]
 ) -> tuple[float, float] | None:
     """Position, heading, velocity and yaw rate at midship. Returns the datum, if geodetic."""
     sensors, kind = profile.sensors, profile.sensors.kind
@@ -296,7 +296,7 @@ def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> 
     return float(position.value[0, 0]), float(position.value[0, 1])
 
 
-def _wind(grid: Grid, sensor: Sensor, samples: resampling.Samples) -> None:
+def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None:
     """Apparent wind at midship: the anemometer's own motion about midship taken out."""
     components = grid.place("wind", samples)  # ahead and starboard part of "where from"
     ahead, starboard = sensor.lever_arm_m
@@ -314,7 +314,7 @@ def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Sample
     return resampling.ordered(times, value, actuator.tolerance_s)
 
 
-def _actuator(grid: Grid, actuator: Actuator, samples: resampling.Samples) -> None:
+def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples) -> None:
     """One actuator's column; beyond the profile's limits it is marked, not clipped."""
     placed = grid.place(actuator.name, samples)
     column = np.arctan2(placed[:, 1], placed[:, 0]) if actuator.circular else placed[:, 0]

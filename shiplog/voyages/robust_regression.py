@@ -29,7 +29,7 @@ RENEWED = (2, 5, 9)  # turns at which the rough fit looks at the memory of its r
 SMOOTH = (0.36, 0.24, 0.08)  # weights of a bin and its neighbours on either side
 LEAST_KNOWN = 0.15
 STRIDE = 0.5  # priors in one turn
-NINETY = 0.95  # quantile of either end of a 90 % interval
+NINETY_QUANTILE = 0.95  # quantile of either end of a 90 % interval
 
 Model = Callable[[np.ndarray], np.ndarray]  # parameters [k] → residuals [B, c]
 
@@ -228,7 +228,7 @@ def fit(problem: Problem, start: np.ndarray) -> Fit | None:
         if abs(step[at]) > problem.prior[index]:  # noise on both sides, and little else
             return None
         reverse[index] += step[at]
-    quantile = float(stdtrit(max(len(names) - 1, 2), NINETY))
+    quantile = float(stdtrit(max(len(names) - 1, 2), NINETY_QUANTILE))
     return Fit(value, cov, reverse, quantile)
 
 

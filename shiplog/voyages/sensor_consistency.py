@@ -32,12 +32,12 @@ from shiplog.voyages.resampling import RATE_HZ
 from shiplog.voyages.robust_regression import Fit, Problem, bins, fit, rough, shifted
 
 STEP_S = 1.0 / RATE_HZ
-MOST_ROWS = 36_000  # of a long voyage the liveliest hour says it all
+VOYAGE_ROWS = 36_000  # of a long voyage the liveliest hour says it all
 ROUGH_ROWS = 6_000
-CHUNK = 1_200  # rows that are kept or left out together
+CHUNK_ROWS = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
 MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
-SURE = 2.0  # half intervals that a value must be away from none, to be said
+SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be away from none, to be said
 CERTAIN = 4.0  # the same, to be put right where that is asked for
 
 # practical sizes: less is no fault of an instrument that anyone would correct
@@ -65,7 +65,7 @@ class Estimate:
     @property
     def notable(self) -> bool:
         """Well off none, and large enough to matter."""
-        return self._off > self.least and self._off > SURE * self._half
+        return self._off > self.least and self._off > SURE_HALF_INTERVALS * self._half
 
     @property
     def certain(self) -> bool:
@@ -129,7 +129,7 @@ def measured(table: pl.DataFrame, profile: Profile) -> Motion:
     for column in values.values():
         good &= np.isfinite(column)
     rows = np.flatnonzero(good)
-    if len(rows) > MOST_ROWS:
+    if len(rows) > VOYAGE_ROWS:
         rows = _liveliest(rows, values["yaw_rate"], len(good))
     starts = np.diff(rows, prepend=-2) != 1
     starts |= (mark[rows] & int(Quality.JUMP)) != 0
@@ -151,9 +151,9 @@ def measured(table: pl.DataFrame, profile: Profile) -> Motion:
 
 def _liveliest(rows: np.ndarray, yaw_rate: np.ndarray, count: int) -> np.ndarray:
     """Of usable rows, those of the chunks of time in which the ship turns most."""
-    chunk = rows // CHUNK
-    weight = np.bincount(chunk, yaw_rate[rows] ** 2, count // CHUNK + 1)
-    kept = np.argsort(weight)[-(MOST_ROWS // CHUNK) :]
+    chunk = rows // CHUNK_ROWS
+    weight = np.bincount(chunk, yaw_rate[rows] ** 2, count // CHUNK_ROWS + 1)
+    kept = np.argsort(weight)[-(VOYAGE_ROWS // CHUNK_ROWS) :]
     return rows[np.isin(chunk, kept)]
 
 
@@ -287,7 +287,7 @@ def _gnss_clocks(found: Fit, profile: Profile) -> Iterator[Estimate]:
     together = _clock("gnss", value, value - half, value + half)
     apart = found.quantile * math.sqrt(difference @ both @ difference)
     late = velocity.value - position.value
-    if together.notable and abs(late) < max(CLOCK_S, SURE * apart):
+    if together.notable and abs(late) < max(CLOCK_S, SURE_HALF_INTERVALS * apart):
         yield together
     elif not _in_body_axes(profile):
         yield position

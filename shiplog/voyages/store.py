@@ -49,7 +49,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """What the catalogue says of one voyage."""
 
     name: str
@@ -73,7 +73,7 @@ class Store:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[CatalogueEntry]:
         """All voyages, by name. Reads the catalogue, or the folders where the two differ."""
         if self.path.exists() and not self.path.is_dir():
             raise StoreError(
@@ -301,18 +301,18 @@ class Store:
             if (folder / "voyage.json").is_file()
         }
 
-    def _catalogue(self) -> list[Entry]:
+    def _catalogue(self) -> list[CatalogueEntry]:
         """What catalogue.parquet lists; nothing where it cannot be read."""
         path = self.path / "catalogue.parquet"
         try:
             table = pl.read_parquet(path)
         except (OSError, pl.exceptions.PolarsError):
             return []
-        if table.columns != [field.name for field in fields(Entry)]:
+        if table.columns != [field.name for field in fields(CatalogueEntry)]:
             return []
-        return [Entry(**row) for row in table.to_dicts()]
+        return [CatalogueEntry(**row) for row in table.to_dicts()]
 
-    def _scan_folders(self) -> list[Entry]:
+    def _scan_folders(self) -> list[CatalogueEntry]:
         listed_already = {(e.name, e.written): e for e in self._catalogue()}
         entries = []
         for folder, written in self._written().items():
@@ -326,7 +326,7 @@ class Store:
             report = VoyageReport.from_json(facts["report"])
             slowest = report.slowest
             entries.append(
-                Entry(
+                CatalogueEntry(
                     report.name,
                     facts["profile"]["ship"]["name"],
                     facts["start"],

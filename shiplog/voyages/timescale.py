@@ -9,21 +9,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-SECONDS = 30.0
+SEGMENT_S = 30.0
 BIN = 2.0  # s that one observation averages
 KNOT = 2.0  # s between knots of the acceleration
 NODE_ROWS = 2  # rows of the record to a step of an integration
-BINS = 15  # of a segment, whatever it lasts
+SEGMENT_BINS = 15  # of a segment, whatever it lasts
 SHIP_TIME = 7.1  # s, L/U for which the above are made: 5 to 10 s, of 3 m at 0.3 to 0.6 m/s
 BIN_LENGTHS = (1.4, 2.0, 4.0, 8.0, 16.0)  # s; segments of 21 to 240 s, rows to a bin are even
-ENOUGH = 48  # segments of the shorter campaign, fewer of which say too little of how parts differ
+CAMPAIGN_SEGMENTS = (
+    48  # segments of the shorter campaign, fewer of which say too little of how parts differ
+)
 
 
 @dataclass(frozen=True)
 class Timescale:
     """How long a ship's segments are [s], what one observation averages, and between knots."""
 
-    seconds: float = SECONDS
+    seconds: float = SEGMENT_S
     bin: float = BIN
     knot: float = KNOT
 
@@ -35,7 +37,7 @@ class Timescale:
     @property
     def factor(self) -> float:
         """Times that of a three-metre ship."""
-        return self.seconds / SECONDS
+        return self.seconds / SEGMENT_S
 
 
 THREE_METRES = Timescale()  # as a model ship of three metres has it
@@ -55,7 +57,7 @@ def of_ship(length: float, speed: float, recorded: float = math.inf) -> Timescal
     time = length / max(speed, 1e-6)
     step = math.floor(math.log2(max(time, 1e-6) / SHIP_TIME) + 0.5)
     at = min(max(step, -1), len(BIN_LENGTHS) - 2) + 1
-    while at > 1 and BINS * BIN_LENGTHS[at] * ENOUGH > recorded:
+    while at > 1 and SEGMENT_BINS * BIN_LENGTHS[at] * CAMPAIGN_SEGMENTS > recorded:
         at -= 1
     wide = BIN_LENGTHS[at]
-    return Timescale(BINS * wide, wide, wide)
+    return Timescale(SEGMENT_BINS * wide, wide, wide)

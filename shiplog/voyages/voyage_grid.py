@@ -26,7 +26,7 @@ JUMP_RAD = math.radians(30.0)
 
 
 @dataclass
-class Grid:
+class VoyageGrid:
     """Times [m] ns, columns [m] SI, marks [m] of channels.Quality, and what was found."""
 
     times: np.ndarray
@@ -59,7 +59,7 @@ class Grid:
         )
 
 
-def mark_gaps(grid: Grid) -> None:
+def mark_gaps(grid: VoyageGrid) -> None:
     """A row that lacks any value is a gap, whichever instrument is silent."""
     missing = np.zeros(len(grid.times), bool)
     for column in grid.columns.values():
@@ -68,7 +68,7 @@ def mark_gaps(grid: Grid) -> None:
     grid.marks[missing & ~known] |= int(Quality.GAP)
 
 
-def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
+def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
     """Values that repeat although the ship moves; frozen ones, too long to be data.
 
     What an instrument counts in steps stands still until the ship has gone a step.
@@ -104,7 +104,7 @@ def mark_holds(grid: Grid, profile: Profile, sampled: dict[str, resampling.Sampl
             )
 
 
-def mark_jumps(grid: Grid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
+def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
     """Steps of the position or heading that the velocity and the yaw rate do not explain.
 
     Looked for from one measured value to the next, not between rows that were interpolated.
@@ -133,7 +133,7 @@ def mark_jumps(grid: Grid, profile: Profile, sampled: dict[str, resampling.Sampl
 
 
 def _jumps(
-    grid: Grid,
+    grid: VoyageGrid,
     profile: Profile,
     sampled: dict[str, resampling.Samples],
     name: str,

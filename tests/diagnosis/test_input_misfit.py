@@ -10,13 +10,13 @@ from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linearisation import Linear, Path
 from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.segment_nodes import at_knots
-from shiplog.diagnosis.segments import Cut, Grid
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.compiled_network import Network
 from shiplog.voyages.timescale import KNOT, NODE_ROWS
 
 KNOTS, BINS, STEP = 6, 5, 0.2
-GRID = Grid(STEP, round((KNOTS - 1) * KNOT / STEP), round((KNOTS - 1) * KNOT / STEP) // NODE_ROWS
-            + 1, BINS, KNOTS)  # fmt: skip
+ROWS = round((KNOTS - 1) * KNOT / STEP)
+GRID = SegmentGrid(STEP, ROWS, ROWS // NODE_ROWS + 1, BINS, KNOTS)
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
 UNREST = Unrest(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
 

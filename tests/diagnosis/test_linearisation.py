@@ -164,7 +164,7 @@ def linearised():
         "rudder_lag": np.array([1.5]),
     }  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:  # a wider step than a derivative's averages noise
-        patch.setattr(measurement_correction, "STEP", 0.02)
+        patch.setattr(measurement_correction, "READ_STEP", 0.02)
         cut, moved, shown = measurement_correction.read(model, SETTING, SEEN, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()

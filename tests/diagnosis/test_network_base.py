@@ -20,7 +20,7 @@ from shiplog.diagnosis.trial_voyages import in_ship_time, record_of, windows_of
 from shiplog.exceptions import RunError
 from shiplog.report import verdict as verdicts
 from shiplog.training import run_folder
-from shiplog.training.run_config import Config, Fast, Network
+from shiplog.training.run_config import Config, Fast, NetworkSettings
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
@@ -42,7 +42,7 @@ def afloat(tmp_path_factory):
     names = [leg.name for leg in case.trial]
     config = Config(
         recipe="fast", fast=Fast(warm_epochs=12, iterations=10), window=100,
-        network=Network(width=24, depth=2, wind_input="components"),
+        network=NetworkSettings(width=24, depth=2, wind_input="components"),
         split=Split(training=tuple(names[1:]), validation=tuple(names[:1])),
     )  # fmt: skip
     run = train_run(config, store, work / "run")

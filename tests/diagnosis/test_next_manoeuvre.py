@@ -33,7 +33,7 @@ def test_each_manoeuvre_is_within_what_the_ship_did():
     rows = 200
     actuator = np.linspace(-1.0, 1.0, rows)[:, None] * np.array([0.5, 10.0, 3.0, 2.0])
     record = SimpleNamespace(profile=profile, actuator=actuator, seen=np.ones(rows, dtype=bool))
-    time = np.arange(0.0, next_manoeuvre.SECONDS, 0.5)
+    time = np.arange(0.0, next_manoeuvre.MANOEUVRE_S, 0.5)
     for manoeuvre in next_manoeuvre.MANOEUVRES:
         driven = next_manoeuvre.driven(record, manoeuvre, time)
         assert driven.shape == (len(time), 4) and np.isfinite(driven).all()

@@ -14,7 +14,7 @@ from shiplog.diagnosis import (
     nominal_reference,
     voyage_effects,
 )
-from shiplog.diagnosis.nominal_campaign import FEWEST, parts_of, prior
+from shiplog.diagnosis.nominal_campaign import FEWEST_PARTS, parts_of, prior
 from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.diagnosis.voyage_effects import VoyageEffects
 from shiplog.models.starting_values import Start
@@ -36,8 +36,8 @@ def test_parts_are_whole_stretches_of_one_voyage(seed):
         assert len(rows)
         assert (np.diff(rows) == 1).all()
         assert len(set(voyage[rows])) == 1
-    if len(voyage) >= 2 * FEWEST:
-        assert len(parts) >= FEWEST
+    if len(voyage) >= 2 * FEWEST_PARTS:
+        assert len(parts) >= FEWEST_PARTS
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     at = Settled(np.zeros(2), given.path, UNREST)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)
     own = made.effects.deviation[columns.of["drag"]]
-    assert own == pytest.approx([voyage_effects.LEAST])
+    assert own == pytest.approx([voyage_effects.LEAST_DEVIATION])
 
 
 def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):

@@ -270,7 +270,7 @@ def test_without_a_cause_the_process_noise_is_the_usual_one_again():
 def test_what_is_far_behind_keeps_its_place_and_not_its_linearisation(monkeypatch, kept):
     """The same hypotheses, with the same scores, and the same decision."""
     whole = searched({"drag": [1.2], "load": [1.2]})
-    monkeypatch.setattr(searching, "KEPT", kept)
+    monkeypatch.setattr(searching, "KEPT_LINEARISATIONS", kept)
     found = searched({"drag": [1.2], "load": [1.2]})
     linearised = {id(h.point) for h in found.found.values() if isinstance(h.point, Point)}
     assert len(linearised) == kept < len({id(h.point) for h in whole.found.values()})

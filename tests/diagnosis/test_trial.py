@@ -13,8 +13,8 @@ from straight import CAUSES, UNREST
 from shiplog.diagnosis import nominal_campaign
 from shiplog.diagnosis import trial as trials
 from shiplog.diagnosis.discrepancy import EVEN
-from shiplog.diagnosis.evidence import Trial as Former
-from shiplog.diagnosis.parameter_layout import HELD
+from shiplog.diagnosis.evidence import TrialEvidence as Former
+from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
 
 SHARE = 0.5  # of itself that the trial counts
@@ -157,7 +157,7 @@ def test_a_fixed_cause_stays_where_it_is(made):
     point = trial.at(stands)
     found, covariance = trial._numbers(level(trial, point, 1.0, ("drag",)), point, ("drag",))
     assert found["drag"] == pytest.approx([0.7], abs=1e-5)
-    assert covariance[0, 0] < 2.0 / HELD
+    assert covariance[0, 0] < 2.0 / HELD_INFORMATION
     nothing = level(trial, point, 1.0).value
     assert level(trial, point, 1.0, ("drag",)).value == pytest.approx(nothing, abs=1e-3)
 

@@ -107,7 +107,7 @@ def test_parts_that_agree_keep_little_deviation_and_no_more_than_assumed():
         j = rng.standard_normal((400, 2))
         each.append(products(j, j @ theta + rng.standard_normal(400)))
     found = learn(each, np.ones(2), np.zeros(2), (np.arange(2),))
-    assert 0.0 < found.deviation[0] < 0.4 * voyage_effects.FIRST
+    assert 0.0 < found.deviation[0] < 0.4 * voyage_effects.FIRST_DEVIATION
 
 
 @pytest.mark.parametrize("true", (0.05, 3.0))

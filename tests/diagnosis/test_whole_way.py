@@ -574,7 +574,7 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     in it, a step would be a spike, and a rudder recorded in steps would tell of no lag."""
     seen, ref = sea.done.trial.record, sea.campaign.reference
     (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
-    time = measurement_correction.STEP * lag.sizes(ref.setting)[0]
+    time = measurement_correction.READ_STEP * lag.sizes(ref.setting)[0]
     column = ref.columns.of["rudder_lag"][0] - ref.columns.base
     step = np.zeros_like(seen.actuator)
     step[1000:, 0] = 0.2
@@ -674,7 +674,7 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     monkeypatch.setattr(trial, "rested", {})
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
-    assert -30.0 < found.evidence - decision.nothing.evidence < decisions.LEAST
+    assert -30.0 < found.evidence - decision.nothing.evidence < decisions.SHOWS_NATS
     away.clear()
     trial.rested.clear()
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)

@@ -561,7 +561,7 @@ def by_rerun(monkeypatch):
         given.extend(done)
         return done
 
-    monkeypatch.setattr(rerun_route, "LEAST", 0)
+    monkeypatch.setattr(rerun_route, "LEAST_MESSAGES", 0)
     monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
     monkeypatch.setattr(rerun_route, "read_most", watched)
     return given
@@ -667,7 +667,7 @@ SCRIPT = """
 import sys
 from shiplog.logs import rerun_route
 from shiplog.logs.read import read
-rerun_route.LEAST = 0
+rerun_route.LEAST_MESSAGES = 0
 assert "numba" not in sys.modules and "rerun" not in sys.modules
 print(read(sys.argv[1]).health.messages_read, rerun_route.worker()._process.pid)
 """
@@ -692,7 +692,7 @@ def test_no_process_is_left_behind(tmp_path):
 
 
 def _in_a_child(path: Path) -> int:
-    rerun_route.LEAST = 0
+    rerun_route.LEAST_MESSAGES = 0
     assert read(path).health.messages_read == 90
     process = rerun_route.worker()._process
     assert process is not None

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog.report.judgement import FEWEST, force_line, judge
+from shiplog.report.judgement import FEWEST_WINDOWS, force_line, judge
 
 
 def errors(losses, off=3.0, turned=10.0) -> pl.DataFrame:
@@ -65,10 +65,10 @@ def test_windows_that_ran_away_are_counted_and_left_out():
     assert found.against[0].share == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("count", [1, FEWEST - 1, FEWEST])
+@pytest.mark.parametrize("count", [1, FEWEST_WINDOWS - 1, FEWEST_WINDOWS])
 def test_of_too_few_windows_there_is_no_interval(count):
     found = judge("ref", errors([1.0] * count), {"hold": np.full(count, 2.0)}, 3.0, 20)
-    few = count < FEWEST
+    few = count < FEWEST_WINDOWS
     assert ("Too few windows for an interval." in found.sentence) == few
     assert (found.against[0].low is None) == few
     assert ("0.5 of the L of holding the velocity" in found.sentence) == few

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 
 from shiplog.exceptions import ShiplogError
 from shiplog.report import viewer
-from shiplog.report.comparison_data import Actuator, Comparison
+from shiplog.report.comparison_data import ComparisonData, DrawnActuator
 from shiplog.report.viewer import (
     display,
     forces,
@@ -73,13 +73,13 @@ def compared():
     simulated = [
         rollouts(measured, model, seed) for model in ("network fast", "mmg") for seed in (0, 1)
     ]
-    return Comparison(
+    return ComparisonData(
         title="two circles",
         ship_length=3.0,
         ship_breadth=0.5,
         actuators=(
-            Actuator("rudder_port", "rudder", "rad"),
-            Actuator("propeller", "propeller", "rev/s"),
+            DrawnActuator("rudder_port", "rudder", "rad"),
+            DrawnActuator("propeller", "propeller", "rev/s"),
         ),
         has_wind=True,
         measured=measured,

@@ -8,13 +8,13 @@ import polars as pl
 import pytest
 
 from shiplog.simulation import error_breakdown
-from shiplog.simulation.sensitivities import Series, state_losses
+from shiplog.simulation.sensitivities import WindowSeries, state_losses
 
 COUNT, SIZE = 30, 100
 
 
 @pytest.fixture
-def driven() -> tuple[Series, pl.DataFrame]:
+def driven() -> tuple[WindowSeries, pl.DataFrame]:
     """Three voyages of ten windows of 100 s; what the ship does changes every 20 s or so."""
     rng = np.random.default_rng(3)
 
@@ -28,7 +28,7 @@ def driven() -> tuple[Series, pl.DataFrame]:
     measured[..., 4] = changing(-3.0, 3.0)
     actuator = np.stack((changing(-0.6, 0.6), changing(-0.6, 0.6), changing(2.0, 12.0)), -1)
     wind = np.stack((changing(-4.0, 4.0), changing(-4.0, 4.0)), -1)
-    data = Series(measured, actuator, wind, np.ones((COUNT, SIZE - 1)), np.ones(COUNT))
+    data = WindowSeries(measured, actuator, wind, np.ones((COUNT, SIZE - 1)), np.ones(COUNT))
     windows = pl.DataFrame(
         {
             "voyage": np.repeat(["a", "b", "c"], 10),
@@ -39,7 +39,7 @@ def driven() -> tuple[Series, pl.DataFrame]:
     return data, windows
 
 
-def little(data: Series) -> np.ndarray:
+def little(data: WindowSeries) -> np.ndarray:
     """The same small error everywhere: 1 mm/s, 1 mm/s, and as much weighted in yaw."""
     error = np.zeros_like(data.measured)
     error[..., 1] = error[..., 3] = 1e-3
@@ -65,20 +65,20 @@ def test_shares_are_those_of_the_loss(driven):
     json.dumps([c.as_json() for c in found.channels])
 
 
-def astern(data: Series, windows: pl.DataFrame) -> np.ndarray:
+def astern(data: WindowSeries, windows: pl.DataFrame) -> np.ndarray:
     return data.measured[..., 1] < -0.15
 
 
-def in_the_north_east(data: Series, windows: pl.DataFrame) -> np.ndarray:
+def in_the_north_east(data: WindowSeries, windows: pl.DataFrame) -> np.ndarray:
     x0, y0 = data.measured[..., 0], data.measured[..., 2]
     return (x0 >= np.median(x0)) & (y0 >= np.median(y0))
 
 
-def late(data: Series, windows: pl.DataFrame) -> np.ndarray:
+def late(data: WindowSeries, windows: pl.DataFrame) -> np.ndarray:
     return np.broadcast_to(windows["share"].to_numpy()[:, None] > 2 / 3, (COUNT, SIZE))
 
 
-def wind_from_starboard(data: Series, windows: pl.DataFrame) -> np.ndarray:
+def wind_from_starboard(data: WindowSeries, windows: pl.DataFrame) -> np.ndarray:
     heading, (u, v) = data.measured[..., 4], np.moveaxis(data.measured[..., [1, 3]], -1, 0)
     north, east = np.moveaxis(data.wind, -1, 0)
     ahead = np.cos(heading) * north + np.sin(heading) * east + u

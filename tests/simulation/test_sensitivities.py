@@ -18,7 +18,7 @@ from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.simulation import sensitivities
 from shiplog.simulation.scoring import prediction_error, window_loss
-from shiplog.simulation.sensitivities import Series
+from shiplog.simulation.sensitivities import WindowSeries
 from shiplog.voyages.windows import Windows
 
 
@@ -61,7 +61,7 @@ COUPLED = np.array([0.05, 0.3, 0.02, 0.01])
 SHIFT = 1e-5
 
 
-def sailed(count: int, size: int, seed: int, actuators: tuple[float, ...]) -> Series:
+def sailed(count: int, size: int, seed: int, actuators: tuple[float, ...]) -> WindowSeries:
     """Smooth motion that no model made, with steps between 0.5 and 1.5 s."""
     rng = np.random.default_rng(seed)
     t = np.arange(size) / size
@@ -72,7 +72,7 @@ def sailed(count: int, size: int, seed: int, actuators: tuple[float, ...]) -> Se
     driven = (push + 0.2 * np.sin(6.0 * t)[None, :, None]) * actuators
     wind = rng.normal(size=(count, 1, 2)) * 2.0 + np.zeros((1, size, 1))
     dt = rng.uniform(0.5, 1.5, size=(count, size - 1))
-    return Series(state, driven, wind, dt, np.ones(count))
+    return WindowSeries(state, driven, wind, dt, np.ones(count))
 
 
 def central(values, function, scale):
@@ -127,7 +127,7 @@ def test_true_and_apparent_wind_are_inverses():
 # ---------------------------------------------------------------- series
 
 
-def windows(data: Series, wind: np.ndarray | None = None) -> Windows:
+def windows(data: WindowSeries, wind: np.ndarray | None = None) -> Windows:
     nothing = np.zeros((*data.measured.shape[:2], 0))
     tensors = (data.measured, data.actuator, nothing if wind is None else wind, data.dt)
     plan = pl.DataFrame({"copy": [0] * len(data.measured)})
@@ -138,7 +138,7 @@ def test_windows_become_a_series_over_ground(coupled):
     _, _, data = coupled
     apparent = sensitivities.apparent_wind(data.measured, data.wind)
     found = sensitivities.series(windows(data, apparent))
-    for name in Series._fields:
+    for name in WindowSeries._fields:
         assert getattr(found, name) == pytest.approx(getattr(data, name), abs=1e-12), name
     calm = sensitivities.series(windows(data))  # no sensor
     assert calm.wind.shape == data.wind.shape and not calm.wind.any()
@@ -146,7 +146,7 @@ def test_windows_become_a_series_over_ground(coupled):
 
 def test_samples_weigh_by_the_trapezoidal_rule(coupled):
     """dt 1, 3, 2: half of the neighbours' sum. The mean of a straight line is exact."""
-    one = Series(np.zeros((1, 4, 6)), np.zeros((1, 4, 1)), np.zeros((1, 4, 2)),
+    one = WindowSeries(np.zeros((1, 4, 6)), np.zeros((1, 4, 1)), np.zeros((1, 4, 2)),
                  np.array([[1.0, 3.0, 2.0]]), np.ones(1))  # fmt: skip
     assert one.steps.tolist() == [[0.5, 2.0, 2.5, 1.0]]
     data = coupled[2]
@@ -157,7 +157,7 @@ def test_samples_weigh_by_the_trapezoidal_rule(coupled):
 def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
     data = sailed(count, 4, 1, (1.0,))
     whole = sensitivities.padded(data)
-    for name in Series._fields:
+    for name in WindowSeries._fields:
         values = getattr(whole, name)
         assert len(values) == size
         assert (values[:count] == getattr(data, name)).all()
@@ -168,7 +168,7 @@ def test_padding_reaches_the_next_size_with_windows_of_no_weight(count, size):
 def test_picked_windows_keep_all_that_is_theirs(coupled):
     data = coupled[2]
     some = sensitivities.pick(data, [3, 0])
-    for name in Series._fields:
+    for name in WindowSeries._fields:
         assert (getattr(some, name) == getattr(data, name)[[3, 0]]).all()
 
 
@@ -320,7 +320,7 @@ def test_parameters_that_err_together_spread_by_their_sum(coupled, monkeypatch):
     model, theta, data = coupled
     _, slopes = sensitivities.linearised(model, theta, data)
     sigma = np.array([0.01, -0.02, 0.003, 0.001])
-    monkeypatch.setattr(sensitivities, "CHUNK", 8)
+    monkeypatch.setattr(sensitivities, "WINDOWS_AT_A_TIME", 8)
     many = sensitivities.pick(data, [0, 1, 2, 3, 4] * 3)
     found = sensitivities.spread(model, theta, np.outer(sigma, sigma), many)
     assert found == pytest.approx(np.tile(np.abs(slopes @ sigma), (3, 1, 1)), abs=1e-7)
@@ -401,7 +401,7 @@ def test_chunks_change_nothing(coupled, monkeypatch):
     model, theta, _ = coupled
     data = sailed(19, 30, 6, (1.0, 0.2))._replace(weight=np.linspace(0.0, 2.0, 19))
     whole = sensitivities.normal(model, theta, data)
-    monkeypatch.setattr(sensitivities, "CHUNK", 8)
+    monkeypatch.setattr(sensitivities, "WINDOWS_AT_A_TIME", 8)
     assert len(sensitivities.padded(data).weight) == 24
     parts = sensitivities.normal(model, theta, data)
     assert parts.loss == pytest.approx(whole.loss, rel=1e-12)

@@ -11,7 +11,7 @@ from shiplog import profile as profiles
 from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG, estimated, geometry_of
 from shiplog.simulation import coverage, force_breakdown, sensitivities
-from shiplog.simulation.sensitivities import Series, Simulator
+from shiplog.simulation.sensitivities import Simulator, WindowSeries
 from shiplog.training import hybrid_training
 from shiplog.training.output_error import Identified
 
@@ -55,7 +55,7 @@ COUNT, SIZE, WIDTH = 8, 30, 3
 PULL = 0.002  # m/s² to starboard a unit of thrust: the extra force that no physics know of
 
 
-def driven(seed: int) -> Series:
+def driven(seed: int) -> WindowSeries:
     """Windows under way, thrust and azimuth changing every five seconds, in a steady wind."""
     rng = np.random.default_rng(seed)
     state = np.zeros((COUNT, SIZE, 6))
@@ -63,7 +63,7 @@ def driven(seed: int) -> Series:
     state[:, 0] = rng.normal(size=(COUNT, 6)) * first + (0.0, 0.5, 0.0, 0.0, 0.0, 0.0)
     command = np.repeat(rng.uniform((-0.5, 0.3), (0.5, 0.9), (COUNT, SIZE // 5, 2)), 5, axis=1)
     wind = np.broadcast_to(rng.normal(size=(COUNT, 1, 2)) * 2.0, (COUNT, SIZE, 2)).copy()
-    return Series(state, command, wind, np.ones((COUNT, SIZE - 1)), np.ones(COUNT))
+    return WindowSeries(state, command, wind, np.ones((COUNT, SIZE - 1)), np.ones(COUNT))
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def theta(ship) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def data(physics, theta) -> Series:
+def data(physics, theta) -> WindowSeries:
     plain = driven(0)
     return plain._replace(measured=sensitivities.rollout(physics, theta, plain))
 
@@ -103,11 +103,11 @@ def loud(hybrid, theta) -> np.ndarray:
     return np.concatenate((theta, weights))
 
 
-def flat(data: Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def flat(data: WindowSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return tuple(a.reshape(-1, a.shape[-1]) for a in (data.measured, data.actuator, data.wind))
 
 
-def away(data: Series) -> Series:
+def away(data: WindowSeries) -> WindowSeries:
     """The same windows, the azimuth turned once more: where no training second was, the same
     thrust to the physics."""
     return data._replace(actuator=data.actuator + np.array([2.0 * math.pi, 0.0]))
@@ -205,7 +205,7 @@ def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, loud, the
 # ---------------------------------------------------------------- what it sees
 
 
-def table(data: Series) -> pl.DataFrame:
+def table(data: WindowSeries) -> pl.DataFrame:
     """The samples as the 1 Hz table has them, the wind as it was felt on board."""
     state, actuator, wind = flat(data)
     felt = sensitivities.apparent_wind(state, wind)
@@ -329,7 +329,7 @@ def test_the_forces_of_a_ship_without_wind_sensor_are_those_of_a_calm(data):
 
 
 @pytest.fixture(scope="module")
-def pulled(physics, theta, data) -> Series:
+def pulled(physics, theta, data) -> WindowSeries:
     """The MMG and a known small force beside it, as if the thruster were slightly askew."""
     state = data.measured[:, 0].copy()
     path = [state]

@@ -10,7 +10,7 @@ import pytest
 
 from shiplog.exceptions import ModelError
 from shiplog.simulation import prediction_interval, sensitivities
-from shiplog.simulation.sensitivities import Series, Simulator
+from shiplog.simulation.sensitivities import Simulator, WindowSeries
 from shiplog.training import hybrid_training, identifiability
 from shiplog.training.cross_validation import cross_validate, folds
 from shiplog.training.output_error import CORRELATION, Identified, identify
@@ -78,21 +78,21 @@ TRUE, START = np.array([0.05, 0.02, 0.3]), np.array([0.2, 0.05, 0.7])
 WIDE = np.full(3, 10.0)  # a ridge that hardly holds
 
 
-def driven(actuators: int, seed: int = 0, count: int = COUNT) -> Series:
+def driven(actuators: int, seed: int = 0, count: int = COUNT) -> WindowSeries:
     """Windows of 40 s with commands that change and a start in motion; nothing measured yet."""
     rng = np.random.default_rng(seed)
     state = np.zeros((count, SIZE, 6))
     state[:, 0, [1, 3, 5]] = rng.normal(size=(count, 3)) * (0.3, 0.1, 0.01)
     command = np.repeat(rng.normal(size=(count, SIZE // 8, actuators)), 8, axis=1) + 0.5
     calm = np.zeros((count, SIZE, 2))
-    return Series(state, command, calm, np.ones((count, SIZE - 1)), np.ones(count))
+    return WindowSeries(state, command, calm, np.ones((count, SIZE - 1)), np.ones(count))
 
 
-def measured(model, theta, data: Series) -> Series:
+def measured(model, theta, data: WindowSeries) -> WindowSeries:
     return data._replace(measured=sensitivities.rollout(model, np.array(theta), data))
 
 
-def noisy(data: Series, seed: int, sigma: float = 0.02) -> Series:
+def noisy(data: WindowSeries, seed: int, sigma: float = 0.02) -> WindowSeries:
     """White noise on every measured velocity, the first among them."""
     error = np.zeros_like(data.measured)
     shape = (*error.shape[:2], 3)
@@ -101,12 +101,12 @@ def noisy(data: Series, seed: int, sigma: float = 0.02) -> Series:
 
 
 @pytest.fixture(scope="module")
-def exact() -> Series:
+def exact() -> WindowSeries:
     return measured(Boat(), TRUE, driven(1))
 
 
 @pytest.fixture(scope="module")
-def blurred(exact) -> Series:
+def blurred(exact) -> WindowSeries:
     return noisy(exact, seed=1)
 
 
@@ -242,7 +242,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
     wrong[weight == 0] += 3.0
     some = sensitivities.pick(blurred, np.flatnonzero(weight))
     alone = identify(Boat(), START, WIDE, some)
-    left_out = identify(Boat(), START, WIDE, Series(wrong, *blurred[1:4], weight))
+    left_out = identify(Boat(), START, WIDE, WindowSeries(wrong, *blurred[1:4], weight))
     assert left_out.values == pytest.approx(alone.values, rel=1e-9)
     assert left_out.covariance == pytest.approx(alone.covariance, rel=1e-6)
     assert left_out.loss == pytest.approx(alone.loss)
@@ -253,7 +253,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
 
 
 @pytest.fixture(scope="module")
-def growing() -> Series:
+def growing() -> WindowSeries:
     data = driven(1)
     data.measured[:, 0, 1] = np.linspace(0.5, 1.0, COUNT)
     return measured(Growing(), [0.02], data)
@@ -425,7 +425,7 @@ def test_each_of_two_voyages_is_rolled_out_with_what_the_other_said():
     )
     seen = []
 
-    def fit(part: Series) -> Simulator:
+    def fit(part: WindowSeries) -> Simulator:
         seen.append(part.weight)
         done = identify(Boat(), START, WIDE, part)
         return Simulator(Boat(), done.values, np.diag([1e-4, 0.0, 0.0]))
@@ -455,7 +455,7 @@ def test_a_voyage_that_was_corrupted_spoils_every_fit_but_its_own(exact):
     bad = exact.measured.copy()
     bad[5:, 1:, 1] += 50.0  # voyage c, but for where its rollouts begin
 
-    def fit(part: Series) -> Simulator:
+    def fit(part: WindowSeries) -> Simulator:
         done = identify(Boat(), START, WIDE, part)
         return Simulator(Boat(), done.values, done.covariance)
 

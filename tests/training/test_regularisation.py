@@ -5,7 +5,7 @@ import pytest
 from test_output_error import Straight, driven, measured, noisy
 
 from shiplog.simulation import sensitivities
-from shiplog.simulation.sensitivities import Series
+from shiplog.simulation.sensitivities import WindowSeries
 from shiplog.training import regularisation
 from shiplog.training.cross_validation import as_good
 from shiplog.training.output_error import Identified, identify
@@ -14,7 +14,7 @@ FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 START = np.array([0.05, 0.03, 0.0])
 
 
-def judged(data: Series, unseen: Series, spread: np.ndarray):
+def judged(data: WindowSeries, unseen: WindowSeries, spread: np.ndarray):
     """Every factor's fit to `data`, and its L on the unseen windows."""
 
     def fit(factor: float, begin: np.ndarray | None) -> Identified:

@@ -11,12 +11,12 @@ from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
 from shiplog.training import network_gradient, run_folder
 from shiplog.training.network_training import paper
-from shiplog.training.run_config import Config, Network, Paper
+from shiplog.training.run_config import Config, NetworkSettings, Paper
 from shiplog.voyages.split_settings import Split
 
 PROFILE = sailing.profile()
 SPLIT = Split(training=("a",), validation=("b",))
-CONFIG = Config(recipe="paper", seeds=(0, 1), split=SPLIT, network=Network(
+CONFIG = Config(recipe="paper", seeds=(0, 1), split=SPLIT, network=NetworkSettings(
     width=8, depth=2, wind_input="angle"))  # fmt: skip
 SHAPE = Shape(2, width=8, depth=2)
 ROWS = pl.DataFrame({"voyage": ["a"] * 3, "surge": [0.1, 0.2, 0.3]})

@@ -81,7 +81,7 @@ def test_voyages_do_not_run_into_each_other():
 
 
 def test_a_long_voyage_leaves_room_for_the_others(monkeypatch):
-    monkeypatch.setattr(campaign_consistency, "MOST_ROWS", 400)
+    monkeypatch.setattr(campaign_consistency, "CAMPAIGN_ROWS", 400)
     both = together([motion(0, 100.0), motion(1, 10.0)])
     assert np.flatnonzero(both.starts).tolist() == [0, 200] and len(both.starts) == 300
 

@@ -15,7 +15,7 @@ import casadi  # type: ignore
 import numpy as np
 
 from shiplog.models.mmg.geometry import Geometry
-from shiplog.simulation.sensitivities import Series
+from shiplog.simulation.sensitivities import WindowSeries
 
 cs: Any = casadi  # SWIG's generated stubs do not know SX's operators
 
@@ -171,7 +171,7 @@ class Peer:
     """
 
     def __init__(
-        self, g: Geometry, names: Sequence[str], data: Series, compiled: bool = False
+        self, g: Geometry, names: Sequence[str], data: WindowSeries, compiled: bool = False
     ) -> None:
         count, samples, wide = data.actuator.shape
         self.count, self.steps, self.parameters = count, samples - 1, len(names)

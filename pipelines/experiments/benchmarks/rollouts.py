@@ -25,7 +25,7 @@ from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, beside, load
-from shiplog.simulation.sensitivities import Series, linearised, normal, padded, rollout
+from shiplog.simulation.sensitivities import WindowSeries, linearised, normal, padded, rollout
 from shiplog.training.output_error import Identified, identify
 from shiplog.training.queue import cores
 
@@ -52,7 +52,7 @@ def held(rng: np.random.Generator, low: float, high: float, shortest: int) -> np
     return out
 
 
-def inputs(count: int, rng: np.random.Generator) -> Series:
+def inputs(count: int, rng: np.random.Generator) -> WindowSeries:
     """Harbour manoeuvres: slow starts, bold orders, up to 3 m/s of wind from anywhere."""
     measured = np.zeros((count, SAMPLES, 6))
     measured[:, 0, 1] = rng.uniform(0.0, 0.4, count)
@@ -67,12 +67,14 @@ def inputs(count: int, rng: np.random.Generator) -> Series:
     speed = np.minimum(rng.uniform(0.0, 3.0, (count, 1)) * gusts, 3.0)
     angle = rng.uniform(-math.pi, math.pi, (count, 1))
     wind = np.stack((speed * np.cos(angle), speed * np.sin(angle)), -1)
-    return Series(measured, np.stack(actuator), wind, np.ones((count, SAMPLES - 1)), np.ones(count))
+    return WindowSeries(
+        measured, np.stack(actuator), wind, np.ones((count, SAMPLES - 1)), np.ones(count)
+    )
 
 
 def measurements(
-    model: MMG, known: Parameters, data: Series, rng: np.random.Generator
-) -> tuple[np.ndarray, Series]:
+    model: MMG, known: Parameters, data: WindowSeries, rng: np.random.Generator
+) -> tuple[np.ndarray, WindowSeries]:
     """Another ship's parameters, and what its noisy sensors say of these manoeuvres."""
     moved = known.values + HIDDEN * known.spread * rng.normal(size=len(known.values))
     truth = np.clip(moved, known.low, known.high)
@@ -109,7 +111,7 @@ def report(title: str, seconds: dict[str, list[float]]) -> None:
         print(line, flush=True)
 
 
-def peers(model: MMG, data: Series) -> dict[str, tuple[str, Callable]]:
+def peers(model: MMG, data: WindowSeries) -> dict[str, tuple[str, Callable]]:
     """name → (rollout or sensitivities, θ → result), the C ones where there is a C compiler."""
     if Peer is None:
         print("\nno peer: pip install casadi")
@@ -131,7 +133,7 @@ def peers(model: MMG, data: Series) -> dict[str, tuple[str, Callable]]:
 
 
 def agreement(
-    model: MMG, theta: np.ndarray, data: Series, found: dict[str, tuple[str, Callable]]
+    model: MMG, theta: np.ndarray, data: WindowSeries, found: dict[str, tuple[str, Callable]]
 ) -> None:
     """The largest differences of velocities and of their derivatives over all steps."""
     states, slopes = linearised(model, theta, data)
@@ -158,7 +160,7 @@ def agreement(
 
 
 def refit(
-    model: MMG, known: Parameters, data: Series, free: np.ndarray
+    model: MMG, known: Parameters, data: WindowSeries, free: np.ndarray
 ) -> tuple[float, Identified]:
     began = time.perf_counter()
     bounds = (known.low, known.high)

@@ -1,4 +1,4 @@
-"""What shiplog says of measured ships: the figures of .docs/findings.md.
+"""What shiplog says of measured ships: the figures of docs/results.
 
     python -m pipelines.experiments.findings sensors     FRT-DS-ESSO --out findings
     python -m pipelines.experiments.findings published   FRT-DS-ESSO --out findings

@@ -28,11 +28,11 @@ import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
 from shiplog.diagnosis import likelihood, measurement_correction, segments
-from shiplog.diagnosis.evidence import Point, Trial
+from shiplog.diagnosis.evidence import Point, TrialEvidence
 from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linearisation import Linear
 from shiplog.diagnosis.parameter_layout import Columns
-from shiplog.diagnosis.result import LEAST
+from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.segments import Cut
 from shiplog.diagnosis.setup import trial_of
 from shiplog.exceptions import RunError, ShiplogError
@@ -97,7 +97,7 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, S
 # --- regression of accelerations ------------------------------------------------------------------
 
 
-def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Said:
+def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Said:
     """Coefficients stay as they were fitted; noise is as large as it was on the usual voyages."""
     ref = trial.reference
     columns, model = ref.columns, ref.model
@@ -115,7 +115,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Said:
             continue
         own = []
         for i in columns.of[cause.label]:
-            q, step = i - columns.base, float(measurement_correction.STEP * columns.unit[i])
+            q, step = i - columns.base, float(measurement_correction.READ_STEP * columns.unit[i])
             low, high = (
                 beyond(model, _with(theta, i, d), y + d * shown[..., q], driven + d * moved[..., q])
                 for d in (-step, step)
@@ -190,7 +190,7 @@ class White:
     pull: np.ndarray
 
 
-def likelihood_ratio(trial: Trial, point: Point) -> Said:
+def likelihood_ratio(trial: TrialEvidence, point: Point) -> Said:
     """Coefficients after the usual voyages, all of which count (κ = 1); BIC's price for numbers."""
     ref = trial.reference
     assert ref.nominal is not None
@@ -266,10 +266,10 @@ def ratios(
 # --- our evidence, linearised once ----------------------------------------------------------------
 
 
-def linear(trial: Trial, point: Point) -> Said:
+def linear(trial: TrialEvidence, point: Point) -> Said:
     causes = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
     _, found = trial.scan(point, causes, trial.fixed)
-    return said({one.name: one.evidence for one in found}, LEAST)
+    return said({one.name: one.evidence for one in found}, SHOWS_NATS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

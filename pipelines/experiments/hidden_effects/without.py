@@ -61,7 +61,7 @@ def _voyages_alike(stack: ExitStack) -> None:
 
     def alike(*given):
         found = learned(*given)
-        least = dict.fromkeys(found.deviation, voyage_effects.LEAST)
+        least = dict.fromkeys(found.deviation, voyage_effects.LEAST_DEVIATION)
         return replace(found, deviation=least)
 
     stack.enter_context(patch.object(nominal_cache, "characteristics", alike))

@@ -13,7 +13,7 @@ import polars as pl
 from shiplog import units
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import clock
-from shiplog.logs.conversion.delimited import Table
+from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.profile import LABELS, TABLE_CHANNELS, Column, Profile, Source
 
@@ -34,7 +34,9 @@ SLOWER = 0.5
 NAMED = 8  # vessels that a message names
 
 
-def voyages(table: Table, profile: Profile, path: Path) -> Iterator[tuple[str, pl.DataFrame]]:
+def voyages(
+    table: DelimitedTable, profile: Profile, path: Path
+) -> Iterator[tuple[str, pl.DataFrame]]:
     """The table in SI, a column a channel and `time` in ns, one part a voyage.
 
     Rows without a time are dropped, and said; without a voyage column the file is one voyage.

@@ -21,13 +21,13 @@ log = logging.getLogger(__name__)
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab")
 # In this order: of "1,5;2,5" each comma comes as regularly as the semicolon does.
 SEPARATORS = (";", "\t", "|", ",", " ")
-SAMPLE = 65_536  # bytes that tell the form of a text
+SAMPLE_BYTES = 65_536  # bytes that tell the form of a text
 LOOK = 200  # lines of them
 REGULAR = 0.8  # share of lines that a separator cuts alike
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class DelimitedTable:
     """A table and what its file says of it besides."""
 
     frame: pl.DataFrame
@@ -50,7 +50,7 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() in (".parquet", *TEXT)
 
 
-def read_table(path: Path, known: Collection[str] = ()) -> Table:
+def read_table(path: Path, known: Collection[str] = ()) -> DelimitedTable:
     """A text or Parquet table.
 
     known  column names that the profile speaks of: a line that holds them is the header
@@ -63,7 +63,7 @@ def read_table(path: Path, known: Collection[str] = ()) -> Table:
         )
     try:
         if path.suffix.lower() == ".parquet":
-            table = Table(pl.read_parquet(path))
+            table = DelimitedTable(pl.read_parquet(path))
         else:
             table = _read_text(path, known)
     except (pl.exceptions.PolarsError, OSError, UnicodeError, csv.Error) as error:
@@ -75,11 +75,11 @@ def read_table(path: Path, known: Collection[str] = ()) -> Table:
     return table
 
 
-def _read_text(path: Path, known: Collection[str]) -> Table:
+def _read_text(path: Path, known: Collection[str]) -> DelimitedTable:
     raw = path.read_bytes()
-    text = _decoded(raw[:SAMPLE], whole=len(raw) <= SAMPLE)
+    text = _decoded(raw[:SAMPLE_BYTES], whole=len(raw) <= SAMPLE_BYTES)
     lines = text.splitlines()
-    if len(raw) > SAMPLE:
+    if len(raw) > SAMPLE_BYTES:
         lines = lines[:-1]  # the sample's last line is cut
     form = _form(lines[:LOOK], known)
     if form is None:
@@ -93,7 +93,7 @@ def _read_text(path: Path, known: Collection[str]) -> Table:
     else:
         rows, separator = "\n".join(body), form.separator
     if not rows.strip():
-        return Table(pl.DataFrame({name: [] for name in form.names}))
+        return DelimitedTable(pl.DataFrame({name: [] for name in form.names}))
     frame = pl.read_csv(
         io.BytesIO(rows.encode()), separator=separator, has_header=False, infer_schema=False,
         truncate_ragged_lines=True, new_columns=form.names,
@@ -104,7 +104,7 @@ def _read_text(path: Path, known: Collection[str]) -> Table:
         cut = {"\t": "tabs", " ": "spaces"}.get(form.separator, repr(form.separator))
         log.info("%s: separated by %s%s", path.name, cut, commas)
     stated = {n: u for n, u in zip(form.names, form.units, strict=False) if u}
-    return Table(frame, stated)
+    return DelimitedTable(frame, stated)
 
 
 def _decoded(raw: bytes, whole: bool) -> str:

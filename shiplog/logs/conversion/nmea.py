@@ -36,7 +36,7 @@ SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z]{3},[^$!\r\n*]*(?:\*[0-9A-Fa-f]{2})?")
 ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
 NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
 OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
-LEAST = 0.5  # share of the first lines with a sentence that make a text an NMEA log
+SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
 LATE_S = 0.5  # clocks that differ by more are said: at 10 m/s a ship is 5 m further by then
 EPOCH = date(1970, 1, 1)
 
@@ -59,7 +59,9 @@ def is_nmea(path: Path) -> bool:
     with path.open("rb") as stream:
         lines = stream.read(16_384).decode("latin-1").splitlines()[:100]
     filled = [line for line in lines if line.strip()]
-    return bool(filled) and sum(bool(SENTENCE.search(x)) for x in filled) >= LEAST * len(filled)
+    return bool(filled) and sum(bool(SENTENCE.search(x)) for x in filled) >= SENTENCE_SHARE * len(
+        filled
+    )
 
 
 def read_nmea(path: Path) -> tuple[list[Series], int]:

@@ -18,7 +18,7 @@ GRAVITY = 9.80665  # m/s²
 VISCOSITY = 1.1e-6  # m²/s, water of 16 °C
 SALT, FRESH = 1025.0, 998.0  # kg/m³
 ASPECT = 1.5  # span over mean chord of a ship's rudder
-BLOCK = (0.35, 1.0)
+BLOCK_COEFFICIENTS = (0.35, 1.0)
 FULLEST = 0.2  # C_b B/L; a full tanker's is 0.15, and the regressions are of merchant ships
 BROADEST = 0.2  # B/L of the shape that the wind regression is asked for
 
@@ -83,7 +83,7 @@ def particulars(profile: Profile) -> tuple[Particulars, tuple[str, ...]]:
     box = density * length * breadth * draught
     if block is None and mass is not None:
         found = mass / box
-        block = _within(found, *BLOCK)
+        block = _within(found, *BLOCK_COEFFICIENTS)
         limited = "" if block == found else f", limited from {found:.2g}"
         said.append(f"block coefficient {block:.2g} estimated from the mass{limited}")
     elif block is None:

@@ -22,7 +22,7 @@ from shiplog.models.mmg.geometry import Geometry
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ParameterEntry:
     """One coefficient. Its plausible spread is `share` of its value, or `least` where that is more.
 
     low, high   outside, it is no ship's: refused when read, and a fit stops there
@@ -39,8 +39,8 @@ class Entry:
     unit: str = "1"
 
 
-_E = Entry
-TABLE: dict[str, dict[str, Entry]] = {
+_E = ParameterEntry
+TABLE: dict[str, dict[str, ParameterEntry]] = {
     "body": {  # added masses are known best: every force and mass share one scale, this fixes it
         "m_x": _E("m'_x", "added mass ahead", 0.08, 0.005, 0.0, 1.0),
         "m_y": _E("m'_y", "added mass athwart", 0.08, 0.0, 0.01, 2.0),
@@ -146,7 +146,7 @@ class Parameters:
     high: np.ndarray  # [P]
     source: str
 
-    def entry(self, name: str) -> Entry:
+    def entry(self, name: str) -> ParameterEntry:
         return _entry(name)
 
     def with_values(self, values: np.ndarray, source: str | None = None) -> Parameters:
@@ -319,7 +319,7 @@ def _from(
     return Parameters(wanted, array, spread, low, high, source)
 
 
-def _entry(name: str) -> Entry:
+def _entry(name: str) -> ParameterEntry:
     part, key = name.split(".", 1)
     if part == "thruster":
         key = key.rsplit("_", 1)[1]

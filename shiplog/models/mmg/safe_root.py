@@ -5,10 +5,10 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
-REST = 1e-12  # m²/s²: below, the ship stands
+STANDSTILL = 1e-12  # m²/s²: below, the ship stands
 
 
-def root(square: Array, least: float = REST) -> Array:
+def root(square: Array, least: float = STANDSTILL) -> Array:
     """√s for s ≥ 0 with a finite derivative at 0, where it is √least instead of 0."""
     return jnp.sqrt(jnp.maximum(square, least))
 

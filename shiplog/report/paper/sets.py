@@ -12,7 +12,7 @@ from shiplog import channels
 from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.wind_histogram import ANGLE_BIN, FASTEST, SPEED_BIN, wind_counts
 
-BINS = 30  # of a histogram of one channel
+HISTOGRAM_BINS = 30  # of a histogram of one channel
 
 
 def sizes(
@@ -51,7 +51,7 @@ def histograms(
         values = {name: frame[column].drop_nulls().to_numpy() * factor
                   for name, frame in rows.items()}  # fmt: skip
         every = np.concatenate(list(values.values()))
-        edges = np.histogram_bin_edges(every, BINS)
+        edges = np.histogram_bin_edges(every, HISTOGRAM_BINS)
         for name, own in values.items():
             counts, _ = np.histogram(own, edges)
             found.append(pl.DataFrame({

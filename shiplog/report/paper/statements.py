@@ -17,7 +17,7 @@ import polars as pl
 from scipy.stats import t as student
 
 LEVEL = 0.05  # of all comparisons together
-SAME = 1.25  # ratio: "no significant difference" is shown where the interval ends below it
+SAME_RATIO = 1.25  # ratio: "no significant difference" is shown where the interval ends below it
 
 HOLDS, FAILS, UNCLEAR = "holds", "does not hold", "not shown"
 
@@ -104,7 +104,7 @@ def _finding(said: Statement, low: float, high: float, sure: bool) -> str:
     if not said.smaller:
         if low > 0.0 or high < 0.0:
             return FAILS
-        return HOLDS if max(-low, high) < math.log(SAME) else UNCLEAR
+        return HOLDS if max(-low, high) < math.log(SAME_RATIO) else UNCLEAR
     if high < 0.0:
         return HOLDS
     return FAILS if low > 0.0 else UNCLEAR

@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from shiplog.report.comparison_data import Actuator, Comparison
+from shiplog.report.comparison_data import ComparisonData, DrawnActuator
 from shiplog.report.diagnosis_data import Exhibit
 from shiplog.report.viewer.native import Served, open_viewer, serve
 
 __all__ = [
-    "Actuator", "Comparison", "Exhibit", "Served", "open_viewer", "save", "save_album",
-    "save_diagnosis", "serve",
+    "ComparisonData",
+    "DrawnActuator",
+    "Exhibit",
+    "Served",
+    "open_viewer",
+    "save",
+    "save_album",
+    "save_diagnosis",
+    "serve",
 ]  # fmt: skip
 
 
-def save(comparison: Comparison, path: str | Path) -> None:
+def save(comparison: ComparisonData, path: str | Path) -> None:
     """Write the comparison as an .rrd, under a temporary name until it is whole."""
     from shiplog.report.viewer import (
         recording,  # half a second of imports that most commands never need

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from shiplog import channels
-from shiplog.report.comparison_data import Comparison
+from shiplog.report.comparison_data import ComparisonData
 from shiplog.report.diagnosis_data import AFTER, BEFORE, Exhibit
 from shiplog.report.viewer import display, forces, style, timeline, trajectory
 from shiplog.report.viewer.display import Drawn
@@ -71,7 +71,7 @@ def pictured(exhibit: Exhibit) -> Pictured:
                 voyage=pl.lit(name)
             )
         )
-    compared = Comparison(
+    compared = ComparisonData(
         title=exhibit.title,
         ship_length=exhibit.ship_length,
         ship_breadth=exhibit.ship_breadth,

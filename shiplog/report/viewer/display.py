@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from shiplog import channels
-from shiplog.report.comparison_data import BAND, Comparison
+from shiplog.report.comparison_data import BAND, ComparisonData
 
 TURN = 2.0 * math.pi
 ROLLOUT = ("model", "seed", "voyage", "window")  # what one rollout is known by
@@ -24,11 +24,11 @@ def unwrapped(angle: str, over: tuple[str, ...]) -> pl.Expr:
     return (pl.col(angle).drop_nulls().first() + step.cum_sum()).over(over)
 
 
-class Drawn(Comparison):
+class Drawn(ComparisonData):
     """A comparison whose tables are in display units, with headings that do not jump."""
 
 
-def drawn(comparison: Comparison) -> Drawn:
+def drawn(comparison: ComparisonData) -> Drawn:
     """The same comparison, ready to be drawn."""
     tables = {
         "measured": _measured(comparison),
@@ -40,7 +40,7 @@ def drawn(comparison: Comparison) -> Drawn:
     return Drawn(**{**rest, **tables})
 
 
-def _measured(comparison: Comparison) -> pl.DataFrame:
+def _measured(comparison: ComparisonData) -> pl.DataFrame:
     """Heading free-running, wind from 0 to 360 deg."""
     table = comparison.measured.with_columns(heading=unwrapped("heading", ("voyage",)))
     if comparison.has_wind:
@@ -48,7 +48,7 @@ def _measured(comparison: Comparison) -> pl.DataFrame:
     return _in_display_units(table, comparison.channels)
 
 
-def _simulated(comparison: Comparison) -> pl.DataFrame:
+def _simulated(comparison: ComparisonData) -> pl.DataFrame:
     """Rollouts in order of time, heading in the turn that the measured one is in."""
     start = comparison.measured.select(
         "voyage", pl.col("time").cast(pl.Float64), there=unwrapped("heading", ("voyage",))
@@ -99,7 +99,7 @@ def _forces(forces: pl.DataFrame | None) -> pl.DataFrame | None:
     )
 
 
-def shown_seeds(comparison: Comparison) -> dict[str, int]:
+def shown_seeds(comparison: ComparisonData) -> dict[str, int]:
     """For each model the seed that is drawn boldly: the one whose mean error is the median.
 
     It is a rollout that a trained model made, which a mean over seeds is not, and neither the

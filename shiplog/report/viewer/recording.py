@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from shiplog import files
 from shiplog.exceptions import ShiplogError
-from shiplog.report.comparison_data import Comparison
+from shiplog.report.comparison_data import ComparisonData
 from shiplog.report.diagnosis_data import Exhibit
 from shiplog.report.viewer import (
     diagnosis,
@@ -37,7 +37,7 @@ VIEWS = {
 LEFT = ("trajectory", "histogram")  # of a voyage's tab, one above the other
 
 
-def write(comparison: Comparison, path: Path) -> None:
+def write(comparison: ComparisonData, path: Path) -> None:
     """The comparison as an .rrd."""
     picture = display.drawn(comparison)
     with whole(comparison.title, layout(picture), path) as recording:

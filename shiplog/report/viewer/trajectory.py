@@ -23,7 +23,7 @@ HULL = np.array(  # (ahead, starboard) in ship lengths and breadths: a transom a
      (0.28, -0.5), (0.5, 0.0)]
 )  # fmt: skip
 NORTHWARD = pl.DataFrame({"x0": [0.0], "y0": [0.0], "heading": [0.0]})
-FARTHEST = 500.0  # m
+FARTHEST_M = 500.0  # m
 MOST_HULLS = 60  # on one track: more would hide the lines
 
 
@@ -73,7 +73,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None
 def in_chart_units(drawn: Drawn) -> tuple[Drawn, str]:
     """Metres, or kilometres at sea: Rerun 0.41 pales lines far from the origin of a 2D view."""
     places = np.concatenate([display.column(drawn.measured, name) for name in ("x0", "y0")])
-    if not (np.abs(places) > FARTHEST).any():
+    if not (np.abs(places) > FARTHEST_M).any():
         return drawn, "metres"
     km = [pl.col(name) / 1000.0 for name in ("x0", "y0")]
     small = replace(

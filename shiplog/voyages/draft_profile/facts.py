@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import polars as pl
 
-FIRST = 3  # values shown
+FIRST_VALUES = 3  # values shown
 ASKED = 8  # vessels named where a draft has to ask
 
 
 def of_values(values: pl.Series) -> str:
     """Range and first values of a column; `nothing` where it is blank."""
     if values.dtype == pl.String or not (values.dtype.is_numeric() or values.dtype == pl.Boolean):
-        return "first " + ", ".join(repr(str(v)) for v in values.drop_nulls().head(FIRST))
+        return "first " + ", ".join(repr(str(v)) for v in values.drop_nulls().head(FIRST_VALUES))
     number = values.cast(pl.Float64, strict=False).fill_nan(None).drop_nulls()
     if number.is_empty():
         return "holds nothing"
-    first = ", ".join(f"{v:.7g}" for v in number.head(FIRST))
+    first = ", ".join(f"{v:.7g}" for v in number.head(FIRST_VALUES))
     return f"{number.min():.7g} to {number.max():.7g}; first {first}"
 
 

@@ -14,7 +14,7 @@ from shiplog import units
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import busiest, text_of
-from shiplog.logs.conversion.delimited import Table, read_table
+from shiplog.logs.conversion.delimited import DelimitedTable, read_table
 from shiplog.profile import TABLE_CHANNELS
 from shiplog.voyages.draft_profile import facts, words
 from shiplog.voyages.draft_profile.topics import NO_ACTUATOR
@@ -77,7 +77,7 @@ RATES_HZ = (0.02, 100.0)  # how often a ship's motion is recorded
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundColumn:
     """A column and what it is taken for."""
 
     column: str
@@ -102,7 +102,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
         if label.channel == "vessel" and vessel is not None:
             rows = frame.filter(text_of(frame[label.column]) == vessel)
     taken = {f.column for f in labels}
-    found: dict[str, list[Found]] = {}
+    found: dict[str, list[FoundColumn]] = {}
     for channel, (pattern, unit) in CHANNELS.items():
         names = _matching(frame, pattern, channel, taken)
         found[channel] = [_found(rows[n], channel, unit, table) for n in names]
@@ -140,9 +140,9 @@ def _matching(frame: pl.DataFrame, pattern: str, channel: str, taken: Iterable[s
     return sorted(names, key=lambda n: words.trust(channel, n)[:3])
 
 
-def _labels(table: Table, path: Path, vessel: str | None) -> list[Found]:
+def _labels(table: DelimitedTable, path: Path, vessel: str | None) -> list[FoundColumn]:
     frame = table.frame
-    labels: list[Found] = []
+    labels: list[FoundColumn] = []
     for channel, pattern in LABEL_COLUMNS.items():
         names = [n for n in frame.columns if re.fullmatch(pattern, words.bare(n))]
         if channel == "time":
@@ -162,13 +162,13 @@ def _labels(table: Table, path: Path, vessel: str | None) -> list[Found]:
                     f"{'' if vessel is None else f', and none is {vessel}'}: {busiest(ships)}.",
                     hint="say which with --vessel.",
                 )
-            labels.append(Found(names[0], channel, None, more=f'only = "{vessel}"'))
+            labels.append(FoundColumn(names[0], channel, None, more=f'only = "{vessel}"'))
         else:
-            labels.append(Found(names[0], channel, None))
+            labels.append(FoundColumn(names[0], channel, None))
     return labels
 
 
-def _time(values: pl.Series, table: Table) -> Found:
+def _time(values: pl.Series, table: DelimitedTable) -> FoundColumn:
     """The column of times; a unit only where its size does not say it."""
     try:
         times = clock.instants(values)
@@ -177,22 +177,22 @@ def _time(values: pl.Series, table: Table) -> Found:
         if check == "" and values.dtype in (pl.String, pl.Datetime) and naive:
             text = str(values.drop_nulls().head(1).to_list())
             check = "" if "Z" in text or "+" in text else "CHECK: taken as UTC"
-        return Found(values.name, "time", None, check)
+        return FoundColumn(values.name, "time", None, check)
     except ShiplogError as error:
         if values.dtype.is_numeric():
             step = clock.typical(values.cast(pl.Float64).diff())
             for unit, per in clock.UNIX:
                 if step and RATES_HZ[0] <= per / step <= RATES_HZ[1]:
-                    return Found(values.name, "time", unit, "CHECK: of the step between rows")
-        return Found(values.name, "time", None, f"CHECK: {error.message}")
+                    return FoundColumn(values.name, "time", unit, "CHECK: of the step between rows")
+        return FoundColumn(values.name, "time", None, f"CHECK: {error.message}")
 
 
-def _found(values: pl.Series, channel: str, usual: str, table: Table) -> Found:
+def _found(values: pl.Series, channel: str, usual: str, table: DelimitedTable) -> FoundColumn:
     """A column with its unit: the one it states, else the usual one where the values allow it."""
     stated = words.unit_of(values.name) or words.spelled(table.units.get(values.name, ""))
     check = "CHECK: a set-point, not a measurement" if words.is_set_point(values.name) else ""
     if stated:
-        return Found(values.name, channel, stated, check)
+        return FoundColumn(values.name, channel, stated, check)
     unit = usual
     if usual in ("deg", "deg/s") and values.dtype.is_numeric() and channel not in (
         "latitude", "longitude",
@@ -202,10 +202,14 @@ def _found(values: pl.Series, channel: str, usual: str, table: Table) -> Found:
         if isinstance(most, float) and 0 < most < limit and usual == "deg":
             unit = "rad"
     sure = channel in ("latitude", "longitude")
-    return Found(values.name, channel, unit, check or ("" if sure else "CHECK: unit not stated"))
+    return FoundColumn(
+        values.name, channel, unit, check or ("" if sure else "CHECK: unit not stated")
+    )
 
 
-def _settle_turning(found: dict[str, list[Found]], labels: list[Found], rows: pl.DataFrame) -> None:
+def _settle_turning(
+    found: dict[str, list[FoundColumn]], labels: list[FoundColumn], rows: pl.DataFrame
+) -> None:
     """The unit of a yaw rate that states none: the one that fits how fast the heading turns."""
     time = next((f for f in labels if f.channel == "time"), None)
     rates, headings = found["yaw_rate"], found["heading"]
@@ -230,11 +234,11 @@ def _settle_turning(found: dict[str, list[Found]], labels: list[Found], rows: pl
 
 
 def _kinds(
-    found: dict[str, list[Found]],
-) -> tuple[list[tuple[str, str, list[Found]]], list[Found]]:
+    found: dict[str, list[FoundColumn]],
+) -> tuple[list[tuple[str, str, list[FoundColumn]]], list[FoundColumn]]:
     """The kind of each sensor whose columns are all there, GNSS first; and the second choices."""
-    chosen: list[tuple[str, str, list[Found]]] = []
-    second: list[Found] = []
+    chosen: list[tuple[str, str, list[FoundColumn]]] = []
+    second: list[FoundColumn] = []
     for (name, kind), channels in TABLE_CHANNELS.items():
         if (name, kind) not in SINGLE or not all(found.get(c) for c in channels):
             continue
@@ -262,9 +266,11 @@ def _sensor(name: str, kind: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _actuators(rows: pl.DataFrame, table: Table, taken: set[str]) -> list[tuple[str, Found]]:
+def _actuators(
+    rows: pl.DataFrame, table: DelimitedTable, taken: set[str]
+) -> list[tuple[str, FoundColumn]]:
     """Measured ones; orders only of a kind that nothing measured."""
-    actuators: list[tuple[str, Found]] = []
+    actuators: list[tuple[str, FoundColumn]] = []
     taken, names = set(taken), set()
     for ordered in (False, True):
         kinds = {kind for kind, _ in actuators}
@@ -287,7 +293,9 @@ def _actuators(rows: pl.DataFrame, table: Table, taken: set[str]) -> list[tuple[
                 while name in names:
                     name += "_2"
                 names.add(name)
-                actuators.append((kind, _pulsed(Found(column, name, one.unit, one.check), rows)))
+                actuators.append(
+                    (kind, _pulsed(FoundColumn(column, name, one.unit, one.check), rows))
+                )
     return actuators
 
 
@@ -297,7 +305,7 @@ def _twins(rows: pl.DataFrame, one: str, other: str) -> bool:
     return abs(alike.item() or 0.0) > TWINS
 
 
-def _pulsed(one: Found, rows: pl.DataFrame) -> Found:
+def _pulsed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
     """A thruster that is given in servo pulses."""
     low, high = rows[one.column].min(), rows[one.column].max()
     if one.unit != "1" or not isinstance(low, (int, float)) or not isinstance(high, (int, float)):
@@ -314,7 +322,7 @@ SIZES = {  # of an actuator, which only physical models ask for
 }
 
 
-def _actuator(kind: str, one: Found) -> str:
+def _actuator(kind: str, one: FoundColumn) -> str:
     field, unit = FIELDS[kind]
     offset = "offset = 1500.0  # CHECK: the neutral pulse\n" if one.unit == "pwm" else ""
     return (
@@ -325,7 +333,7 @@ def _actuator(kind: str, one: Found) -> str:
     )
 
 
-def _table(columns: list[Found], rows: pl.DataFrame, second: list[Found]) -> str:
+def _table(columns: list[FoundColumn], rows: pl.DataFrame, second: list[FoundColumn]) -> str:
     lines = ["[table]"]
     if not any(f.channel == "time" for f in columns):
         lines.append(
@@ -336,7 +344,7 @@ def _table(columns: list[Found], rows: pl.DataFrame, second: list[Found]) -> str
     return "\n".join(lines) + "\n"
 
 
-def _line(one: Found, rows: pl.DataFrame) -> str:
+def _line(one: FoundColumn, rows: pl.DataFrame) -> str:
     unit = f', unit = "{one.unit}"' if one.unit else ""
     more = f", {one.more}" if one.more else ""
     check = f"{one.check}; " if one.check else ""
