@@ -53,7 +53,7 @@ def _commit() -> str | None:
 
     Installed into an environment inside somebody's repository, git would name their commit.
     """
-    checkout = Path(__file__).parents[1]
+    checkout = Path(__file__).parents[2]
     if not (checkout / ".git").exists():
         return None
     try:

@@ -8,6 +8,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from contextlib import ExitStack
 from dataclasses import asdict
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -36,6 +37,8 @@ from shiplog.diagnosis import (
     trial_voyages,
 )
 from shiplog.exceptions import ShiplogError
+
+ROOT = Path(__file__).parents[2]
 
 # --- ships of other families ----------------------------------------------------------------------
 
@@ -288,3 +291,8 @@ def test_a_checkout_says_its_commit_and_whether_the_source_was_changed(tmp_path)
     assert program.identity(tmp_path) == {"commit": head, "dirty": True}
     assert program.name({"commit": head, "dirty": True}) == f"{head[:12]}+changes"
     assert program.name(program.other(("shiplog", "--x"))) == "shiplog --x"
+
+
+def test_the_source_is_the_one_that_these_tests_stand_in():
+    assert program.ROOT == ROOT
+    assert (program.ROOT / "pyproject.toml").is_file()

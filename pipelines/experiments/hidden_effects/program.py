@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[2]  # `python -m pipelines...` finds this source and no other
+ROOT = Path(__file__).parents[3]  # `python -m pipelines...` finds this source and no other
 SOURCE = ("shiplog", "pipelines", "pyproject.toml")  # changes elsewhere change no answer
 ANSWERING = ("diagnose", "rivals")  # steps whose program a figure belongs to
 SHORT = 12  # characters of a commit that a page shows
