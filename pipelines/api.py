@@ -20,7 +20,6 @@ from shiplog.logs.health_report import VoyageReport
 from shiplog.report import page, tables
 from shiplog.report.verdict import Verdict
 from shiplog.training import run_folder
-from shiplog.training.run_config import Config, Physics
 from shiplog.training.run_folder import Run
 from shiplog.voyages.store import Store
 
@@ -53,8 +52,11 @@ class Ingested(_Shown):
 class Evaluation(_Shown):
     """Runs on measured voyages.
 
-    errors     one row a run, seed and window: L, RMSE a channel, end errors
-    rollouts   the simulated states, one row a run, seed, voyage, window and second
+    errors     one row a run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et al.
+               2024), RMSE of surge and sway [m/s] and yaw rate [deg/s], and how far off the end
+               is [m], [deg]
+    rollouts   one row a run, seed, voyage, window and second: time [s], the simulated state
+               (m, m/s, rad, rad/s) and the error d of Eq. 6
     coverage   one row a window: share of its seconds inside the training data
     """
 
@@ -129,7 +131,7 @@ def train(
     store: Store | str | Path,
     out: str | Path,
     *,
-    model: str = Config.model_fields["model"].default,
+    model: str = "feedforward",
     voyages: Names = (),
     validation: Names = (),
     data: str = "ref",
@@ -143,9 +145,10 @@ def train(
     parameters: str | Path | None = None,
     without: Sequence[str] = (),
     free: Sequence[str] = (),
-    folds: int = Physics.model_fields["folds"].default,
+    folds: int | None = None,
 ) -> Run:
-    """A model of the voyages, as the run folder `out`. Arguments are those of `shiplog train`.
+    """A model of the voyages, as the run folder `out`. Arguments are those of `shiplog train`;
+    `window` is in samples at 1 Hz.
 
     Raises ShiplogError for voyages that cannot be trained on and for a folder that is taken.
     """

@@ -7,7 +7,8 @@
     print(shiplog.evaluate(run, store, "voyage_6"))
     print(shiplog.diagnose(run, store, "season2_*", out="tour/diagnosis"))
 
-Each function is the command of its name; what is heavy is imported at the first call.
+The commands are functions; `load` and `open_store` open what they left. What is heavy is imported
+at the first call.
 """
 
 from __future__ import annotations

@@ -56,14 +56,11 @@ def write(out: Path, data: Path, kept: Path, source: Path) -> None:
          "--json", out / "ingest-esso.json")  # fmt: skip
     _train(source, out, "esso/mmg", "--model", "mmg", "--no-fit", "--store", esso / "store")
     _diagnose(source, out, "esso", esso / "mmg", "*", esso / "store")
-    for case in sorted((kept / "cases").iterdir())[:: max(1, len(_cases(kept)) // BLIND)][:BLIND]:
+    cases = sorted((kept / "cases").iterdir())
+    for case in cases[:: max(1, len(cases) // BLIND)][:BLIND]:
         own_base = case / "base"
         base = own_base if own_base.exists() else kept / "bases" / case.name.split("-")[0]
         _diagnose(source, out, f"blind-{case.name}", base, "trial_*", case / "store")
-
-
-def _cases(kept: Path) -> list[Path]:
-    return list((kept / "cases").iterdir())
 
 
 def _train(source: Path, out: Path, name: str, *options: object) -> None:

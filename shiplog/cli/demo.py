@@ -16,7 +16,7 @@ def demo(
     out: Annotated[Path, typer.Option(help="Where store, run and recording go.")] = Path("demo"),
     view: Annotated[bool, typer.Option("--view/--no-view", help="Open the viewer.")] = True,
     logs: Annotated[
-        Path | None, typer.Option(help="Sample logs; found beside the source otherwise.")
+        Path | None, typer.Option(help="Sample logs; those of the checkout unless given.")
     ] = None,
     json_to: JsonOption = None,
 ) -> None:

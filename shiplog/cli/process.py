@@ -67,7 +67,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fault(error: Exception) -> ShiplogError:
-    """What a user is told of it."""
+    """The message for a user."""
     if isinstance(error, ShiplogError):
         return error
     if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:

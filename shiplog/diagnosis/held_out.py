@@ -19,9 +19,7 @@ from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.simulation.sensitivities import series
 from shiplog.voyages.windows import Windows
 
-SIMULATES_NOTHING = (
-    2.0  # times the L of keeping all velocities, from which on a model simulates nothing
-)
+SIMULATES_NOTHING = 2.0  # times the L of keeping all velocities
 TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half

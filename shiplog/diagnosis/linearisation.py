@@ -28,7 +28,7 @@ from shiplog.simulation.sensitivities import Physical, rate
 
 jax.config.update("jax_enable_x64", True)
 
-SEGMENTS_AT_A_TIME = 64  # segments at a time
+SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
 RUN_AWAY = 10.0  # times what a path may be off its measurement, beyond which the model has run away

@@ -15,9 +15,8 @@ from shiplog.models.extended import Extended
 from shiplog.voyages.recording import Record
 
 SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
-READ_STEP = (
-    0.3  # of a cause's size, to see how it changes what is read: less, and noise drowns a delay
-)
+# Of a cause's size, to see how it changes what is read: less, and noise drowns a delay
+READ_STEP = 0.3
 
 
 def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.ndarray]) -> Record:

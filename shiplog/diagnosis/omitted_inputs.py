@@ -162,9 +162,8 @@ def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
     if count <= VOYAGE_FOLDS:
         return runs, "voyages"
     ends = np.cumsum(np.bincount(runs)) - 1
-    return np.unique(ends * VOYAGE_FOLDS // len(runs), return_inverse=True)[1][
-        runs
-    ], "groups of voyages"
+    group = np.unique(ends * VOYAGE_FOLDS // len(runs), return_inverse=True)[1]
+    return group[runs], "groups of voyages"
 
 
 def _unit(values: np.ndarray) -> np.ndarray:

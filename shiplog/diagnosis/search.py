@@ -17,21 +17,18 @@ import numpy as np
 from shiplog.diagnosis.evidence import Found, Level, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
 from shiplog.diagnosis.relinearisation import settle
+from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; what is left then is far behind
-KEPT_LINEARISATIONS = (
-    6  # linearisations that are kept; another one is made again where it is asked for
-)
+KEPT_LINEARISATIONS = 6  # another one is made again where it is asked for
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
 
-
-SEEN_NATS = 5.0  # nats that a cause would have to bring to be seen at all
 
 log = logging.getLogger(__name__)
 
@@ -123,9 +120,8 @@ class Search:
     def _forget(self) -> None:
         """Linearisations of all but the best hypotheses: each takes 50 MB and more."""
         best = [self.nothing, *self.ranked()]
-        kept = list(dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point)))[
-            :KEPT_LINEARISATIONS
-        ]
+        points = dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point))
+        kept = list(points)[:KEPT_LINEARISATIONS]
         for key, one in self.found.items():
             if isinstance(one.point, Point) and id(one.point) not in kept:
                 place = Place(one.point.numbers, one.point.path)
@@ -181,7 +177,7 @@ class Search:
 
     def _say_what_would_not_show(self) -> None:
         """What the model's misfit and these voyages cost, before anything is looked for."""
-        shares = {name: told.together(SEEN_NATS) for name, told in self.told.items()}
+        shares = {name: told.together(SHOWS_NATS) for name, told in self.told.items()}
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("of what is realistic would not show: %s", ", ".join(dict.fromkeys(blind)))

@@ -20,12 +20,8 @@ from scipy.linalg import cholesky, solve_triangular
 EM_ROUNDS = 6  # of three steps of expectation-maximisation each
 LEAP = 16.0  # steps at once, at most
 BOUNDS = (-16.0, 10.0)  # of the logarithm of a variance: 3e-4 to 150 plausible sizes
-FIRST_DEVIATION = (
-    0.1  # standard deviation at which it begins, in units of a number's plausible size
-)
-LEAST_DEVIATION = (
-    0.02  # that one pseudo-part contributes: no two voyages are alike to better than that
-)
+FIRST_DEVIATION = 0.1  # at which it begins, in units of a number's plausible size
+LEAST_DEVIATION = 0.02  # of one pseudo-part: no two voyages are alike to better than that
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 
-OFF_THE_POND = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
+NOT_DRAWN = 1e6  # m, m/s: a rollout beyond has left the pond, and is not drawn
 
 
 def save(done: DiagnosedTrial, path: Path) -> None:
@@ -167,7 +167,7 @@ def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows
     """A row a sample; what has left the pond is null."""
     count, size, _ = states.shape
     since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt.double().numpy(), 1)), 1)
-    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < OFF_THE_POND), axis=1)
+    gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < NOT_DRAWN), axis=1)
     states = np.where(gone[..., None], np.nan, states)
     index = numbered[np.repeat(np.arange(count), size)]
     return (

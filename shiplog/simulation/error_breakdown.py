@@ -29,7 +29,7 @@ WIDTHS = (0.5, 1.0, 2.0, 5.0)  # m/s, of a bin of wind speed
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelError:
+class ChannelBreakdown:
     """One velocity's part in the error. `within` of it arises in `occurs` of the time."""
 
     channel: str
@@ -55,7 +55,7 @@ class Minute:
 class Wrong:
     """`channels` in order of their share; `diverged`: windows that ran away, left out of all."""
 
-    channels: tuple[ChannelError, ...]
+    channels: tuple[ChannelBreakdown, ...]
     worst: Minute | None
     timeline: pl.DataFrame
     diverged: int
@@ -82,7 +82,9 @@ def explain(
     found = []
     for i, name in enumerate(CHANNELS):
         where, within, occurs = _where(cost[..., i], kept.steps, regimes)
-        found.append(ChannelError(name, float(cost[..., i].sum() / total), where, within, occurs))
+        found.append(
+            ChannelBreakdown(name, float(cost[..., i].sum() / total), where, within, occurs)
+        )
     found.sort(key=lambda c: -c.share)
     return Wrong(tuple(found), worst_minute(rows), rows, int((~finite).sum()))
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 BAND_LEVEL = 0.9
-FEW_VOYAGES_QUANTILE = (
-    0.95  # quantile of the held-out ratios, where voyages are too few for a conformal one
-)
+# Of the held-out ratios, where voyages are too few for a conformal one
+FEW_VOYAGES_QUANTILE = 0.95
 SMOOTHED = 11  # s over which the growth of the error is averaged
 
 

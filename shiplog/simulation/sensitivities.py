@@ -24,7 +24,7 @@ from shiplog.voyages.windows import Windows
 jax.config.update("jax_enable_x64", True)
 
 VELOCITY = np.array(VELOCITY_IN_STATE)
-WINDOWS_AT_A_TIME = 128  # windows at a time: their sensitivities to 60 parameters are 45 MB
+WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
 
 class Physical(Protocol):

@@ -476,8 +476,10 @@ def open_folder(path: Path) -> Run:
     return Run(path, config, profile)
 
 
-def extend(run: Run, out: Path, simulator: ExtendedSimulator, of: Sequence[Path] = ()) -> Run:
-    """A new run: everything of the old one, and the causes; `of` are the files of those that are
+def extend(
+    run: Run, out: Path, simulator: ExtendedSimulator, own_files: Sequence[Path] = ()
+) -> Run:
+    """A new run: everything of the old one, and the causes; `own_files` define those that are
     not in the catalogue. Raises RunError for a taken name."""
     refuse_taken(out, "--extend")
     partial = out.with_name(f"{out.name}.partial")
@@ -491,7 +493,7 @@ def extend(run: Run, out: Path, simulator: ExtendedSimulator, of: Sequence[Path]
     )  # fmt: skip
     told, arrays = Extension.kept(simulator, len(simulator.model.base.names))
     own = tuple(cause for cause in simulator.model.causes if cause.user)
-    for i, path in enumerate(of if own else ()):
+    for i, path in enumerate(own_files if own else ()):
         shutil.copy(path, partial / f"extension-{i}.py")
     files.write_json(partial / "extension.json", told | {"base": run.name})
     _save_arrays(partial / "extension.safetensors", arrays)

@@ -64,9 +64,8 @@ def resolution(value: np.ndarray) -> float:
         levels = np.sort(column)
         apart: np.ndarray = levels[1:] - levels[:-1]
         span = float(apart.sum())
-        apart = apart[
-            apart > SAME_SPAN * span
-        ]  # what rounding of the arithmetic made is no difference
+        # what rounding of the arithmetic made is no difference
+        apart = apart[apart > SAME_SPAN * span]
         if len(apart) < FEWEST_STEPS:  # it hardly moved
             continue
         step = float(apart.min())

@@ -23,7 +23,7 @@ from pathlib import Path
 from pipelines.experiments.findings import esso_osaka, faults, kvlcc2, milliampere
 
 FINDINGS: dict[str, Callable[[Path, Path], str]] = {
-    "sensors": esso_osaka.sensors, "published": esso_osaka.published, 
+    "sensors": esso_osaka.sensors, "published": esso_osaka.published,
     "refitted": esso_osaka.refitted, "wind": esso_osaka.wind,
     "faults": faults.esso_osaka, "faults-other": faults.other_ship,
     "milliampere": milliampere.milliampere, "kvlcc2": kvlcc2.kvlcc2,

@@ -19,6 +19,7 @@ from pipelines.experiments.simulated_ship.voyage import Voyage
 from pipelines.experiments.simulated_ship.weather import ornstein_uhlenbeck
 from shiplog.logs.write import Series, write_log
 
+ORIGIN = "pipelines.known_ship"  # this simulator, as the committed logs name it
 DATUM = (34.82, 135.52)  # deg, near Inukai Pond, Osaka University
 MILLISECOND = 1_000_000  # ns
 COLOUR_TIMES = (1.0, 5.0)  # s, within which coloured noise fades
@@ -77,7 +78,7 @@ def write_voyage(
         series,
         ship=voyage.ship.name,
         datum=DATUM,
-        notes={"origin": "pipelines.experiments.simulated_ship"},
+        notes={"origin": ORIGIN},
     )
 
 

@@ -111,7 +111,7 @@ def schema_of(topic: str, fields: Iterable[str]) -> str:
     contract = TOPICS.get(topic) or FAMILIES.get(topic.strip("/").split("/")[0], "")
     if set(fields) <= set(SCHEMAS.get(contract, ())):
         return contract
-    return "shiplog.voyages.one_hertz." + plain(topic.strip("/"))
+    return "shiplog.table." + plain(topic.strip("/"))
 
 
 def plain(name: str) -> str:

@@ -59,9 +59,8 @@ def is_nmea(path: Path) -> bool:
     with path.open("rb") as stream:
         lines = stream.read(16_384).decode("latin-1").splitlines()[:100]
     filled = [line for line in lines if line.strip()]
-    return bool(filled) and sum(bool(SENTENCE.search(x)) for x in filled) >= SENTENCE_SHARE * len(
-        filled
-    )
+    sentences = sum(bool(SENTENCE.search(line)) for line in filled)
+    return bool(filled) and sentences >= SENTENCE_SHARE * len(filled)
 
 
 def read_nmea(path: Path) -> tuple[list[Series], int]:
