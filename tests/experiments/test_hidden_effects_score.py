@@ -401,7 +401,7 @@ def test_the_fixed_suite_hides_something_of_every_kind():
     assert {case.verdict for case in drawn} == {"none", "named", "unknown"}
     assert {len(case.causes) for case in drawn} == {0, 1, 2}
     assert [p.seed for p in suites.plan("brief").cases] == [p.seed for p in fixed.cases]
-    assert {p.seconds for p in suites.plan("brief").cases} == {3000}
+    assert {(p.seconds, p.size) for p in suites.plan("brief").cases} == {(3000, 1.0)}
     assert len(suites.plan("nightly", 7).cases) == 200
     network = suites.plan("network")
     assert {p.cause for p in network.cases} == {*parameters.SURVIVE, *parameters.ABSORBED}

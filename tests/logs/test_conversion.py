@@ -12,6 +12,7 @@ from pipelines.convert import convert
 from shiplog import profile as profiles
 from shiplog.exceptions import ChannelMissing, ProfileError
 from shiplog.logs.conversion import clock, heartbeat
+from shiplog.logs.conversion.columns import schema_of
 from shiplog.logs.conversion.delimited import read_table
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.voyages.ingest import ingest
@@ -156,6 +157,12 @@ def test_rows_that_go_back_in_time_are_sorted_and_said(tmp_path, caplog):
     done = convert([tmp_path / "t.csv"], profile, tmp_path)
     assert "goes back in time 29 times" in caplog.text
     assert ingest(done.logs[0], profile).table["x0"].is_sorted()
+
+
+def test_a_topic_of_the_contract_keeps_its_schema_and_another_gets_one_of_its_own():
+    assert schema_of("/gyro", ["yaw_rate_degps"]) == "shiplog.Gyro"
+    assert schema_of("/gyro", ["yaw_rate_degps", "volts"]) == "shiplog.table.gyro"
+    assert schema_of("/2nd engine", ["speed"]) == "shiplog.table._2nd_engine"
 
 
 def test_a_table_without_rows_or_profile_is_refused(tmp_path):
