@@ -182,7 +182,7 @@ def campaign(
         counts=share,
     )  # fmt: skip
     return Campaign(
-        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), noise, tuple(rows),
+        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), 1.0, noise, tuple(rows),
         np.ones(len(given.cut)),
     )  # fmt: skip
 

@@ -373,6 +373,11 @@ class TrialEvidence:
         moved = [replace(f, evidence=f.evidence - best.value) for f in found]
         return replace(base, evidence=best.value), sorted(moved, key=lambda f: -f.evidence)
 
+    def fit(self, point: Point, included: Sequence[str], louder: float) -> Found:
+        """The base hypothesis at one level of process noise."""
+        level = self.level(point, louder, included)
+        return Found("nothing", level.value, louder, *self._numbers(level, point, included))
+
     def _with(self, level: Level, label: str) -> Found:
         """One cause more, its change from the usual with a prior of its size."""
         columns = self.reference.columns.of[label]

@@ -68,6 +68,6 @@ def read(
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
-                shown[..., column] = segments.measured(between, rows)[0] / apart
+                shown[..., column] = segments.averaged(between, rows) / apart
         before = corrected((cause,), before, given)
     return base, moved, shown

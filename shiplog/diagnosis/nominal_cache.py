@@ -57,11 +57,12 @@ def characteristics(
                              strict=True)) for k in ("deviation", "size")}  # fmt: skip
         return Characteristics(
             _known_unrest(known), given["deviation"], given["size"],
-            float(known["share"]), float(known["noise"]), known["weight"],
+            float(known["apart"]), float(known["share"]), float(known["noise"]), known["weight"],
         )  # fmt: skip
     found = nominal_campaign.characteristics(model, setting, start, record, at)
-    arrays = _unrest(found.unrest) | {"share": found.share, "noise": found.noise,
-                                      "weight": found.weight}  # fmt: skip
+    arrays = _unrest(found.unrest) | {
+        "apart": found.apart, "share": found.share, "noise": found.noise, "weight": found.weight,
+    }  # fmt: skip
     for name in ("deviation", "size"):
         values = getattr(found, name)
         arrays |= {f"{name}_names": np.array(list(values)),

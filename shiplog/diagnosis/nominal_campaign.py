@@ -1,8 +1,9 @@
 """The nominal campaign: what is usual for a ship, and how far its own voyages are from each other.
 
 Coefficients, the causes' usual numbers and the weights of the model's discrepancy are learned
-together. How far the parts of the campaign disagree in each of them (`voyage_effects`) is how far a
-trial may differ without any change: once as a campaign, and once more in each of its parts.
+together. How far the parts of the campaign disagree in each of them (`voyage_effects`) is how far
+the parts of a trial may differ without any change. How far a campaign as a whole may differ is
+learned from the voyages (`campaign_prior`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from shiplog.diagnosis import (
+    campaign_prior,
     discrepancy,
     likelihood,
     linearisation,
@@ -23,6 +25,7 @@ from shiplog.diagnosis import (
     segments,
     voyage_effects,
 )
+from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, Unrest
 from shiplog.diagnosis.linearisation import Linear
@@ -40,7 +43,6 @@ ROBUST = 6.0  # medians of χ², from which on a segment counts less
 PART = 20  # segments of one part of a campaign: 10 minutes of a three-metre ship
 FEWEST_PARTS = 4  # parts that a campaign is cut into, where it has twice as many segments
 NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
-SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Campaign:
     discrepancy  its families and their columns
     unseen       families that no model of forces has, over the nominal campaign
     each         products of the nominal parts, in units: [1 + C, 1 + C], then the unseen families'
+    apart        how far a campaign as a whole is from another, in deviations of its parts
     noise        standard deviation, over the parts, of the logarithm of the process noise
     rows         nominal segments of each part; weight [S] of each segment
     """
@@ -62,6 +65,7 @@ class Campaign:
     discrepancy: Discrepancy
     unseen: Discrepancy
     each: tuple[np.ndarray, ...]
+    apart: float
     noise: float
     rows: tuple[np.ndarray, ...]
     weight: np.ndarray
@@ -77,7 +81,7 @@ class Campaign:
         known = self.effects.size**-2.0
         count = 1 + len(known)
         kept = [g[:count, :count] for i, g in enumerate(self.parts) if i != left_out]
-        return prior(kept, known, self.reference.anchor, self.effects.deviation,
+        return prior(kept, known, self.reference.anchor, self.apart * self.effects.deviation,
                      self.reference.counts)  # fmt: skip
 
 
@@ -115,19 +119,6 @@ def products(
     return [picked(modes, rows).total(weight[rows], noise) * scale for rows in parts]
 
 
-def prior(
-    parts: Sequence[np.ndarray], known: np.ndarray, anchor: np.ndarray, deviation: np.ndarray,
-    share: float,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Information [C, C] and pull [C] on a trial's numbers: the posterior of the nominal parts,
-    which count for `share` of themselves, widened by one campaign's own deviation."""
-    total = share * sum(parts, np.zeros((len(known) + 1,) * 2))
-    covariance = np.linalg.inv(total[1:, 1:] + np.diag(known))
-    mean = covariance @ (total[1:, 0] + anchor)
-    information = np.linalg.inv(covariance + np.diag(deviation**2))
-    return information, information @ mean
-
-
 @dataclass(frozen=True)
 class Characteristics:
     """What the nominal campaign alone says of model and ship; it can be kept for later trials.
@@ -135,6 +126,7 @@ class Characteristics:
     unrest      sizes and correlation times of instrument and process noise
     deviation   group of columns → standard deviation of one part's numbers, in their units
     size        family of the discrepancy → prior size of its weights
+    apart       how far a campaign as a whole is from another, in those deviations
     share       how much of itself a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
     weight      [S] of each segment
@@ -143,6 +135,7 @@ class Characteristics:
     unrest: Unrest
     deviation: Mapping[str, float]
     size: Mapping[str, float]
+    apart: float
     share: float
     noise: float
     weight: np.ndarray
@@ -198,12 +191,14 @@ def characteristics(
             weight = _weights(modes, made, effects)
             unrest = _noise_of_parts(made, effects, unrest, weight >= 1.0)
     parts = [reduced(one, effects.deviation)[0] for one in each]
-    share = _share(parts, effects, held)
-    information, pull = prior(parts, effects.size**-2.0, held, effects.deviation, share)
+    voyages = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
+    apart, share = campaign_prior.learn(parts, voyages, effects, held)
+    information, pull = prior(parts, effects.size**-2.0, held, apart * effects.deviation, share)
     return Characteristics(
         unrest,
         {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
         {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
+        apart,
         share,
         _noise(modes, made.rows, columns, effects, information, pull, weight),
         weight,
@@ -275,7 +270,7 @@ def learn(
     effects = VoyageEffects(deviation, size)
     count = 1 + len(known)
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
-    information, pull = prior(parts, size**-2.0, held, deviation, found.share)
+    information, pull = prior(parts, size**-2.0, held, found.apart * deviation, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
         pull, held, 1.0 / found.share, made.linear, modes,
@@ -284,8 +279,8 @@ def learn(
         counts=found.share,
     )  # fmt: skip
     return Campaign(
-        reference_made, effects, families, unseen, tuple(every), found.noise, tuple(made.rows),
-        weight,
+        reference_made, effects, families, unseen, tuple(every), found.apart, found.noise,
+        tuple(made.rows), weight,
     )  # fmt: skip
 
 
@@ -350,23 +345,6 @@ def _groups(model: Extended, columns: Columns, families: Discrepancy) -> dict[st
     return found | {family.name: family.columns for family in families.families}
 
 
-def _share(parts: Sequence[np.ndarray], effects: VoyageEffects, held: np.ndarray) -> float:
-    """How much of itself a trial counts: the share with which the parts predict each other best
-    (a power posterior: Grünwald & van Ommen 2017)."""
-    known = effects.size**-2.0
-    scores = []
-    for share in SHARES:
-        score = 0.0
-        for i, left in enumerate(parts):
-            kept = [g for j, g in enumerate(parts) if j != i]
-            information, pull = prior(kept, known, held, effects.deviation, share)
-            score += nominal_reference.marginal(left, information, pull)
-        scores.append(score)
-        if score < max(scores):
-            break
-    return SHARES[int(np.argmax(scores))]
-
-
 def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
     """Standard deviation of the logarithm of the process noise over the parts."""
     found = []
@@ -397,7 +375,7 @@ def assumed(
         made = nominal_reference.assume(model, setting, start, record, given, inputs)
         none = Discrepancy((), made.unrest.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
-        return Campaign(made, effects, none, none, (), 0.0, (), np.zeros(0))
+        return Campaign(made, effects, none, none, (), 0.0, 0.0, (), np.zeros(0))
     start = widened(model, setting, start)
     at = nominal_reference.settled(
         model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 STEP_NATS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
 SHORTER = 3  # times that a step is halved where the fit runs away
 AT_REST = 0.02  # of a number's size: it rests
+STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
@@ -39,12 +41,16 @@ def settle(
         lately = louder
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
+    steady = False  # whether the process noise is at rest: then it is not looked for in a round
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, louder)
             if np.abs(point.linear.e).max() > AWAY:
                 raise np.linalg.LinAlgError("a path that ran away")
-            base, _ = trial.scan(point, (), included, lately)
+            if steady and lately is not None:
+                base = trial.fit(point, included, lately)
+            else:
+                base, _ = trial.scan(point, (), included, lately)
             if base.evidence < lowest:
                 raise np.linalg.LinAlgError("a step too far")
         except np.linalg.LinAlgError:  # the fit ran away, and its path with it
@@ -60,6 +66,8 @@ def settle(
         near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
             lowest = max(lowest, base.evidence - STEP_NATS)
+        tried = steady
+        steady = lately is not None and abs(math.log(base.louder / lately)) < STEADY
         louder = lately = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit ran away
@@ -69,6 +77,9 @@ def settle(
         numbers = moved
         lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
         if far < AT_REST:
+            if tried:
+                base, _ = trial.scan(point, (), included, lately)
+                numbers, louder = _within_bounds(trial, base.numbers, base.covariance), base.louder
             trial.rested[key] = (numbers, point.path, louder)
             break
         if lost and np.isfinite(before):

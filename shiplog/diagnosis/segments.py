@@ -96,24 +96,28 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 
 
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State [S, B, 6], averaged over bins, and whether it was seen there."""
+    """State [S, B, 6], averaged over bins, and whether most of a bin was seen."""
     g = grid(record)
-    per = round(g.bin / record.step)
-    inside = rows[:, None] + np.arange(g.rows + 1)
-    mean = _means(g.bins, per)
-    y = np.einsum("br,src->sbc", mean, record.state[inside], optimize=True)
-    seen = record.seen[inside].astype(float) @ (mean > 0.0).T / (per + 1) > 0.5
-    return y, np.repeat(seen[..., None], 6, axis=-1)
+    whole, ends, per = _in_bins(record.seen[:, None].astype(float), rows, g)
+    seen = whole + ends[:, 1:] > 0.5 * (per + 1)
+    return averaged(record, rows), np.repeat(seen, 6, axis=-1)
 
 
-def _means(bins: int, per: int) -> np.ndarray:
-    """[B, R] by the trapezium over each bin of so many rows."""
-    weight = np.ones(per + 1)
-    weight[[0, -1]] = 0.5
-    found = np.zeros((bins, bins * per + 1))
-    for i in range(bins):
-        found[i, i * per : (i + 1) * per + 1] = weight / weight.sum()
-    return found
+def averaged(record: Record, rows: np.ndarray) -> np.ndarray:
+    """State [S, B, 6], averaged over bins by the trapezium."""
+    whole, ends, per = _in_bins(record.state, rows, grid(record))
+    return (whole + 0.5 * (ends[:, 1:] - ends[:, :-1])) / per
+
+
+def _in_bins(
+    values: np.ndarray, rows: np.ndarray, g: SegmentGrid
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Of a record's rows [n, c]: sums [S, B, c] of each bin without its last row, the rows
+    [S, B + 1, c] between bins, and how many rows a bin goes on for."""
+    per = round(g.bin / g.step)
+    inside = values[rows[:, None] + np.arange(g.bins * per + 1)]
+    whole = inside[:, :-1].reshape(len(rows), g.bins, per, values.shape[1]).sum(2)
+    return whole, inside[:, ::per], per
 
 
 def driving(record: Record, rows: np.ndarray) -> np.ndarray:

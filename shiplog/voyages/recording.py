@@ -7,9 +7,9 @@ smaller than that. So the diagnosis reads the recorded rows themselves.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -26,6 +26,14 @@ from shiplog.voyages.timescale import THREE_METRES, Timescale
 
 STEP_S = 1.0 / RATE_HZ
 FILLED = 20  # rows: a shorter gap is bridged for the inputs, and not scored
+
+
+class _Ends(NamedTuple):
+    """Where the stretches that begin at `starts` [n] begin and end, for each row [n]."""
+
+    starts: np.ndarray
+    firsts: np.ndarray
+    lasts: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,7 @@ class Record:
     wind: np.ndarray
     step: float = STEP_S
     timescale: Timescale = THREE_METRES
+    _ends: _Ends | None = field(default=None, repr=False)  # of `starts`, once they were asked for
 
     def __len__(self) -> int:
         return len(self.time)
@@ -66,15 +75,23 @@ class Record:
     @property
     def firsts(self) -> np.ndarray:
         """[n] the row at which each row's stretch begins."""
-        at = np.flatnonzero(self.starts)
-        return np.repeat(at, np.diff(np.append(at, len(self))))
+        return self._stretches.firsts
 
     @property
     def lasts(self) -> np.ndarray:
         """[n] the row at which each row's stretch ends."""
-        at = np.flatnonzero(self.starts)
-        lengths = np.diff(np.append(at, len(self)))
-        return np.repeat(at + lengths - 1, lengths)
+        return self._stretches.lasts
+
+    @property
+    def _stretches(self) -> _Ends:
+        """Worked out once for all records that differ in their values alone."""
+        if self._ends is None or self._ends.starts is not self.starts:
+            at = np.flatnonzero(self.starts)
+            lengths = np.diff(np.append(at, len(self)))
+            ends = _Ends(self.starts, np.repeat(at, lengths), np.repeat(at + lengths - 1, lengths))
+            object.__setattr__(self, "_ends", ends)
+            return ends
+        return self._ends
 
     def later(self, values: np.ndarray, seconds: float) -> np.ndarray:
         """Values [n, ...] as they stand `seconds` later; at the ends of a stretch they stay."""
