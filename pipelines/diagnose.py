@@ -16,11 +16,8 @@ from shiplog.diagnosis import (
     baseline_check,
     error_location,
     network_base,
-    placebo,
-    refutation,
-    search,
     segments,
-    setup,
+    trial_decision,
     trial_voyages,
 )
 from shiplog.diagnosis import result as decisions
@@ -116,22 +113,14 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else ""
-    made = setup.trial_of(run, nominal, recorded, causes, lacking)
-    tried, untested = made.trial, dict(made.untested)
-    notes += [lacking] if lacking else []
-    log.info(
-        "%s against %s: %d segments of %d s, of which a share of %.2f counts",
-        listed(names, most=4), run.name, len(tried.rows), tried.grid.seconds,
-        tried.reference.counts,
-    )  # fmt: skip
-    point = tried.begin(run.extension_numbers())
-    whole = tried.covering(point)
-    pushed = error_location.pushed(tried, point, whole)
     cut = trial_voyages.windows_of(run, store, names, profile)
-    judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, tried), tried)
-    weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
-    weighed.run()
-    decision, _, found, dropped = refutation.judged(weighed, judge)
+    decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking)
+    tried, judge = decided.trial, decided.judge
+    decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
+    untested = dict(decided.untested)
+    notes += [lacking] if lacking else []
+    whole = tried.covering(decided.point)
+    pushed = error_location.pushed(tried, decided.point, whole)
     held, network, alone = judge, None, None
     if not run.config.physical:
         notes += answer.of_physics(run, tried, found)

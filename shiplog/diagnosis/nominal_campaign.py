@@ -153,13 +153,19 @@ class _Pass:
     rows: list[np.ndarray]
 
 
-def _pass(model: Extended, setting: Setting, start: Start, record: Record, at: Settled) -> _Pass:
+def _pass(
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    numbers: Mapping[str, np.ndarray] | None = None,
+) -> _Pass:  # fmt: skip
+    """`numbers` of causes that the voyages have; none but on voyages that are not nominal."""
     columns = nominal_reference.columns_of(model, setting, start)
-    cut, moved, shown = read(model, setting, record, segments.begins(record))
-    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
-    g = segments.grid(record)
+    cut, moved, shown = read(model, setting, record, segments.begins(record), numbers)
+    whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
+    g, path = segments.grid(record), at.path
     wide = nominal_reference.wide_of(setting)
-    linear = linearisation.linear(model, whole, cut, g, at.path, moved, shown, wide)
+    if numbers:
+        path = linearisation.pulled(model, whole, cut, g, wide, path)
+    linear = linearisation.linear(model, whole, cut, g, path, moved, shown, wide)
     held = nominal_reference.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.unrest.push, len(columns.unit), discrepancy.SEEN,
@@ -172,10 +178,11 @@ def _pass(model: Extended, setting: Setting, start: Start, record: Record, at: S
 
 
 def characteristics(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
-) -> Characteristics:
+    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    numbers: Mapping[str, np.ndarray] | None = None,
+) -> Characteristics:  # fmt: skip
     """Learned from the nominal voyages, linearised `at` where their coefficients converged."""
-    made = _pass(model, setting, start, record, at)
+    made = _pass(model, setting, start, record, at, numbers)
     columns, held, known = made.columns, made.held, made.columns.known
     unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)
     groups = _groups(model, columns, made.families)
@@ -363,13 +370,14 @@ def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
 
 def assumed(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
-    inputs: Network | None = None,
+    inputs: Network | None = None, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
     """Where no nominal campaign shows what is usual: the voyages in question stand for it, and no
     cause has a usual size.
 
     given    coefficients that nobody fitted, held near their values; else a fit to these voyages
     inputs   a network that was trained on these voyages
+    numbers  of causes that were found in these voyages: what they explain is no discrepancy
     """
     if inputs is not None:
         made = nominal_reference.assume(model, setting, start, record, given, inputs)
@@ -382,7 +390,7 @@ def assumed(
     )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference
-    found = characteristics(model, setting, start, record, at)
+    found = characteristics(model, setting, start, record, at, numbers)
     whole = learn(model, setting, start, record, at, found)
     columns, known = whole.reference.columns, whole.effects.size**-2.0
     known[columns.base : columns.linearised] = HELD_INFORMATION

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from shiplog.diagnosis import nominal_cache, nominal_campaign
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.trial_voyages import model_of, setting_of
@@ -24,13 +26,14 @@ class Setup:
 
 def trial_of(
     run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
-    lacking: str = "",
+    lacking: str = "", numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Setup:  # fmt: skip
     """Of a network the ship's MMG is asked, fitted to the voyages that the network was trained on.
 
     own       causes of the user's
     nominal   the voyages that the run was made on, before these; None where there are none
     lacking   why the model cannot tell causes that change forces; empty where it can
+    numbers   of causes found in these voyages, where no nominal campaign shows the discrepancy
     """
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
     extension = run.extension
@@ -46,7 +49,9 @@ def trial_of(
     model, start = model_of(run, every, setting)
     if nominal is None:
         inputs = None if run.config.physical else run.base()[0]
-        campaign = nominal_campaign.assumed(model, setting, start, recorded, run.given, inputs)
+        campaign = nominal_campaign.assumed(
+            model, setting, start, recorded, run.given, inputs, numbers
+        )
     else:
         # where the coefficients converge depends on the nominal voyages alone: it can be kept
         before = setting_of(run, nominal, nominal)
