@@ -182,8 +182,8 @@ def campaign(
         counts=share,
     )  # fmt: skip
     return Campaign(
-        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), 1.0, noise, tuple(rows),
-        np.ones(len(given.cut)),
+        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), np.arange(parts), 0.0, noise,
+        tuple(rows), np.ones(len(given.cut)),
     )  # fmt: skip
 
 

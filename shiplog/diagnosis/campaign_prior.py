@@ -1,9 +1,9 @@
 """What a nominal campaign says of a trial's numbers: their prior.
 
-The parts of a campaign have numbers of their own (`voyage_effects`). A trial is another campaign:
-as a whole it may differ from the nominal one, by less or as much as parts of one campaign differ.
-How much it differs, and how much of itself it counts, is what predicts each nominal voyage best
-from the others.
+Voyages of one ship differ, and parts of one voyage differ: each voyage has numbers θ + c and each
+of its parts θ + c + b (nested random effects: Laird & Ware 1982). How far parts differ is learned
+in `voyage_effects`. How far voyages differ in that unit, and how much of itself a voyage counts, is
+what predicts each nominal voyage best from the others. A trial is further voyages of the ship.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from shiplog.diagnosis import nominal_reference
-from shiplog.diagnosis.voyage_effects import VoyageEffects
+from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 
-APART = (0.0, 0.25, 0.5, 1.0)  # of a campaign, in deviations of its parts; each as likely
+APART = (0.0, 0.25, 0.5, 1.0)  # of voyages, in deviations of their parts; each as likely
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 
 
@@ -25,9 +25,9 @@ def prior(
     share: float,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Information [C, C] and pull [C] on a trial's numbers: the posterior of the nominal parts,
-    which count for `share` of themselves, widened by one campaign's own `deviation` [C].
+    which count for `share` of themselves, widened by a `deviation` [C] of their own.
 
-    parts   products [1 + C, 1 + C] of each part, its own numbers integrated out
+    parts   products [1 + C, 1 + C] of each part or voyage, its own numbers integrated out
     known   [C] information on the numbers before any data; `anchor` [C] what it pulls towards
     """
     total = share * sum(parts, np.zeros((len(known) + 1,) * 2))
@@ -37,26 +37,42 @@ def prior(
     return information, information @ mean
 
 
+def of_voyages(
+    parts: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray
+) -> tuple[list[np.ndarray], list[float]]:
+    """Products [1 + C, 1 + C] of each voyage, numbers of its own with that `deviation` [C]
+    integrated out, and log|I + D^½ M D^½| of each.
+
+    parts     products of each part, its own numbers integrated out; `voyages` of each
+    """
+    found, volumes = [], []
+    for name in np.unique(voyages):
+        own = [gram for gram, of in zip(parts, voyages, strict=True) if of == name]
+        gram, volume = reduced(sum(own[1:], own[0]), deviation)
+        found.append(gram)
+        volumes.append(volume)
+    return found, volumes
+
+
 def learn(
     parts: Sequence[np.ndarray], voyages: np.ndarray, effects: VoyageEffects, anchor: np.ndarray
 ) -> tuple[float, float]:
-    """How far a campaign as a whole is from another, in deviations of its parts, and how much of
-    itself a trial counts (a power posterior: Grünwald & van Ommen 2017).
+    """How far voyages are from each other, in deviations of their parts, and how much of itself a
+    voyage counts (a power posterior: Grünwald & van Ommen 2017).
 
-    voyages   of each part. Every voyage is predicted from the others, as if it were a campaign. One
-              voyage alone says nothing of this: all of `APART` stay as likely as before.
+    One voyage alone says nothing of this: all of `APART` stay as likely as before.
     """
     known = effects.size**-2.0
-    names = np.unique(voyages)
+    count = len(np.unique(voyages))
     best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(APART)))), 1.0)
-    for share in SHARES if len(names) > 1 else ():
+    tried = [of_voyages(parts, voyages, apart * effects.deviation) for apart in APART]
+    for share in SHARES if count > 1 else ():
         scores = np.zeros(len(APART))
-        for name in names:
-            left = sum(g for g, v in zip(parts, voyages, strict=True) if v == name)
-            kept = [g for g, v in zip(parts, voyages, strict=True) if v != name]
-            for i, apart in enumerate(APART):
-                given = prior(kept, known, anchor, apart * effects.deviation, share)
-                scores[i] += nominal_reference.marginal(left, *given)
+        for i, (each, volumes) in enumerate(tried):
+            for left, (gram, volume) in enumerate(zip(each, volumes, strict=True)):
+                kept = [g for j, g in enumerate(each) if j != left]
+                given = prior(kept, known, anchor, np.zeros(len(known)), share)
+                scores[i] += nominal_reference.marginal(gram, *given) - 0.5 * volume
         whole = float(logsumexp(scores))
         if whole < best:
             break

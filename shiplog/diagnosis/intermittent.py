@@ -17,7 +17,7 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     """Acceleration [3], root mean square, of the nominal process noise at one place, where it is
     likelier to push at one place than in each channel by itself; None where it is not.
 
-    Each part's numbers are predicted by the others and itself, as a trial's are.
+    Each part's numbers are predicted by the other voyages and itself, as a trial's are.
     """
     reference = campaign.reference
     linear = reference.nominal
@@ -26,8 +26,10 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     pushed = campaign.discrepancy.pushed(linear.cut, g)
     unit, share = reference.columns.unit, reference.counts
     own = np.empty((len(linear.e), len(unit)))
-    for left_out, (rows, part) in enumerate(zip(campaign.rows, campaign.parts, strict=True)):
-        information, pull = campaign.prior_without(left_out)
+    names = np.unique(campaign.voyage)
+    for rows, part, voyage in zip(campaign.rows, campaign.parts, campaign.voyage, strict=True):
+        left_out = int(np.searchsorted(names, voyage))
+        information, pull = campaign.prior_without(left_out, campaign.apart)
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
         own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
     left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])

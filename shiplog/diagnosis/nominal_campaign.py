@@ -1,9 +1,8 @@
 """The nominal campaign: what is usual for a ship, and how far its own voyages are from each other.
 
 Coefficients, the causes' usual numbers and the weights of the model's discrepancy are learned
-together. How far the parts of the campaign disagree in each of them (`voyage_effects`) is how far
-the parts of a trial may differ without any change. How far a campaign as a whole may differ is
-learned from the voyages (`campaign_prior`).
+together. How far the voyages of the campaign and their parts disagree in each of them
+(`voyage_effects`, `campaign_prior`) is how far those of a trial may without any change.
 """
 
 from __future__ import annotations
@@ -55,7 +54,8 @@ class Campaign:
     discrepancy  its families and their columns
     unseen       families that no model of forces has, over the nominal campaign
     each         products of the nominal parts, in units: [1 + C, 1 + C], then the unseen families'
-    apart        how far a campaign as a whole is from another, in deviations of its parts
+    voyage       of each part; parts of a campaign of one voyage are voyages of their own
+    apart        how far voyages are from each other, in deviations of their parts
     noise        standard deviation, over the parts, of the logarithm of the process noise
     rows         nominal segments of each part; weight [S] of each segment
     """
@@ -65,6 +65,7 @@ class Campaign:
     discrepancy: Discrepancy
     unseen: Discrepancy
     each: tuple[np.ndarray, ...]
+    voyage: np.ndarray
     apart: float
     noise: float
     rows: tuple[np.ndarray, ...]
@@ -73,15 +74,27 @@ class Campaign:
     @cached_property
     def parts(self) -> tuple[np.ndarray, ...]:
         """`each` with every part's own numbers integrated out."""
-        deviation = np.append(self.effects.deviation, np.zeros(self.unseen.count))
-        return tuple(reduced(g, deviation)[0] for g in self.each)
+        return tuple(reduced(g, self.deviation)[0] for g in self.each)
 
-    def prior_without(self, left_out: int) -> tuple[np.ndarray, np.ndarray]:
-        """Information and pull of a trial's numbers, one nominal part left out."""
+    @cached_property
+    def voyages(self) -> tuple[np.ndarray, ...]:
+        """Products of each voyage, its own numbers integrated out."""
+        return tuple(
+            campaign_prior.of_voyages(self.parts, self.voyage, self.apart * self.deviation)[0]
+        )
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Of one part's numbers, the unseen families' with them [C + W]."""
+        return np.append(self.effects.deviation, np.zeros(self.unseen.count))
+
+    def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Information and pull of θ, one nominal voyage left out; of the numbers of a voyage that
+        is so far `apart`."""
         known = self.effects.size**-2.0
         count = 1 + len(known)
-        kept = [g[:count, :count] for i, g in enumerate(self.parts) if i != left_out]
-        return prior(kept, known, self.reference.anchor, self.apart * self.effects.deviation,
+        kept = [g[:count, :count] for i, g in enumerate(self.voyages) if i != left_out]
+        return prior(kept, known, self.reference.anchor, apart * self.effects.deviation,
                      self.reference.counts)  # fmt: skip
 
 
@@ -126,7 +139,7 @@ class Characteristics:
     unrest      sizes and correlation times of instrument and process noise
     deviation   group of columns → standard deviation of one part's numbers, in their units
     size        family of the discrepancy → prior size of its weights
-    apart       how far a campaign as a whole is from another, in those deviations
+    apart       how far voyages are from each other, in those deviations
     share       how much of itself a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
     weight      [S] of each segment
@@ -277,7 +290,11 @@ def learn(
     effects = VoyageEffects(deviation, size)
     count = 1 + len(known)
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
-    information, pull = prior(parts, size**-2.0, held, found.apart * deviation, found.share)
+    voyage = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
+    if len(np.unique(voyage)) == 1:
+        voyage = np.arange(len(parts))
+    voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
+    information, pull = prior(voyages, size**-2.0, held, np.zeros(len(known)), found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
         pull, held, 1.0 / found.share, made.linear, modes,
@@ -286,7 +303,8 @@ def learn(
         counts=found.share,
     )  # fmt: skip
     return Campaign(
-        reference_made, effects, families, unseen, tuple(every), found.apart, found.noise,
+        reference_made, effects, families, unseen, tuple(every), voyage, found.apart,
+        found.noise,
         tuple(made.rows), weight,
     )  # fmt: skip
 
@@ -383,7 +401,7 @@ def assumed(
         made = nominal_reference.assume(model, setting, start, record, given, inputs)
         none = Discrepancy((), made.unrest.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
-        return Campaign(made, effects, none, none, (), 0.0, 0.0, (), np.zeros(0))
+        return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
     start = widened(model, setting, start)
     at = nominal_reference.settled(
         model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS

@@ -15,14 +15,14 @@ from shiplog.diagnosis.trial import SIZES
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
-    """Label or family → nats that it gains at most on one nominal part, 0 at least."""
+    """Label or family → nats that it gains at most on one nominal voyage, 0 at least."""
     columns, share = campaign.reference.columns, campaign.reference.counts
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
     tested = {label: (at, (1.0,)) for label, at in columns.of.items()}
     for family in (*campaign.discrepancy.families, *campaign.unseen.families):
         tested[family.name] = (family.columns, SIZES)
     most = dict.fromkeys(tested, 0.0)
-    for left_out, gram in enumerate(campaign.parts):
+    for left_out, gram in enumerate(campaign.voyages):
         information, pull = campaign.prior_without(left_out)
         count = len(pull)
         gram = share * gram

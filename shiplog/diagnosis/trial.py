@@ -2,7 +2,8 @@
 
 A hypothesis is a set of causes and one kind of remainder. Its columns join those of the campaign: a
 cause's numbers as a change from usual, or a family of the discrepancy as a change of its weights.
-Every part of the trial has deviations of its own (`voyage_effects`), which are integrated out.
+Every voyage of the trial and every part of it has deviations of its own (`voyage_effects`,
+`campaign_prior`), which are integrated out.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from shiplog.diagnosis import (
+    campaign_prior,
     discrepancy,
     evidence,
     intermittent,
@@ -74,6 +76,7 @@ class Trial(evidence.TrialEvidence):
         both = (*campaign.discrepancy.families, *self.unseen.families)
         self.families = {family.name: family.columns for family in both}
         self.parts = parts_of(record.voyage[self.rows])
+        self.voyage = record.voyage[self.rows[[part[0] for part in self.parts]]]  # of each part
         self.remainder = Remainder()  # that `scan` includes
         self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model runs away
         self._begun = False
@@ -130,10 +133,10 @@ class Trial(evidence.TrialEvidence):
         unit = np.append(self.reference.columns.unit, np.ones(self.unseen.count))
         deviation = np.append(self.campaign.effects.deviation, np.zeros(self.unseen.count))
         each = products(modes, self.parts, unit, self.weight, noise)
-        total, volume = np.zeros_like(each[0]), 0.0
-        for gram in each:
-            gram, logdet = reduced(gram, deviation)
-            total, volume = total + gram, volume + logdet
+        parts, volumes = zip(*(reduced(gram, deviation) for gram in each), strict=True)
+        apart = self.campaign.apart * deviation
+        voyages, more = campaign_prior.of_voyages(parts, self.voyage, apart)
+        total, volume = sum(voyages[1:], voyages[0]), sum(volumes) + sum(more)
         # no id(): a point that is gone leaves its own to the next one
         self._totals = [*self._totals[-40:], (weakref.ref(point.weighed), key, total, volume)]
         return total, volume
@@ -275,7 +278,7 @@ class Trial(evidence.TrialEvidence):
         unit = np.append(columns.unit, np.ones(self.unseen.count))
         common = self.solved(point, base) / columns.unit
         modes, noise = self.modes(point, base.louder)
-        deviation = self.campaign.effects.deviation
+        deviation = math.hypot(1.0, self.campaign.apart) * self.campaign.effects.deviation
         free = np.flatnonzero(deviation > 0.0)
         pushed = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
         if self.reference.misfit is not None:

@@ -8,15 +8,16 @@ import straight
 from straight import CAUSES, SETTING, UNREST
 
 from shiplog.diagnosis import (
+    campaign_prior,
     discrepancy,
     likelihood,
     nominal_campaign,
     nominal_reference,
     voyage_effects,
 )
-from shiplog.diagnosis.nominal_campaign import FEWEST_PARTS, parts_of, prior
+from shiplog.diagnosis.campaign_prior import prior
+from shiplog.diagnosis.nominal_campaign import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.nominal_reference import Settled
-from shiplog.diagnosis.voyage_effects import VoyageEffects
 from shiplog.models.starting_values import Start
 
 
@@ -55,61 +56,6 @@ def test_parts_by_hand(voyages, sizes):
     found = tuple(map(len, parts_of(np.repeat(np.arange(len(voyages)), voyages))))
     assert found == sizes
     assert sum(found) == sum(voyages)
-
-
-def test_a_prior_is_the_posterior_of_the_parts_and_one_more_deviation():
-    """Against drawn numbers: θ ~ N(mean, known⁻¹), each part sees all of θ, the trial's numbers
-    are θ + b with b ~ N(0, D): a Gaussian by conditioning, of a part each with its power."""
-    rng = np.random.default_rng(0)
-    count, share = 4, 0.3
-    known, anchor = rng.uniform(0.5, 3.0, count), rng.standard_normal(count)
-    deviation = np.array([0.3, 0.0, 1.0, 0.2])
-    j, e = rng.standard_normal((30, count)), rng.standard_normal(30)
-    both = np.concatenate((e[:, None], j), 1)
-    parts = [both[a : a + 10].T @ both[a : a + 10] for a in (0, 10, 20)]
-    information, pull = prior(parts, known, anchor, deviation, share)
-
-    before = np.diag(1.0 / known)
-    whole = np.eye(30) / share + j @ before @ j.T
-    gain = before @ j.T @ np.linalg.inv(whole)
-    mean = anchor / known
-    mean = mean + gain @ (e - j @ mean)
-    covariance = before - gain @ j @ before + np.diag(deviation**2)
-    assert np.linalg.inv(information) == pytest.approx(covariance, rel=1e-9)
-    assert np.linalg.solve(information, pull) == pytest.approx(mean, rel=1e-9)
-    # no parts: what was known, and the deviation
-    information, pull = prior([], known, anchor, deviation, 1.0)
-    assert np.linalg.inv(information) == pytest.approx(before + np.diag(deviation**2))
-    assert np.linalg.solve(information, pull) == pytest.approx(anchor / known)
-
-
-def drawn_parts(times: float, seed: int, count: int = 6, parts: int = 12) -> list[np.ndarray]:
-    """Parts that agree on numbers of unit size, with noise `times` what is assumed."""
-    rng = np.random.default_rng(seed)
-    theta, found = rng.standard_normal(count), []
-    for _ in range(parts):
-        j = 0.5 * rng.standard_normal((30, count))
-        both = np.concatenate(((j @ theta + times * rng.standard_normal(30))[:, None], j), 1)
-        found.append(both.T @ both)
-    return found
-
-
-def test_a_right_noise_model_counts_whole_and_one_too_quiet_does_not():
-    """Of 15 draws with the noise that is assumed most keep all of it, and none falls below a half;
-    of 15 with twice that noise, which is four times the squares, none keeps more than a half."""
-    effects, none = VoyageEffects(np.zeros(60), np.ones(60)), np.zeros(60)
-    right, wrong = (
-        [nominal_campaign._share(drawn_parts(t, seed, 60), effects, none) for seed in range(15)]
-        for t in (1.0, 2.0)
-    )
-    assert sum(share == 1.0 for share in right) >= 9
-    assert min(right) >= 0.5 >= max(wrong)
-    assert set(right + wrong) <= set(nominal_campaign.SHARES)
-
-
-def test_one_part_cannot_say_how_much_it_counts():
-    effects = VoyageEffects(np.zeros(6), np.ones(6))
-    assert nominal_campaign._share(drawn_parts(1.0, 0, parts=1), effects, np.zeros(6)) == 1.0
 
 
 def test_products_of_parts_are_those_of_the_whole():
@@ -191,7 +137,7 @@ def test_characteristics_say_every_group_once(learned):
     assert set(found.deviation) == {"hull", "rudder", "two", "drag", "motion", "controls", "wind"}
     assert set(found.size) == set(discrepancy.SEEN)
     assert all(0.0 < value < 1.0 for value in found.deviation.values())
-    assert found.share in nominal_campaign.SHARES
+    assert found.share in campaign_prior.SHARES
     # what a trial is given is by these names, column by column
     columns = made.reference.columns
     for label in ("two", "drag"):
@@ -222,13 +168,12 @@ def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
     _, made = learned
     ref = made.reference
     count = 1 + len(ref.pull)
-    kept = [one[:count, :count] for one in made.parts]
-    information, pull = prior(
-        kept, made.effects.size**-2.0, ref.anchor, made.effects.deviation, ref.counts
-    )
+    kept = [one[:count, :count] for one in made.voyages]
+    none = np.zeros(count - 1)
+    information, pull = prior(kept, made.effects.size**-2.0, ref.anchor, none, ref.counts)
     assert information == pytest.approx(ref.information, rel=1e-6, abs=1e-6)
     assert pull == pytest.approx(ref.pull, rel=1e-6, abs=1e-6)
-    for i in range(len(made.parts)):
+    for i in range(len(made.voyages)):
         less, _ = made.prior_without(i)
         gone = np.linalg.eigvalsh(ref.information - less)
         assert gone.min() > -1e-6 * gone.max()

@@ -57,7 +57,7 @@ def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
     families = {f.name: f.columns for f in (*made.discrepancy.families, *made.unseen.families)}
     at = columns.of.get(name, families.get(name))
     best = 0.0
-    for left_out, gram in enumerate(made.parts):
+    for left_out, gram in enumerate(made.voyages):
         information, pull = made.prior_without(left_out)
         usual = np.arange(1 + count)
         plain = marginal(SHARE * gram[np.ix_(usual, usual)], information, pull)
@@ -73,7 +73,7 @@ def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
 
 def test_a_campaign_of_no_parts_has_no_placebo():
     made = campaign(4.0)
-    none = replace(made, each=(), rows=())
+    none = replace(made, each=(), rows=(), voyage=np.zeros(0))
     assert set(placebos(none).values()) == {0.0}
 
 
