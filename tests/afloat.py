@@ -12,7 +12,7 @@ from pipelines.experiments import simulated_ship
 from shiplog import profile as profiles
 from shiplog.diagnosis import linearisation, residual_acceleration, segments
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear, Wide
+from shiplog.diagnosis.linear_segments import Linear, Wide
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
 from shiplog.models.mmg import body

@@ -15,15 +15,15 @@ from shiplog import profile as profiles
 from shiplog.diagnosis import (
     discrepancy,
     likelihood,
-    linearisation,
+    linear_segments,
     nominal_reference,
     segment_nodes,
     segments,
 )
 from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.evidence import Point
+from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_campaign import Campaign, prior
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.parameter_layout import Columns
@@ -176,7 +176,7 @@ def campaign(
     model = SimpleNamespace(causes=columns.causes, base=None)
     made = Reference(
         model, SETTING, np.zeros(COEFFICIENTS), columns, UNREST,  # type: ignore[arg-type]
-        linearisation.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor,
+        linear_segments.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor,
         1.0 / share, given, modes, nominal_reference.freedom(parts),
         misfit=seen if seen.families else None,  # type: ignore[arg-type]
         counts=share,

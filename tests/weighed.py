@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import straight
 
-from shiplog.diagnosis.evidence import Found
+from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import NOMINAL, Remainder

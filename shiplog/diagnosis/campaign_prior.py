@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import logsumexp
 
 from shiplog.diagnosis import nominal_reference
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
@@ -73,7 +72,7 @@ def learn(
                 kept = [g for j, g in enumerate(each) if j != left]
                 given = prior(kept, known, anchor, np.zeros(len(known)), share)
                 scores[i] += nominal_reference.marginal(gram, *given) - 0.5 * volume
-        whole = float(logsumexp(scores))
+        whole = float(np.logaddexp.reduce(scores))
         if whole < best:
             break
         weight = np.exp(scores - whole)

@@ -14,10 +14,11 @@ from shiplog.diagnosis import (
     unrecorded_thruster,
 )
 from shiplog.diagnosis import trial as diagnosis_trial
-from shiplog.diagnosis.evidence import Point, TrialEvidence
+from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.unrecorded_thruster import Pulses

@@ -18,7 +18,7 @@ import numpy as np
 from shiplog import channels, frames
 from shiplog.diagnosis import residual_acceleration
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.residual_acceleration import Unexplained
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body

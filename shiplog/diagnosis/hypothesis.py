@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import thresholds
-from shiplog.diagnosis.evidence import Found, Point
-from shiplog.diagnosis.linearisation import Path
+from shiplog.diagnosis.fitted import Found, Point
+from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause

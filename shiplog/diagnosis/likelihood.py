@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.timescale import BIN, KNOT
 
 SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Protocol
 
 import jax
@@ -22,6 +22,7 @@ import numpy as np
 from jax import Array
 
 from shiplog.diagnosis import variational_equations
+from shiplog.diagnosis.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.jit_cache import traced
 from shiplog.simulation.sensitivities import Physical, rate
@@ -112,92 +113,6 @@ def _slopes(model, theta, states, driven):
 
 
 # --- in numpy: one record, in flat memory ---------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Path:
-    """Where each segment was linearised: start [S, 6] and knots [S, 3, J] of acceleration."""
-
-    start: np.ndarray
-    push: np.ndarray
-
-    def at_nodes(self, g: SegmentGrid) -> np.ndarray:
-        return np.einsum("scj,kj->skc", self.push, g.weights)
-
-    @property
-    def known(self) -> np.ndarray:
-        """[S, 6 + 3J] what a linearisation puts back: the start is free, and its own value its
-        mean."""
-        return np.concatenate((np.zeros_like(self.start), self.push.reshape(len(self.push), -1)), 1)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Segments linearised: residual = Z z + J d + noise.
-
-    e   [S, B, 6]       measured less simulated, with the path's own z put back
-    z   [S, B, 6, Z]    by initial state (6) and knots (3J)
-    j   [S, B, 6, C]    by θ
-    lost [S]            bool: the model runs away there; rows of zeros, nothing of it is used
-    """
-
-    cut: Cut
-    path: Path
-    e: np.ndarray
-    z: np.ndarray
-    j: np.ndarray
-    lost: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    def __post_init__(self) -> None:
-        if len(self.lost) != len(self.cut):
-            object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
-
-    @property
-    def said(self) -> str:
-        """How many segments were left out; empty where none was."""
-        if not self.lost.any():
-            return ""
-        return (
-            f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
-            "the model runs away there."
-        )
-
-    def pick(self, keep: np.ndarray) -> Linear:
-        """Some of the segments."""
-        path = Path(self.path.start[keep], self.path.push[keep])
-        parts = (getattr(self, name)[keep] for name in ("e", "z", "j", "lost"))
-        return Linear(self.cut.pick(keep), path, *parts)
-
-    def less(self, pushed: np.ndarray) -> Linear:
-        """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
-        return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
-
-    def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
-        """Without what the numbers [S, C + W] of each segment do, SI: C of the columns of `j`, then
-        W that push [S, 3J, W] at the knots."""
-        count = self.j.shape[-1]
-        e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
-        return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))
-
-    def beside(self, other: Linear) -> Linear:
-        """These segments and others of the same record."""
-        path = Path(*(_both(self.path, other.path, name) for name in ("start", "push")))
-        parts = (_both(self, other, name) for name in ("e", "z", "j", "lost"))
-        return Linear(self.cut.beside(other.cut), path, *parts)
-
-
-def _both(one: object, other: object, name: str) -> np.ndarray:
-    return np.concatenate((getattr(one, name), getattr(other, name)))
-
-
-@dataclass(frozen=True)
-class Wide:
-    """How freely a path may be pulled: noise of one observation [6], of the start [6], and of
-    the acceleration's knots [3]."""
-
-    noise: np.ndarray
-    start: np.ndarray
-    push: np.ndarray
 
 
 def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) -> Path:

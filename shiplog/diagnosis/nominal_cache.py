@@ -16,10 +16,10 @@ import jax
 import numpy as np
 
 from shiplog import disk_cache, files
-from shiplog.diagnosis import nominal_campaign, nominal_reference
+from shiplog.diagnosis import campaign_characteristics, nominal_reference
+from shiplog.diagnosis.campaign_characteristics import Characteristics
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Path
-from shiplog.diagnosis.nominal_campaign import Characteristics
+from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
@@ -48,7 +48,7 @@ def settled(model: Extended, setting: Setting, start: Start, record: Record) -> 
 def characteristics(
     model: Extended, setting: Setting, start: Start, record: Record, at: Settled
 ) -> Characteristics:
-    """`nominal_campaign.characteristics`, worked out once for a model and a campaign."""
+    """`campaign_characteristics.characteristics`, worked out once for a model and a campaign."""
     key = _key(model, setting, start, record)
     kept = disk_cache.folder() / "settled" / f"{key}.characteristics.npz"
     known = _read(kept)
@@ -59,7 +59,7 @@ def characteristics(
             _known_unrest(known), given["deviation"], given["size"],
             float(known["apart"]), float(known["share"]), float(known["noise"]), known["weight"],
         )  # fmt: skip
-    found = nominal_campaign.characteristics(model, setting, start, record, at)
+    found = campaign_characteristics.characteristics(model, setting, start, record, at)
     arrays = _unrest(found.unrest) | {
         "apart": found.apart, "share": found.share, "noise": found.noise, "weight": found.weight,
     }  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 from shiplog.diagnosis import input_misfit, likelihood, linearisation, segments
 from shiplog.diagnosis.input_misfit import Misfit
 from shiplog.diagnosis.likelihood import Modes, Unrest
-from shiplog.diagnosis.linearisation import Linear, Path, Wide
+from shiplog.diagnosis.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.models.causes import Cause, Setting, constants_of

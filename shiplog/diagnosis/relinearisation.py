@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from shiplog.diagnosis.evidence import Found, Point, TrialEvidence
-from shiplog.diagnosis.linearisation import Path
+from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis.fitted import Found, Point
+from shiplog.diagnosis.linear_segments import Path
 
 RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute

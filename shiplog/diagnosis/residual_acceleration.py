@@ -13,7 +13,7 @@ import polars as pl
 
 from shiplog.diagnosis import segments
 from shiplog.diagnosis.likelihood import Unrest, starts_and_knots
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.recording import Record
 
 HALF_SEGMENT = 8  # knots: half a segment

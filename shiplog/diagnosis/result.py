@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.evidence import Found, Point, Told, TrialEvidence
+from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis.fitted import Found, Point, Told
 from shiplog.diagnosis.relinearisation import settle
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause, Shown

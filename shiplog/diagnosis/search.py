@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.diagnosis.evidence import Found, Level, Point
+from shiplog.diagnosis.fitted import Found, Level, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
 from shiplog.diagnosis.relinearisation import settle
 from shiplog.diagnosis.result import SHOWS_NATS

@@ -25,16 +25,11 @@ from shiplog.diagnosis import (
     segments,
     unrecorded_thruster,
 )
-from shiplog.diagnosis.evidence import Found, Level, Point
+from shiplog.diagnosis.campaign_parts import parts_of, products, robust_weights, squares
+from shiplog.diagnosis.fitted import Found, Level, Point
 from shiplog.diagnosis.likelihood import Modes, Weighed
-from shiplog.diagnosis.linearisation import Linear
-from shiplog.diagnosis.nominal_campaign import (
-    Campaign,
-    parts_of,
-    products,
-    robust_weights,
-    squares,
-)
+from shiplog.diagnosis.linear_segments import Linear
+from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.voyages.recording import Record

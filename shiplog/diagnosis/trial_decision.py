@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import placebo, refutation, setup, trial_voyages
-from shiplog.diagnosis.evidence import Point
+from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.search import Search

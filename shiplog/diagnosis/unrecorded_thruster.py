@@ -12,9 +12,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from shiplog.diagnosis import likelihood
-from shiplog.diagnosis.evidence import LOUDER, Found, Point, TrialEvidence
+from shiplog.diagnosis.evidence import LOUDER, TrialEvidence
+from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body

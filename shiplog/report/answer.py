@@ -10,7 +10,7 @@ from shiplog.diagnosis import error_location, next_manoeuvre, segments
 from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.report import verdict as verdicts

@@ -7,7 +7,7 @@ import pytest
 
 from shiplog.diagnosis import input_misfit, likelihood
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.segment_nodes import at_knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid

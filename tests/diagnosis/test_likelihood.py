@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from shiplog.diagnosis import likelihood
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_reference import inflation, marginal, usual
 from shiplog.diagnosis.segments import Cut
 from shiplog.voyages.timescale import KNOT

@@ -10,7 +10,7 @@ import pytest
 
 from shiplog import profile as profiles
 from shiplog.diagnosis import likelihood, linearisation, measurement_correction, segments
-from shiplog.diagnosis.linearisation import Path, Wide
+from shiplog.diagnosis.linear_segments import Path, Wide
 from shiplog.diagnosis.segments import Cut
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Setting

@@ -8,6 +8,8 @@ import straight
 from straight import CAUSES, SETTING, UNREST
 
 from shiplog.diagnosis import (
+    campaign_characteristics,
+    campaign_parts,
     campaign_prior,
     discrepancy,
     likelihood,
@@ -15,8 +17,8 @@ from shiplog.diagnosis import (
     nominal_reference,
     voyage_effects,
 )
+from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.campaign_prior import prior
-from shiplog.diagnosis.nominal_campaign import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.models.starting_values import Start
 
@@ -67,14 +69,14 @@ def test_products_of_parts_are_those_of_the_whole():
     weight = np.linspace(0.2, 1.0, 6)
     unit = columns.unit
     rows = [np.arange(2), np.arange(2, 6)]
-    found = nominal_campaign.products(modes, rows, unit, weight, 1.3)
+    found = campaign_parts.products(modes, rows, unit, weight, 1.3)
     wanted = np.zeros((1 + len(unit),) * 2)
     for s, (e, j, _, c) in enumerate(straight.dense(given, UNREST.louder(1.3))):
         both = np.concatenate((e[:, None], j * unit), 1)
         wanted += weight[s] * both.T @ np.linalg.solve(c, both)
     assert sum(found) == pytest.approx(wanted, rel=1e-6)
-    assert nominal_campaign.products(modes, rows, unit)[0] == pytest.approx(
-        nominal_campaign.products(modes, rows, unit, np.ones(6), 1.0)[0]
+    assert campaign_parts.products(modes, rows, unit)[0] == pytest.approx(
+        campaign_parts.products(modes, rows, unit, np.ones(6), 1.0)[0]
     )
 
 
@@ -82,9 +84,9 @@ def test_weights_of_segments_by_hand():
     """Six medians off is the edge; what is lost stays so and is not in the median."""
     square = np.array([1.0, 2.0, 3.0, 36.0, 1e9])
     kept = np.array([True, True, True, True, False])
-    found = nominal_campaign.robust_weights(square, kept)  # the median of four is 2.5
+    found = campaign_parts.robust_weights(square, kept)  # the median of four is 2.5
     assert found == pytest.approx([1.0, 1.0, 1.0, 15.0 / 36.0, 0.0])
-    assert nominal_campaign.robust_weights(square, np.zeros(5, dtype=bool)).tolist() == [0.0] * 5
+    assert campaign_parts.robust_weights(square, np.zeros(5, dtype=bool)).tolist() == [0.0] * 5
 
 
 # --- a campaign learned from a pass that is exactly linear
@@ -115,9 +117,9 @@ def learned(model):
     given = straight.passed(record, columns, numbers, told=0.3)
     at = Settled(np.zeros(2), given.path, UNREST)
     patch = pytest.MonkeyPatch()
-    patch.setattr(nominal_campaign, "read", lambda *_: (given.cut, None, None))
-    patch.setattr(nominal_campaign.linearisation, "linear", lambda *_: given)
-    found = nominal_campaign.characteristics(model, SETTING, START, record, at)
+    patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
+    patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
+    found = campaign_characteristics.characteristics(model, SETTING, START, record, at)
     made = nominal_campaign.learn(model, SETTING, START, record, at, found)
     patch.undo()
     return found, made
@@ -188,8 +190,8 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     columns = nominal_reference.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     given = straight.passed(record, columns, told=0.3)
-    monkeypatch.setattr(nominal_campaign, "read", lambda *_: (given.cut, None, None))
-    monkeypatch.setattr(nominal_campaign.linearisation, "linear", lambda *_: given)
+    monkeypatch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
+    monkeypatch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
     less = replace(found, deviation={n: v for n, v in found.deviation.items() if n != "drag"})
     at = Settled(np.zeros(2), given.path, UNREST)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)

@@ -8,7 +8,7 @@ import pytest
 
 from shiplog.diagnosis import residual_acceleration, segments
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear, Path
+from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.segments import Cut
 from shiplog.models.mmg import body
 from shiplog.voyages.recording import Record

@@ -11,7 +11,7 @@ from straight import CAUSES
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.evidence import Point
+from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses

@@ -20,8 +20,9 @@ from pipelines.experiments.simulated_ship import Laws, cases, sensors
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from shiplog import profile as profiles
-from shiplog.diagnosis import (  # fmt: skip
+from shiplog.diagnosis import (
     likelihood,
+    linear_segments,  # fmt: skip
     linearisation,
     measurement_correction,
     next_manoeuvre,
@@ -33,7 +34,7 @@ from shiplog.diagnosis import (  # fmt: skip
 )
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.evidence import Found
+from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.relinearisation import settle, within
 from shiplog.diagnosis.trial import Trial
@@ -391,8 +392,8 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
         np.zeros((count, 1, 1)), np.zeros(count), 0.2,
     )  # fmt: skip
-    path = linearisation.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
-    linear = linearisation.Linear(
+    path = linear_segments.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
+    linear = linear_segments.Linear(
         cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * knots)),
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip

@@ -19,8 +19,8 @@ from jax.typing import ArrayLike
 from pipelines.experiments.hidden_effects import plan, rivals, run, score, score_tables, suites
 from pipelines.experiments.hidden_effects.plan import Planned
 from pipelines.experiments.hidden_effects.score import Answer, Sealed
-from shiplog.diagnosis.linearisation import Linear
-from shiplog.diagnosis.linearisation import Path as Along
+from shiplog.diagnosis.linear_segments import Linear
+from shiplog.diagnosis.linear_segments import Path as Along
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.segments import BIN, Cut
 

@@ -28,9 +28,10 @@ import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
 from shiplog.diagnosis import likelihood, measurement_correction, segments
-from shiplog.diagnosis.evidence import Point, TrialEvidence
+from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import Unrest
-from shiplog.diagnosis.linearisation import Linear
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.segments import Cut

@@ -25,9 +25,9 @@ from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
 from shiplog.diagnosis import (
     baseline_check,
+    campaign_characteristics,
     discrepancy,
     nominal_cache,
-    nominal_campaign,
     placebo,
     posterior,
     refutation,
@@ -81,7 +81,7 @@ def _no_robust_weights(stack: ExitStack) -> None:
     def plain(square, kept):
         return np.where(kept, 1.0, 0.0)
 
-    for module in (nominal_campaign, sys.modules[Trial.__module__]):
+    for module in (campaign_characteristics, sys.modules[Trial.__module__]):
         stack.enter_context(patch.object(module, "robust_weights", plain))
     _learned_anew(stack)
 
@@ -129,7 +129,7 @@ def _learned_anew(stack: ExitStack) -> None:
     """What is kept in the cache was learned with the part."""
 
     def learned(*given):
-        return nominal_campaign.characteristics(*given)
+        return campaign_characteristics.characteristics(*given)
 
     stack.enter_context(patch.object(nominal_cache, "characteristics", learned))
 

@@ -1,0 +1,72 @@
+"""What a fit of a hypothesis gives: where a trial was linearised, numbers, evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shiplog.diagnosis.likelihood import Weighed
+from shiplog.diagnosis.linear_segments import Linear, Path
+
+
+@dataclass(frozen=True)
+class Found:
+    """One hypothesis.
+
+    evidence   log marginal likelihood [nats]: of a candidate and of a structure, above the base
+               hypothesis it stands beside; of a base hypothesis itself, as it is
+    louder     λ at which it is best
+    numbers    of each cause in it, as a change from what is usual, with their covariance
+    told       of a candidate: how much these data tell of it, were it there
+    """
+
+    name: str
+    evidence: float
+    louder: float
+    numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    covariance: np.ndarray | None = None
+    told: Told | None = None
+
+
+@dataclass(frozen=True)
+class Told:
+    """What evidence a cause may be expected to bring: ½ Σ each s² - cost, for numbers s in units of
+    their realistic size."""
+
+    each: np.ndarray
+    cost: float
+
+    def least(self, nats: float) -> np.ndarray:
+        """Of each number alone, the size that would bring so much [realistic sizes]."""
+        return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
+
+    def together(self, nats: float) -> float:
+        """The size that would, had all its numbers that size."""
+        return float(np.sqrt(2.0 * (nats + self.cost) / max(self.each.sum(), 1e-12)))
+
+
+@dataclass(frozen=True)
+class Point:
+    """A trial linearised where some causes' numbers stand."""
+
+    numbers: Mapping[str, np.ndarray]
+    path: Path
+    linear: Linear
+    weighed: Weighed
+
+
+@dataclass(frozen=True)
+class Level:
+    """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
+
+    The base holds the causes named already, free, beside all that is usual.
+    """
+
+    louder: float
+    gram: np.ndarray  # [1 + C, 1 + C]
+    logdet: float
+    inverse: np.ndarray  # of information and data together, base's own numbers last
+    solution: np.ndarray
+    value: float  # log evidence of the base
