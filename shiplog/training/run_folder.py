@@ -46,7 +46,8 @@ from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
 from shiplog.models.starting_values import Start
 from shiplog.paths import check_run, refuse_taken
-from shiplog.profile import Profile, advice
+from shiplog.profile import Profile
+from shiplog.profile_file import advice
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.prediction_interval import Band
 from shiplog.simulation.sensitivities import Simulator
