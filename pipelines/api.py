@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -19,8 +20,9 @@ from shiplog.exceptions import ShiplogError
 from shiplog.logs.health_report import VoyageReport
 from shiplog.report import page, tables
 from shiplog.report.verdict import Verdict
-from shiplog.training import run_folder
-from shiplog.training.run_folder import Run
+from shiplog.training import load_model
+from shiplog.training.load_model import Run
+from shiplog.training.options import TrainOptions
 from shiplog.voyages.store import Store
 
 Paths = str | Path | Iterable[str | Path]
@@ -127,51 +129,24 @@ def open_store(path: str | Path) -> Store:
     return store
 
 
-def train(
-    store: Store | str | Path,
-    out: str | Path,
-    *,
-    model: str = "feedforward",
-    voyages: Names = (),
-    validation: Names = (),
-    data: str = "ref",
-    seeds: int = 1,
-    window: int = 100,
-    recipe: str = "fast",
-    width: int = 256,
-    wind_input: str | None = None,
-    epochs: int | None = None,
-    fit: bool = True,
-    parameters: str | Path | None = None,
-    without: Sequence[str] = (),
-    free: Sequence[str] = (),
-    folds: int | None = None,
-) -> Run:
-    """A model of the voyages, as the run folder `out`. Arguments are those of `shiplog train`;
-    `window` is in samples at 1 Hz.
+def train(store: Store | str | Path, out: str | Path, **options: Any) -> Run:
+    """A model of the voyages, as the run folder `out`. The options are those of `TrainOptions`, as
+    `shiplog train` has them:
 
-    Raises ShiplogError for voyages that cannot be trained on and for a folder that is taken.
+        shiplog.train(store, "runs/mmg", model="mmg", voyages=["trial_*"])
+
+    Raises ShiplogError for voyages that cannot be trained on, for options that exclude each other
+    and for a folder that is taken; TypeError for an option that there is not.
     """
-    place, into = _path(store), Path(out)
-    shared = {
-        "model": model, "data": data, "voyages": _names(voyages),
-        "validation": _names(validation), "seeds": seeds, "window": window,
-    }  # fmt: skip
-    if model == "feedforward":
-        from pipelines.train import train_command
+    from pipelines.train import train_command
 
-        train_command(
-            place, into, **shared, recipe=recipe, width=width, wind_input=wind_input, epochs=epochs
-        )
-    else:
-        from pipelines.identify import identify_command
-
-        given = None if parameters is None else Path(parameters)
-        identify_command(
-            place, into, **shared, fit=fit, parameters=given, without=without, free=free,
-            folds=folds,
-        )  # fmt: skip
-    return run_folder.load(into)
+    names = {name: tuple(_names(options.pop(name, ()))) for name in ("voyages", "validation")}
+    patterns = {name: tuple(options.pop(name, ())) for name in ("without", "free")}
+    if (given := options.pop("parameters", None)) is not None:
+        options["parameters"] = Path(given)
+    into = Path(out)
+    train_command(_path(store), into, TrainOptions(**names, **patterns, **options))
+    return load_model.load(into)
 
 
 def load(path: str | Path, causes: Sequence[str | Path] = ()) -> Run:
@@ -179,7 +154,7 @@ def load(path: str | Path, causes: Sequence[str | Path] = ()) -> Run:
     are executed. Raises RunError."""
     from shiplog.models.causes import user
 
-    return run_folder.load(Path(path), user.load([Path(cause) for cause in causes]))
+    return load_model.load(Path(path), user.load([Path(cause) for cause in causes]))
 
 
 def evaluate(

@@ -28,9 +28,9 @@ from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, DiagnosedTrial
-from shiplog.training import run_folder
+from shiplog.training import extension_file, load_model
+from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
-from shiplog.training.run_folder import Run
 from shiplog.voyages import parts
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
@@ -55,7 +55,7 @@ def diagnose_run(
     if extend is not None:
         refuse_taken(extend, "--extend")
     causes = user.load(cause_files)
-    run = run_folder.load(run_path, causes)
+    run = load_model.load(run_path, causes)
     names = trial_voyages.voyages_of(run, store, voyages)
     profile = store.profile(names)
     if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
@@ -112,7 +112,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
             "this ship is not known, and causes that another fit would absorb are not tested."
         )
-    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else ""
+    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
     decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking)
     tried, judge = decided.trial, decided.judge
@@ -122,7 +122,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     whole = tried.covering(decided.point)
     pushed = error_location.pushed(tried, decided.point, whole)
     held, network, alone = judge, None, None
-    if not run.config.physical:
+    if not run.judges_itself:
         notes += answer.of_physics(run, tried, found)
         network = network_base.Own(run, tried)
         if cut is not None:
@@ -138,7 +138,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         seen = network.beside(decision)
         whole = seen[0].covering(seen[1].first)
     if held and decision.named and tried.reference.adapts:
-        if run.config.physical:
+        if run.judges_itself:
             notes.append(
                 f"{run.name} was made on these very voyages and may have learned of what is "
                 "wrong: numbers are then of what is left, and smaller than the cause's."
@@ -192,7 +192,7 @@ def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Pat
     if done.after is None:
         log.info("nothing was named that a model can take in: %s is not written", out)
         return
-    run_folder.extend(run, out, done.after, cause_files)
+    extension_file.extend(run, out, done.after, cause_files)
     log.info("extended model in %s", out)
 
 

@@ -19,8 +19,8 @@ from shiplog.report.comparison_data import BAND, ComparisonData, DrawnActuator
 from shiplog.report.judgement import MEANING, Judgement, force_line, judge
 from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
-from shiplog.training import run_folder
-from shiplog.training.run_folder import Run
+from shiplog.training import load_model
+from shiplog.training.load_model import Run
 from shiplog.voyages import one_hertz, parts, windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -119,7 +119,7 @@ def evaluate_runs(
     cause_files   Python files of the causes of the user's own that are in these runs
     """
     causes = user.load(cause_files)
-    opened = tuple(run_folder.load(path, causes) for path in paths)
+    opened = tuple(load_model.load(path, causes) for path in paths)
     first = opened[0]
     for other in opened[1:]:
         if other.config.window != first.config.window:
@@ -171,7 +171,7 @@ def save(evaluation: EvaluatedRuns) -> None:
 def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
     """What the viewer shows of an evaluation."""
     run = evaluation.runs[0]
-    labels = {r.name: f"{r.name} ({r.config.kind})" for r in evaluation.runs}
+    labels = {r.name: f"{r.name} ({r.config.legend})" for r in evaluation.runs}
     profile = run.profile
     return ComparisonData(
         title=title,
@@ -294,13 +294,8 @@ def _half_widths(
     learnt = run.band()
     if learnt is None or len(learnt.growth) != cut.state.shape[1]:
         return None
-    if run.config.physical:
-        spread = next(iter(models.values())).spread(cut)
-    else:
-        spread = prediction_interval.seeds_spread(
-            [one.simulated.numpy() for one in scores.values()]
-        )
-    return learnt.half_width(spread)
+    simulated = [one.simulated.numpy() for one in scores.values()]
+    return learnt.half_width(run.spread(models, simulated, cut))
 
 
 def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> pl.DataFrame:
@@ -325,13 +320,8 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
 
 def _forces(opened: tuple[Run, ...], rows: pl.DataFrame) -> pl.DataFrame | None:
     for run in opened:
-        if run.config.physical:
-            from shiplog.simulation import force_breakdown
-
-            simulator = run.simulator(run.config.seeds[0])
-            return force_breakdown.along(simulator, rows, run.profile).with_columns(
-                pl.lit(run.name).alias("run")
-            )
+        if (found := run.forces(rows)) is not None:
+            return found.with_columns(pl.lit(run.name).alias("run"))
     return None
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -13,19 +15,19 @@ from threadpoolctl import threadpool_limits
 
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
-from shiplog.models import mmg
-from shiplog.models.hybrid import Hybrid
-from shiplog.paths import refuse_taken
+from shiplog.models import MODELS
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
-from shiplog.training import identifiability, run_folder
+from shiplog.training import identifiability, load_model, run_folder, seed_files
 from shiplog.training.cross_validation import CrossValidated, cross_validate
+from shiplog.training.load_model import Run
 from shiplog.training.model_selection import choose_network, choose_ridge, physics
+from shiplog.training.options import TrainOptions
 from shiplog.training.output_error import Identified
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.run_config import Config
-from shiplog.training.run_folder import Run
+from shiplog.training.run_folder import RunFolder
 from shiplog.training.setup import Prepared, prepare
 from shiplog.voyages.split import choose_physical_split, plan, refuse_shared_rows, say
 from shiplog.voyages.store import Store
@@ -41,7 +43,23 @@ def identify_run(
 
     Raises ShiplogError.
     """
-    split, began = config.split, time.time()
+    began = time.time()
+    run, ready = _begin(config, store, out, parameters)
+    chosen: dict = {}
+    if not config.physics.fit:
+        said = _keep(run, ready)
+    else:
+        said, choices = _identify(run, ready)
+        chosen = {"chosen": choices}
+    done = run.finish(provenance(store, config.split, began) | chosen)
+    return load_model.of_folder(done), said
+
+
+def _begin(
+    config: Config, store: Store, out: Path, parameters: Path | None
+) -> tuple[RunFolder, Prepared]:
+    """The partial folder of a run, its equations, starting values and windows."""
+    split = config.split
     used = [*split.training, *split.validation]
     profile = store.profile(used)
     profile.require_actuators()
@@ -52,19 +70,15 @@ def identify_run(
     planned = plan(learnt, config.data, config.window)
     ready = prepare(config, profile, learnt, held, planned, parameters)
     able = len(set(ready.voyages)) > 1 and config.physics.folds > 1
-    if config.model == "hybrid" and not able and not held.height:
+    if MODELS[config.model].residual and not able and not held.height:
         raise RunError(
             "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
             hint="name a second voyage with --voyages and leave --folds out, or name one with "
             "--validation.",
         )
-    config = config.model_copy(
-        update={
-            "physics": config.physics.model_copy(
-                update={"parameters": ready.start.source, "substeps": ready.model.substeps}
-            )
-        }
-    )
+    resolved = {"parameters": ready.start.source, "substeps": ready.model.substeps}
+    settings = config.physics.model_copy(update=resolved)
+    config = config.model_copy(update={"physics": settings})
     run = run_folder.create(out, config, profile, None, planned, learnt, held)
     count = int(ready.free.sum()) if config.physics.fit else 0
     log.info(
@@ -72,11 +86,14 @@ def identify_run(
         run.label, count, len(ready.start.names), len(ready.voyages), listed(split.training),
         ready.start.source,
     )  # fmt: skip
-    if not config.physics.fit:
-        said = _keep(run, ready)
-        return run.finish(provenance(store, split, began)), said
+    return run, ready
 
-    chosen, found, said = choose_ridge(ready, config.physics)
+
+def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
+    """Every seed identified and saved, with its band. Returns what there is to say, and what
+    held-out voyages chose."""
+    settings = run.config.physics
+    chosen, found, said = choose_ridge(ready, settings)
     kept = {ready.data.weight.tobytes(): found}
 
     def refit(part: WindowSeries) -> Identified:
@@ -86,50 +103,89 @@ def identify_run(
             kept[key] = physics(ready, part, chosen.value)
         return kept[key]
 
-    before = losses(ready.model, ready.start.values, ready.data)
-    by_voyage = cross_validate(
-        lambda part: _simulator(ready.model, refit(part)),
-        ready.data, ready.voyages, config.physics.folds,
-    )  # fmt: skip
-    by_day = None
-    if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
-        by_day = cross_validate(
-            lambda part: _simulator(ready.model, refit(part)),
-            ready.data, ready.days, config.physics.folds,
-        )  # fmt: skip
-    said += [_sentence("training windows", before, losses(ready.model, found.values, ready.data))]
-    said += [
-        _sentence(f"windows of held-out {name}", before, one.loss)
-        for name, one in (("voyages", by_voyage), ("days", by_day))
-        if one is not None
-    ]
-    if by_voyage is None:
-        why = "One voyage only" if config.physics.folds > 1 else "No folds were asked for"
-        said.append(f"{why}: nothing was held out, so the gain is not tested.")
+    held_out = _hold_out(ready, refit, settings.folds)
+    said += held_out.sentences(ready, found, settings.folds)
     said += identifiability.note(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
-        mmg.meaning,
+        lambda name: ready.start.entry(name).meaning,
     )  # fmt: skip
     choices: dict = {"ridge": chosen.as_json()}
-    validated = by_voyage
-    for seed in config.seeds:
-        if config.model == "hybrid":
+    validated = held_out.by_voyage
+    for seed in run.config.seeds:
+        if run.kind.residual:
             network, simulator, done, sentence, validated = choose_network(
-                ready, config.physics, refit, by_voyage, seed
+                ready, settings, refit, held_out.by_voyage, seed
             )
             save(run, seed, ready, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
             said.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
-    if by_voyage is not None:
-        _save_cross_validation(run, before, by_voyage, by_day)
+    if held_out.by_voyage is not None:
+        run.save_cross_validation(held_out.table())
     _band(run, ready, validated)
-    return run.finish(provenance(store, split, began) | {"chosen": choices}), said
+    return said, choices
+
+
+class HeldOut(NamedTuple):
+    """Windows rolled out by fits that did not know their voyage, or their day.
+
+    before    [N] L of the starting values
+    by_day    None where a day is a voyage; both None where nothing can be held out
+    """
+
+    before: np.ndarray
+    by_voyage: CrossValidated | None
+    by_day: CrossValidated | None
+
+    @property
+    def parts(self) -> list[tuple[str, CrossValidated]]:
+        both = (("voyages", self.by_voyage), ("days", self.by_day))
+        return [(name, one) for name, one in both if one is not None]
+
+    def sentences(self, ready: Prepared, found: Identified, folds: int) -> list[str]:
+        """The gain on the training windows and on held-out ones."""
+        after = losses(ready.model, found.values, ready.data)
+        said = [_sentence("training windows", self.before, after)]
+        said += [
+            _sentence(f"windows of held-out {name}", self.before, one.loss)
+            for name, one in self.parts
+        ]
+        if self.by_voyage is None:
+            why = "One voyage only" if folds > 1 else "No folds were asked for"
+            said.append(f"{why}: nothing was held out, so the gain is not tested.")
+        return said
+
+    def table(self) -> pl.DataFrame:
+        """A row a window: held_out (voyages or days), group, window, start, loss."""
+        return pl.concat(
+            pl.DataFrame(
+                {
+                    "held_out": [name] * len(self.before),
+                    "group": one.groups,
+                    "window": np.arange(len(self.before)),
+                    "start": self.before,
+                    "loss": one.loss,
+                }
+            )
+            for name, one in self.parts
+        )
+
+
+def _hold_out(ready: Prepared, refit: Callable[[WindowSeries], Identified], folds: int) -> HeldOut:
+    def fit(part: WindowSeries) -> Simulator:
+        return _simulator(ready.model, refit(part))
+
+    before = losses(ready.model, ready.start.values, ready.data)
+    by_voyage = cross_validate(fit, ready.data, ready.voyages, folds)
+    by_day = None
+    if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
+        by_day = cross_validate(fit, ready.data, ready.days, folds)
+    return HeldOut(before, by_voyage, by_day)
 
 
 def save(
-    run: Run,
+    run: RunFolder,
     seed: int,
     ready: Prepared,
     simulator: Simulator,
@@ -156,8 +212,8 @@ def save(
         }
     )
     toml = start.with_values(values, source).to_toml()
-    fixed = simulator.model.residual.fixed if isinstance(simulator.model, Hybrid) else {}
-    run.save_simulator(seed, simulator, fixed, toml, identified)
+    fixed: Mapping[str, np.ndarray] = simulator.model.fixed  # type: ignore[attr-defined]
+    seed_files.save_physics(run.seed(seed), simulator, fixed, toml, identified)
 
 
 def _apart(days: list[str], voyages: list[str]) -> bool:
@@ -165,7 +221,7 @@ def _apart(days: list[str], voyages: list[str]) -> bool:
     return len(set(zip(days, voyages, strict=True))) > len(set(days))
 
 
-def _keep(run: Run, ready: Prepared) -> list[str]:
+def _keep(run: RunFolder, ready: Prepared) -> list[str]:
     """A run of the starting values as they are; their errors here no fit has seen."""
     nothing = np.zeros((len(ready.start.values),) * 2)
     simulator = Simulator(ready.model, ready.start.values, nothing)
@@ -180,11 +236,11 @@ def _keep(run: Run, ready: Prepared) -> list[str]:
     return [f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."]
 
 
-def _simulator(model: mmg.MMG, found: Identified) -> Simulator:
+def _simulator(model: Any, found: Identified) -> Simulator:
     return Simulator(model, found.values, found.covariance)
 
 
-def _band(run: Run, ready: Prepared, validated: CrossValidated | None) -> None:
+def _band(run: RunFolder, ready: Prepared, validated: CrossValidated | None) -> None:
     """Learn the band on every voyage that was held out: in turn, and those for validation."""
     errors, spreads, groups = [], [], 0
     if validated is not None:
@@ -192,7 +248,7 @@ def _band(run: Run, ready: Prepared, validated: CrossValidated | None) -> None:
         spreads.append(validated.spread)
         groups += len(set(ready.voyages))
     if ready.unseen is not None:
-        simulator = run.simulator(run.config.seeds[0])
+        simulator = load_model.of_folder(run).simulator(run.config.seeds[0])
         errors.append((simulator.simulate(ready.unseen) - ready.unseen.state).numpy())
         spreads.append(simulator.spread(ready.unseen))
         groups += ready.unseen.plan["voyage"].n_unique()
@@ -200,25 +256,6 @@ def _band(run: Run, ready: Prepared, validated: CrossValidated | None) -> None:
         run.save_band(
             prediction_interval.calibrate(np.concatenate(errors), np.concatenate(spreads), groups)
         )
-
-
-def _save_cross_validation(
-    run: Run, before: np.ndarray, by_voyage: CrossValidated, by_day: CrossValidated | None
-) -> None:
-    parts = [
-        pl.DataFrame(
-            {
-                "held_out": [name] * len(before),
-                "group": one.groups,
-                "window": np.arange(len(before)),
-                "start": before,
-                "loss": one.loss,
-            }
-        )
-        for name, one in (("voyages", by_voyage), ("days", by_day))
-        if one is not None
-    ]
-    run.save_cross_validation(pl.concat(parts))
 
 
 def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
@@ -229,45 +266,20 @@ def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
     )
 
 
-def identify_command(
-    store_path: Path,
-    out: Path,
-    *,
-    model: str,
-    data: str,
-    voyages: Sequence[str],
-    validation: Sequence[str],
-    seeds: int,
-    window: int,
-    fit: bool,
-    parameters: Path | None,
-    without: Sequence[str],
-    free: Sequence[str],
-    folds: int | None = None,
-) -> Answer:
-    """`shiplog train --model mmg|hybrid`."""
-    refuse_taken(out)
-    if model == "mmg" and seeds > 1:
+def identify_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
+    """`shiplog train` of a physical model."""
+    if not MODELS[options.model].residual and options.seeds > 1:
         log.info("an identification draws nothing: one seed stands for all")
-        seeds = 1
+        options = replace(options, seeds=1)
     store = Store(store_path)
-    split = choose_physical_split(store, voyages, validation, data, window)
-    say(split)
-    config = Config.model_validate(
-        {
-            "model": model,
-            "data": data,
-            "window": window,
-            "split": split,
-            "seeds": tuple(range(seeds)),
-            "physics": {"fit": fit, "without": tuple(without), "free": tuple(free)}
-            | ({} if folds is None else {"folds": folds}),
-        }
+    split = choose_physical_split(
+        store, options.voyages, options.validation, options.data, options.window
     )
-    run, said = identify_run(config, store, out, parameters)
+    say(split)
+    run, said = identify_run(options.config(split), store, out, options.parameters)
     identified = run.identified()
     lines = [f"{run.label} in {run.path}.", *said, ""]
-    if fit:
+    if options.fit:
         lines += [tables.parameters_table(identified), ""]
     lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
     content = {

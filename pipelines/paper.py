@@ -20,10 +20,11 @@ from shiplog.report import tables, viewer
 from shiplog.report.paper import figures, sets, statements
 from shiplog.report.paper.style import named
 from shiplog.training import run_folder
+from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
 from shiplog.training.run_config import Config
-from shiplog.training.run_folder import Run
+from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import parts
 from shiplog.voyages.split import choose_split, say
 from shiplog.voyages.split_settings import Split
@@ -65,7 +66,7 @@ class Results:
     compared    see `statements.differences`
     """
 
-    runs: dict[str, Run]
+    runs: dict[str, RunFolder]
     failures: dict[str, str]
     losses: pl.DataFrame
     histories: pl.DataFrame
@@ -94,8 +95,8 @@ def paper_command(
     chosen = choose_voyages(store, voyages, validation, window)
     say(chosen.of("d-ref"))
     log.info("reference set: %s", listed(chosen.reference))
-    settings = train.settings_of(recipe, window, seeds, width, epochs)
-    settings["standard"] = chosen.reference
+    options = TrainOptions(recipe=recipe, window=window, seeds=seeds, width=width, epochs=epochs)
+    settings = options.settings() | {"standard": chosen.reference}
     configs = {
         name: Config.model_validate({**settings, "data": name, "split": chosen.of(name)})
         for name in data
@@ -167,9 +168,9 @@ def _halved(name: str, length: int) -> str:
 
 def train_sets(
     configs: Mapping[str, Config], store: Store, out: Path, jobs: int | None, ray: str | None
-) -> tuple[dict[str, Run], dict[str, str]]:
+) -> tuple[dict[str, RunFolder], dict[str, str]]:
     """Every training of every set in one queue. Finished sets, and trainings that failed."""
-    finished: dict[str, Run] = {}
+    finished: dict[str, RunFolder] = {}
     begun: dict[str, train.Begun] = {}
     failures: dict[str, str] = {}
     tasks: list[Task] = []
@@ -177,7 +178,7 @@ def train_sets(
         path = out / name
         try:
             if path.is_dir():
-                finished[name] = _same(run_folder.load(path), config)
+                finished[name] = _same(run_folder.open_finished(path), config)
                 continue
             begun[name] = train.begin(config, store, path)
         except ShiplogError as error:  # such as a folder that is of other settings
@@ -196,7 +197,7 @@ def train_sets(
     return {name: finished[name] for name in configs if name in finished}, failures
 
 
-def _same(run: Run, config: Config) -> Run:
+def _same(run: RunFolder, config: Config) -> RunFolder:
     """A finished run of these very settings. Raises RunError for any other."""
     if run.config != config:
         raise RunError(
@@ -206,7 +207,7 @@ def _same(run: Run, config: Config) -> Run:
     return run
 
 
-def collect(finished: dict[str, Run], failures: dict[str, str], store: Store) -> Results:
+def collect(finished: dict[str, RunFolder], failures: dict[str, str], store: Store) -> Results:
     """Test losses, validation losses and comparisons of the sets that are finished."""
     test = next(iter(finished.values())).config.split.test
     evaluation = evaluate_runs([run.path for run in finished.values()], store, test)

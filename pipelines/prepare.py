@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.logs.check import check
 from shiplog.logs.health_report import Finding, VoyageReport

@@ -8,27 +8,30 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
 import torch
 
 from pipelines.bars import Bars
+from pipelines.identify import identify_command
 from shiplog import random_streams
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
+from shiplog.models import MODELS, NETWORK, PHYSICS
 from shiplog.models.feedforward import scaling
 from shiplog.paths import refuse_taken
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
-from shiplog.training import network_gradient, run_folder
+from shiplog.training import load_model, network_gradient, run_folder, seed_files
 from shiplog.training.job import Training
+from shiplog.training.load_model import NetworkRun, Run
 from shiplog.training.network_training import Progress
+from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.queue import Report, Task, work
 from shiplog.training.run_config import Config
-from shiplog.training.run_folder import Run
+from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import windows
 from shiplog.voyages.split import choose_split, plan, refuse_shared_rows, say
 from shiplog.voyages.store import Store
@@ -55,7 +58,7 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
 class Begun:
     """A run that is being trained: its partial folder, and what finishing it needs."""
 
-    run: Run
+    run: RunFolder
     held: pl.DataFrame
     store: Store
     began: float
@@ -87,12 +90,13 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
 
 def finish(begun: Begun) -> Run:
     """The run with its name, all seeds being trained."""
-    run = begun.run
+    run = load_model.network(begun.run)
     run.save_band(_band(run, begun.held))
-    return run.finish(provenance(begun.store, run.config.split, begun.began))
+    done = run.finish(provenance(begun.store, run.config.split, begun.began))
+    return load_model.of_folder(done)
 
 
-def tasks_of(run: Run) -> list[Task]:
+def tasks_of(run: RunFolder) -> list[Task]:
     """The trainings of a run that are not finished; windows of an epoch are what they cost."""
     cost = float(run.windows().height)
     if run.config.recipe == "fast":
@@ -123,7 +127,7 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
     return failures
 
 
-def _band(run: Run, held: pl.DataFrame) -> prediction_interval.Band:
+def _band(run: NetworkRun, held: pl.DataFrame) -> prediction_interval.Band:
     """How far off its seeds were on the validation voyages, which they did not learn from."""
     unseen = _cut(run, held, plan(held, "ref", run.config.window))
     simulated = [simulate(model, unseen).numpy() for model in run.models().values()]
@@ -132,7 +136,7 @@ def _band(run: Run, held: pl.DataFrame) -> prediction_interval.Band:
     return prediction_interval.calibrate(error, spread, len(run.config.split.validation))
 
 
-def training_of(run: Run, seed: int) -> Training:
+def training_of(run: NetworkRun, seed: int) -> Training:
     """One seed of a begun run, with its windows."""
     config = run.config
     scale, shape = run.scaling(), run.shape
@@ -150,64 +154,39 @@ def train_seed(path: Path, seed: int, report: Report | None = None) -> tuple[flo
     """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
     torch.set_num_threads(1)
     began = time.time()
-    run = run_folder.open_folder(path)
+    run = load_model.network(run_folder.open_folder(path))
+    folder = run.seed(seed)
 
     def keep(progress: Progress) -> None:
-        run.save_checkpoint(seed, progress)
+        seed_files.save_checkpoint(folder, progress)
 
-    progress = training_of(run, seed).run(run.load_checkpoint(seed), keep, report=report)
-    run.save_seed(seed, progress)
+    progress = training_of(run, seed).run(seed_files.load_checkpoint(folder), keep, report=report)
+    seed_files.save_network(folder, progress)
     return progress.best, progress.epoch, time.time() - began
 
 
-def _cut(run: Run, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
+def _cut(run: RunFolder, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
     names = (run.profile.actuator_names, run.profile.wind_names)
     return windows.cut(rows, planned, run.config.window, *names)
 
 
-def settings_of(
-    recipe: str, window: int, seeds: int, width: int, epochs: int | None
-) -> dict[str, Any]:
-    """A configuration as the options of the command line have it, without its voyages."""
-    return {
-        "recipe": recipe,
-        "window": window,
-        "seeds": tuple(range(seeds)),
-        "network": {"width": width},
-        "paper": {"most_epochs": epochs} if epochs else {},
-        "fast": {"iterations": epochs} if epochs else {},
-    }
-
-
-def train_command(
-    store_path: Path,
-    out: Path,
-    *,
-    model: str,
-    data: str,
-    voyages: Sequence[str],
-    validation: Sequence[str],
-    seeds: int,
-    recipe: str,
-    window: int,
-    width: int,
-    wind_input: str | None,
-    epochs: int | None,
-) -> Answer:
+def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     """`shiplog train`: choices checked, split chosen and said, every seed trained."""
+    options.check()
     refuse_taken(out)
+    return FLOWS[MODELS[options.model].family.name](store_path, out, options)
+
+
+def _network(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     store = Store(store_path)
-    split = choose_split(store, voyages, validation, data, window)
+    split = choose_split(store, options.voyages, options.validation, options.data, options.window)
     say(split)
-    settings = settings_of(recipe, window, seeds, width, epochs)
-    if wind_input:
-        settings["network"]["wind_input"] = wind_input
-    config = Config.model_validate({**settings, "model": model, "data": data, "split": split})
+    config = options.config(split)
     run = train_run(config, store, out)
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     said = ", ".join(f"{loss:.0f}" for loss in best.values())
     text = (
-        f"{run.label} in {run.path}: best validation L {said} (seeds 0 to {seeds - 1}).\n"
+        f"{run.label} in {run.path}: best validation L {said} (seeds 0 to {options.seeds - 1}).\n"
         f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
     content = {
@@ -219,3 +198,6 @@ def train_command(
         "split": split.model_dump(mode="json"),
     }
     return Answer(text, content)
+
+
+FLOWS = {NETWORK.name: _network, PHYSICS.name: identify_command}

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pipelines.experiments import simulated_ship
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import linearisation, residual_acceleration, segments
 from shiplog.diagnosis.likelihood import Unrest
 from shiplog.diagnosis.linear_segments import Linear, Wide

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.logs.write import Series, write_log
+from shiplog.profile import Profile
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.store import Store
 
@@ -61,7 +62,7 @@ unit = "rpm"
 """
 
 
-def profile(text: str = PROFILE) -> profiles.Profile:
+def profile(text: str = PROFILE) -> Profile:
     return profiles.parse(text, "circle.toml")
 
 

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import (
     discrepancy,
     likelihood,

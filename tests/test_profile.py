@@ -7,16 +7,16 @@ import pytest
 import sailing
 
 from pipelines.experiments import profile_reference
-from shiplog import profile, units
+from shiplog import profile, profile_file, units
 from shiplog.exceptions import ProfileError
 
 ARM, SIGMA = "lever_arm_m = [0.7, -0.2]", "sigma = 0.01"
 FINITE = "has to be a finite number"
 
 
-@pytest.mark.parametrize("name", profile.shipped())
+@pytest.mark.parametrize("name", profile_file.shipped())
 def test_every_shipped_profile_is_taken(name):
-    assert profile.load(name).source == name
+    assert profile_file.load(name).source == name
 
 
 @pytest.mark.parametrize(
@@ -54,9 +54,9 @@ def test_a_profile_that_is_no_text_or_no_file(tmp_path):
     bad = tmp_path / "bad.toml"
     bad.write_bytes(b"\xff\xfe[ship]")
     with pytest.raises(ProfileError, match="UTF-8"):
-        profile.load(bad)
+        profile_file.load(bad)
     with pytest.raises(ProfileError, match="is a folder"):
-        profile.load(tmp_path)
+        profile_file.load(tmp_path)
 
 
 def test_the_reference_is_what_the_code_reads():
@@ -72,10 +72,10 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     keys = {key for section in sections for key in section.model_fields}
     kinds = {f'"{kind}"' for each in profile.KINDS.values() for kind in each}
     channels = {name for names in profile.TABLE_CHANNELS.values() for name in names}
-    for word in (*keys, *kinds, *channels, *profile.LABELS, *units.TO_SI, *profile.shipped()):
+    for word in (*keys, *kinds, *channels, *profile.LABELS, *units.TO_SI, *profile_file.shipped()):
         assert f"`{word}`" in page
     example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
-    ship = profile.parse(textwrap.dedent(example), "docs/profile.md")
+    ship = profile_file.parse(textwrap.dedent(example), "docs/profile.md")
     assert ship.sensors.position.lever_arm_m == (3.2, 0.0)
 
 
@@ -93,6 +93,6 @@ def test_what_a_log_does_not_have_is_said_with_what_records_it(sensors, said):
     ship, actuators = sections[0], "[[actuators]]" + sailing.PROFILE.split("[[actuators]]", 1)[1]
     text = "".join((ship, *(f"[sensors.{part}" for part in kept), actuators))
     with pytest.raises(ProfileError) as refused:
-        profile.parse(text, "circle.toml")
+        profile_file.parse(text, "circle.toml")
     assert said in str(refused.value)
     assert ("record a gyro or a GNSS compass" in str(refused.value)) == ("heading" not in sensors)

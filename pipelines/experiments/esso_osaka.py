@@ -17,7 +17,7 @@ from pipelines.convert import convert
 from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from pipelines.prepare import expand, ingest_logs
 from pipelines.train import train_run
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.training.run_config import Config
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic.fields import FieldInfo
 
-from shiplog import profile, units
+from shiplog import profile, profile_file, units
 from shiplog.profile import KINDS, LABELS, TABLE_CHANNELS, Section
 from shiplog.report import tables
 
@@ -107,7 +107,7 @@ def text() -> str:
             "Factors to SI; shafts are in rev/s.\n",
             _units(),
             "\n## Shipped profiles\n",
-            ", ".join(f"`{name}`" for name in profile.shipped())
+            ", ".join(f"`{name}`" for name in profile_file.shipped())
             + ": in `shiplog/profiles/`, to start from.",
             "",
         )

@@ -1,48 +1,10 @@
-"""What a command line asks for, checked before anything heavy is loaded: a wrong word is said at
-once, and not after the work."""
+"""What a command line asks for, found before anything heavy is loaded."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from shiplog.exceptions import ShiplogError, UsageError, listed, nearest
-from shiplog.models import MODELS
-from shiplog.training.run_config import RECIPES, WIND_INPUTS
-from shiplog.voyages.augmentation import AUGMENTATIONS
-
-
-def check_training(
-    model: str, data: str, recipe: str, wind_input: str | None, physical: dict[str, bool]
-) -> None:
-    """Raises UsageError for a word that names nothing, and for options that exclude each other.
-
-    physical   options of the physical models only, and whether they were given
-    """
-    for value, allowed, option in (
-        (model, MODELS, "--model"),
-        (data, AUGMENTATIONS, "--data"),
-        (recipe, RECIPES, "--recipe"),
-        (wind_input or WIND_INPUTS[0], WIND_INPUTS, "--wind-input"),
-    ):
-        if value not in allowed:
-            raise UsageError(
-                f"{option} {value!r} does not exist{nearest(value, allowed)}.",
-                hint=f"{option} can be {listed(allowed)}.",
-            )
-    given = [option for option, was in physical.items() if was]
-    if model == "feedforward" and given:
-        raise UsageError(
-            f"{given[0]} says nothing to a network.", hint="it goes with --model mmg or hybrid."
-        )
-    if model == "hybrid" and physical["--no-fit"]:
-        raise UsageError(
-            "A hybrid's network has to be fitted.", hint="--no-fit goes with --model mmg."
-        )
-    if model != "feedforward" and AUGMENTATIONS[data].copies:
-        raise UsageError(
-            f"--data {data} is of noisy copies, which an identification has no use for.",
-            hint=f"choose {listed(n for n, a in AUGMENTATIONS.items() if not a.copies)}.",
-        )
+from shiplog.exceptions import ShiplogError
 
 
 def sample_logs(given: Path | None = None) -> Path:

@@ -35,7 +35,7 @@ def convert(
     from shiplog.paths import check_writable
 
     check_writable(out, "--out")
-    from shiplog import profile as profiles
+    from shiplog import profile_file as profiles
 
     ship = profiles.load(profile) if profile else None
     from pipelines.convert import convert as convert_tables

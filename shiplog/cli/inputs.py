@@ -9,7 +9,7 @@ from pathlib import Path
 def check_paths(logs: Sequence[Path], profile: str | None) -> None:
     """Raises ShiplogError where there is no such profile, or none of the logs is there; one of
     several that is not there does not stop the others."""
-    from shiplog import profile as profiles
+    from shiplog import profile_file as profiles
     from shiplog.exceptions import LogUnreadable
 
     if profile is not None:

@@ -47,13 +47,13 @@ def paper(
 
     Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
     """
-    from shiplog.cli.arguments import check_training
     from shiplog.paths import check_writable
+    from shiplog.training.options import TrainOptions
     from shiplog.voyages.augmentation import AUGMENTATIONS
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
     for name in chosen:
-        check_training("feedforward", name, recipe, None, {})
+        TrainOptions(data=name, recipe=recipe).check()
     check_writable(out, "--out")
     check_voyages(store, voyages, validation)
     from pipelines.paper import paper_command

@@ -12,7 +12,7 @@ from shiplog.simulation import baselines
 from shiplog.simulation.error_reduction import parts
 from shiplog.simulation.rollout import rollout
 from shiplog.simulation.sensitivities import series
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages.store import Store
 
 WORDS = ("surge", "sway", "yaw")
@@ -24,8 +24,8 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
     Quadratic least squares is fitted to all nominal voyages but one in turn, and rolled out on
     that one, while the physics have seen all of them: the comparison favours the physics.
     """
-    if not run.config.physical:
-        return ""
+    if run.lacks or not run.judges_itself:
+        return run.lacks
     cut = windows_of(run, store, run.made_on, profile)
     voyages = [] if cut is None else cut.plan["voyage"].to_list()
     names = list(dict.fromkeys(voyages))

@@ -27,7 +27,7 @@ from shiplog.simulation import coverage as covering
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.extended_simulator import campaign
 from shiplog.simulation.sensitivities import series
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages import one_hertz
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows

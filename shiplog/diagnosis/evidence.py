@@ -19,7 +19,6 @@ from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.models.causes import Cause
-from shiplog.models.compiled_network import Network
 from shiplog.voyages.recording import Record
 
 LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
@@ -372,7 +371,7 @@ class TrialEvidence:
 
     def _coefficients(self, level: Level) -> np.ndarray:
         ref, count = self.reference, self.reference.columns.base
-        if isinstance(ref.model.base, Network):
+        if ref.model.bends:
             assert ref.misfit is not None
             columns = ref.columns
             return ref.misfit.bends(level.solution[columns.linearised : len(columns.unit)])

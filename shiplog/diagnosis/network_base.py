@@ -9,7 +9,7 @@ from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial_voyages import constants_for
 from shiplog.models.extended import Extended
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 
 
 class Own:

@@ -23,7 +23,6 @@ from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.models.causes import Cause, Setting, constants_of
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
-from shiplog.models.mmg.model import MMG
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
@@ -96,8 +95,7 @@ class Reference:
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
         """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
-        own = isinstance(self.model.base, MMG)
-        values = self.theta if own else np.asarray(self.model.stand_in_values)
+        values = self.theta if self.model.own else np.asarray(self.model.stand_in_values)
         return dict(zip(self.model.stand_in.names, values, strict=True))
 
 

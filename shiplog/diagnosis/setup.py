@@ -12,7 +12,7 @@ from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.trial_voyages import model_of, setting_of
 from shiplog.models import causes as catalogue
 from shiplog.models.causes import Cause
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages.recording import Record
 
 
@@ -38,7 +38,7 @@ def trial_of(
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
     extension = run.extension
     held = {} if extension is None else {c.label: c for c in extension.causes}
-    fitted = "" if nominal is not None or run.given else _fitted(run)
+    fitted = "" if nominal is not None or run.given else run.kind.family.name
     wanted = [c for c in (*catalogue.CATALOGUE, *own)
               if c.label not in held]  # fmt: skip
     chosen, untested = catalogue.testable(setting, wanted, fitted)
@@ -48,7 +48,7 @@ def trial_of(
     every: list[Cause] = [*held.values(), *(c for c in chosen if c.label not in held)]
     model, start = model_of(run, every, setting)
     if nominal is None:
-        inputs = None if run.config.physical else run.base()[0]
+        inputs = None if run.judges_itself else run.base()[0]
         campaign = nominal_campaign.assumed(
             model, setting, start, recorded, run.given, inputs, numbers
         )
@@ -62,8 +62,3 @@ def trial_of(
         found = nominal_cache.characteristics(plain, before, start, nominal, at)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
     return Setup(Trial(campaign, recorded, tuple(held)), untested)
-
-
-def _fitted(run: Run) -> str:
-    """What was fitted to the very voyages in question, as `causes.testable` calls it."""
-    return "physics" if run.config.physical else "network"

@@ -16,7 +16,7 @@ from shiplog.models.mmg import estimate
 from shiplog.models.starting_values import Start
 from shiplog.profile import Profile
 from shiplog.simulation.extended_simulator import ExtendedSimulator, campaign
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages import one_hertz, parts, recording, timescale, windows
 from shiplog.voyages.recording import Record
 from shiplog.voyages.split import plan
@@ -73,7 +73,7 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
 
 def simulator(run: Run, trial: TrialEvidence) -> ExtendedSimulator:
     """What judges in a trial, with what the run has of causes, as it stands before any more."""
-    if run.config.physical:
+    if run.judges_itself:
         return run.extended(run.config.seeds[0], trial.record)
     ref = trial.reference
     held = () if run.extension is None else run.extension.causes
@@ -90,11 +90,7 @@ def simulator(run: Run, trial: TrialEvidence) -> ExtendedSimulator:
 
 def model_of(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
     """The run's physics with room for these causes, and where its coefficients stand."""
-    if run.config.physical:
-        base, start, stand_in, values = run.base()
-    else:
-        base, start = run.ship()
-        stand_in, values = base, start.values
+    base, start, stand_in, values = run.judge()
     constants = constants_for(run, causes, setting)
     return Extended(base, tuple(causes), stand_in, values, constants), start
 

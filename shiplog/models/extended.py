@@ -30,7 +30,8 @@ from shiplog.models.mmg.model import MMG, named, total
 class Extended:
     """θ is the base's, then the causes' numbers, one cause after another.
 
-    base             any physical model; MMG itself or one with the same protocol
+    base             any equations; those with `acceleration_of` take coefficients by name, and
+                     are an MMG's
     stand_in         an MMG of the ship, whose coefficients the causes change
     stand_in_values  [P'] its coefficients where the base is no MMG
     constants        what the causes' forces need and nobody fits
@@ -43,6 +44,16 @@ class Extended:
     stand_in: MMG
     stand_in_values: np.ndarray | Array
     constants: Mapping[str, np.ndarray | Array]
+
+    @property
+    def own(self) -> bool:
+        """Whether causes change the base's own coefficients, and not those of the stand-in."""
+        return hasattr(self.base, "acceleration_of")
+
+    @property
+    def bends(self) -> bool:
+        """Whether the base is a network: it has no coefficients, and weights bend it."""
+        return hasattr(self.base, "bend")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,12 +98,12 @@ class Extended:
         at = dict(self.constants)
         before = named(
             self.stand_in.names,
-            values if isinstance(self.base, MMG) else jnp.asarray(self.stand_in_values),
+            values if self.own else jnp.asarray(self.stand_in_values),
         )
         after = before
         for cause, p in zip(self.causes, numbers, strict=True):
             after = cause.coefficients(after, p, wet, share, at)
-        if isinstance(self.base, MMG):
+        if self.own:
             acceleration = self.base.acceleration_of(after, wet, actuator, wind)
         else:
             acceleration = self.base.acceleration(values, wet, actuator, wind)

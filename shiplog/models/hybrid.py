@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,8 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog.models import mmg
+from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.wind import apparent
+from shiplog.models.physical import PhysicalModel, Settings
+from shiplog.profile import Profile
 
 ANCHORS = 200  # training samples that stand for all of them in the distance
 FADE_LIMITS = 2.0  # limits of the coverage figure beyond the training data, where nothing is left
@@ -56,7 +61,7 @@ class Residual:
 
     @property
     def fixed(self) -> dict[str, np.ndarray]:
-        """All but the width, as a run folder keeps it."""
+        """All but the width."""
         names = ("mean", "std", "bound", "anchors", "radius", "limit")
         return {name: np.asarray(getattr(self, name)) for name in names}
 
@@ -89,6 +94,11 @@ class Hybrid:
             for i in range(int(np.prod(shape)))
         ]
         return (*self.physics.names, *weights)
+
+    @property
+    def fixed(self) -> dict[str, np.ndarray]:
+        """Arrays that are no coefficients and belong to a run of it: the network's."""
+        return {f"residual.{name}": value for name, value in self.residual.fixed.items()}
 
     def features(self, state: Array, actuator: Array, true_wind: Array) -> Array:
         """z [..., Z], standardised."""
@@ -128,6 +138,30 @@ class Hybrid:
         count = len(self.physics.names)
         physics = self.physics.acceleration(theta[:count], state, actuator, true_wind)
         return physics + self.added(theta, state, actuator, true_wind)
+
+    def forces(
+        self, theta: Array, state: Array, actuator: Array, true_wind: Array
+    ) -> dict[str, Array]:
+        """As MMG.forces. What the network adds is its acceleration times the mass with added
+        mass."""
+        count = len(self.physics.names)
+        parts = dict(self.physics.forces(theta[:count], state, actuator, true_wind))
+        p = dict(zip(self.physics.names, theta[:count], strict=True))
+        added = self.added(theta, state, actuator, true_wind)
+        return parts | {"network": body.forces_of(p, self.physics.geometry, added)}
+
+
+def opened(profile: Profile, settings: Settings, arrays: Mapping[str, np.ndarray]) -> Hybrid:
+    """The equations of a run, with the network's scaling and anchors among its arrays. Raises
+    ProfileError, and TypeError where arrays are missing."""
+    prefix = "residual."
+    fixed = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+    physics = mmg.opened(profile, settings, arrays)
+    return Hybrid(physics, Residual(width=settings.width, **fixed))  # type: ignore[arg-type]
+
+
+# Its physics are identified first, as an MMG; the network is fitted on top of them.
+MODEL = PhysicalModel(mmg.begin, opened)
 
 
 def first_weights(residual: Residual, rng: np.random.Generator) -> np.ndarray:

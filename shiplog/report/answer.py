@@ -17,7 +17,7 @@ from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages import timescale
 from shiplog.voyages.recording import Record
 

@@ -14,7 +14,6 @@ import torch
 
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
-from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
 from shiplog.profile import Profile
 from shiplog.simulation.sensitivities import WindowSeries, rollout, series, state_losses
@@ -86,7 +85,7 @@ class ExtendedSimulator:
         fitted beside them; of a network its bends [F, 3]. Raises ValueError where they are not
         of this base."""
         base, own = self.model.base, coefficients
-        if own is not None and isinstance(base, Network):
+        if own is not None and self.model.bends:
             base, own = base.bend(own), None
         model = replace(
             self.model,

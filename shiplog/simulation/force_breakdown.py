@@ -8,8 +8,6 @@ import numpy as np
 import polars as pl
 
 from shiplog.channels import STATE
-from shiplog.models.hybrid import Hybrid
-from shiplog.models.mmg import MMG, body
 from shiplog.profile import Profile
 from shiplog.simulation.sensitivities import Simulator, true_wind
 
@@ -17,8 +15,7 @@ from shiplog.simulation.sensitivities import Simulator, true_wind
 def along(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.DataFrame:
     """Part by part at every measured second: voyage, time, part, surge [N], sway [N], yaw [N m].
 
-    seconds   the 1 Hz table with `elapsed`; the forces are those at the measured motion. What a
-              hybrid's network adds is its acceleration times the mass with added mass.
+    seconds   the 1 Hz table with `elapsed`; the forces are those at the measured motion
     """
     state = jnp.array(seconds.select([c.name for c in STATE]).to_numpy())
     actuator = jnp.array(seconds.select(profile.actuator_names).to_numpy())
@@ -39,11 +36,4 @@ def along(simulator: Simulator, seconds: pl.DataFrame, profile: Profile) -> pl.D
 
 @jax.jit
 def _parts(model, theta, state, actuator, wind):
-    physics: MMG = model.physics if isinstance(model, Hybrid) else model
-    count = len(physics.names)
-    parts = dict(physics.forces(theta[:count], state, actuator, wind))
-    if isinstance(model, Hybrid):
-        p = dict(zip(physics.names, theta[:count], strict=True))
-        added = model.added(theta, state, actuator, wind)
-        parts["network"] = body.forces_of(p, physics.geometry, added)
-    return parts
+    return model.forces(theta, state, actuator, wind)

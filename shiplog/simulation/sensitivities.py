@@ -28,7 +28,8 @@ WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
 
 class Physical(Protocol):
-    """Equations of motion that can be compiled, their numbers in a vector of their own.
+    """Equations of motion that can be compiled, their numbers in a vector of their own. Those that
+    a run is made of also have `fixed`, arrays to keep with the numbers, and `forces` by part.
 
     A JAX pytree: `jax.tree_util.register_static` for what is hashable and never changes shape.
     """
@@ -39,6 +40,11 @@ class Physical(Protocol):
     @property
     def substeps(self) -> int:
         """Euler steps within each measured one."""
+        ...
+
+    @property
+    def smooth(self) -> float:
+        """s between which its derivatives change little."""
         ...
 
     def acceleration(

@@ -6,13 +6,12 @@ without error: such a run simulates what it did when it was made.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shiplog.exceptions import RunError, listed
-from shiplog.models import mmg
 
 
 @dataclass(frozen=True)
@@ -43,11 +42,18 @@ class Kept:
         return len(self.neutral)
 
 
-def kept(physics: Sequence[str], count: int, names: Sequence[str]) -> Kept:
+def kept(
+    physics: Sequence[str],
+    count: int,
+    names: Sequence[str],
+    neutral_of: Callable[[str], float | None],
+) -> Kept:
     """Where numbers that were kept as `physics`, `count` of them with a network's weights, go.
 
-    physics   names of the physical coefficients when the run was made
-    names     of today's parameter vector
+    physics     names of the physical coefficients when the run was made
+    names       of today's parameter vector
+    neutral_of  the value that leaves a coefficient's term out; None where it has none
+
     Raises RunError where a kept coefficient exists no more, or a new one is not neutral.
     """
     today = list(names)
@@ -55,7 +61,7 @@ def kept(physics: Sequence[str], count: int, names: Sequence[str]) -> Kept:
     was = [*physics, *weights]
     gone = [name for name in was if name not in today]
     added = [name for name in today if name not in was]
-    neutral = {name: mmg.neutral(name) for name in added}
+    neutral = {name: neutral_of(name) for name in added}
     lacking = [name for name, value in neutral.items() if value is None]
     if gone or lacking or len(was) != count:
         which = gone or lacking or [f"{count} numbers instead of {len(was)}"]

@@ -105,74 +105,126 @@ def together(
     returns   the loss, [] or [S], float64, and gradients of the weights' shapes
 
     What the actuators and the wind add to the first layer is known beforehand and is one matrix
-    product; the weights' gradients are one product a layer, after the backward sweep. The scales
-    are folded into the first and the last layer, so that a step of time is ten operations.
+    product; the weights' gradients are one product a layer, after the backward sweep.
     """
-    like, several = data.velocity, weights[0].dim() == 3
-    steps, count = data.dt.shape[0], data.dt.shape[-1]
-    scale = scaling.to(like.dtype)
-    mean, std = scale.input_mean[:3], scale.input_std[:3]
-    matrices, biases = list(weights[0::2]), list(weights[1::2])
-    if several:
-        biases = [b.unsqueeze(1) for b in biases]
-    add, multiply = (torch.baddbmm, torch.bmm) if several else (torch.addmm, torch.mm)
-    depth, width = len(matrices) - 1, matrices[0].shape[-2]
-    from_velocity, from_driven = matrices[0][..., :3], matrices[0][..., 3:]
-    entry = from_velocity if shape.input_tanh else from_velocity / std
-    first = data.driven[:-1] @ from_driven.mT + biases[0]
-    if not shape.input_tanh:
-        first -= (entry @ mean).unsqueeze(-2)
-    out = matrices[depth] * scale.output_std[:, None]
-    out_bias = biases[depth] * scale.output_std + scale.output_mean
-
-    hidden = like.new_empty(steps if gradient else 1, depth, *like.shape[1:-1], width)
-    path = torch.empty_like(like)
-    path[0] = like[0]
-    z = velocity = like[0]
-    entry_t, out_t = entry.mT, out.mT
-    transposed = [m.mT for m in matrices]
-    for k in range(steps):
-        layers = hidden[k if gradient else 0]
-        if shape.input_tanh:
-            z = torch.tanh((velocity - mean) / std)
-        h = add(first[k], z, entry_t, out=layers[0]).tanh_()
-        for layer in range(1, depth):
-            h = add(biases[layer], h, transposed[layer], out=layers[layer]).tanh_()
-        y = add(out_bias, h, out_t)
-        z = velocity = torch.addcmul(velocity, data.dt[k].unsqueeze(-1), y, out=path[k + 1])
-
+    like, count = data.velocity, data.dt.shape[-1]
+    net = _folded(weights, data, scaling.to(like.dtype), shape)
+    path, hidden = _forward(net, data, gradient)
     error = path - like
     weighted = error * _error_weights(like) * trapezoid(data.dt)[..., None]
     loss = (weighted * error).sum((0, -2, -1), dtype=torch.float64) / count
     if not gradient:
         return loss, []
+    return loss, _backward(net, data, path, hidden, weighted * (2.0 / count))
 
-    slope = weighted * (2.0 / count)  # dL/dν at each step
+
+@dataclass(frozen=True)
+class _Folded:
+    """A network whose scales are folded into its first and last layer, so that a step of time is
+    ten operations.
+
+    matrices, biases  of all layers, as they are
+    first             [I - 1, ..., H] what the first layer adds up of all but the velocity
+    entry             [H, 3] of the velocity to the first layer
+    out, out_bias     the last layer, in m/s² and rad/s²
+    mean, std         [3] of the velocity
+    output_std        [3] of the acceleration
+    entry_tanh        whether the inputs pass a tanh before the first layer
+    """
+
+    matrices: list[Tensor]
+    biases: list[Tensor]
+    first: Tensor
+    entry: Tensor
+    out: Tensor
+    out_bias: Tensor
+    mean: Tensor
+    std: Tensor
+    output_std: Tensor
+    entry_tanh: bool
+
+    @property
+    def depth(self) -> int:
+        return len(self.matrices) - 1
+
+    @property
+    def several(self) -> bool:
+        return self.matrices[0].dim() == 3
+
+
+def _folded(weights: Sequence[Tensor], data: Batch, scale: Scaling, shape: Shape) -> _Folded:
+    mean, std = scale.input_mean[:3], scale.input_std[:3]
+    matrices, biases = list(weights[0::2]), list(weights[1::2])
+    if matrices[0].dim() == 3:
+        biases = [b.unsqueeze(1) for b in biases]
+    from_velocity, from_driven = matrices[0][..., :3], matrices[0][..., 3:]
+    entry = from_velocity if shape.input_tanh else from_velocity / std
+    first = data.driven[:-1] @ from_driven.mT + biases[0]
+    if not shape.input_tanh:
+        first -= (entry @ mean).unsqueeze(-2)
+    out = matrices[-1] * scale.output_std[:, None]
+    out_bias = biases[-1] * scale.output_std + scale.output_mean
+    return _Folded(
+        matrices, biases, first, entry, out, out_bias, mean, std, scale.output_std,
+        shape.input_tanh,
+    )  # fmt: skip
+
+
+def _forward(net: _Folded, data: Batch, keep: bool) -> tuple[Tensor, Tensor]:
+    """Velocities [I, ..., 3] of the rollout, and the hidden layers' values [I - 1, depth, ..., H];
+    of the last step alone where they need not be kept."""
+    like, steps, depth = data.velocity, data.dt.shape[0], net.depth
+    add = torch.baddbmm if net.several else torch.addmm
+    width = net.matrices[0].shape[-2]
+    hidden = like.new_empty(steps if keep else 1, depth, *like.shape[1:-1], width)
+    path = torch.empty_like(like)
+    path[0] = like[0]
+    z = velocity = like[0]
+    entry, out = net.entry.mT, net.out.mT
+    transposed = [m.mT for m in net.matrices]
+    for k in range(steps):
+        layers = hidden[k if keep else 0]
+        if net.entry_tanh:
+            z = torch.tanh((velocity - net.mean) / net.std)
+        h = add(net.first[k], z, entry, out=layers[0]).tanh_()
+        for layer in range(1, depth):
+            h = add(net.biases[layer], h, transposed[layer], out=layers[layer]).tanh_()
+        y = add(net.out_bias, h, out)
+        z = velocity = torch.addcmul(velocity, data.dt[k].unsqueeze(-1), y, out=path[k + 1])
+    return path, hidden
+
+
+def _backward(
+    net: _Folded, data: Batch, path: Tensor, hidden: Tensor, slope: Tensor
+) -> list[Tensor]:
+    """Gradients of the weights, of dL/dν at each step (`slope`, [I, ..., 3])."""
+    steps, depth = data.dt.shape[0], net.depth
+    add, multiply = (torch.baddbmm, torch.bmm) if net.several else (torch.addmm, torch.mm)
     bend = torch.addcmul(torch.ones_like(hidden), hidden, hidden, value=-1.0)  # 1 - h²
-    entered = (path[:-1] - mean) / std
+    entered = (path[:-1] - net.mean) / net.std
     through = None
-    if shape.input_tanh:
+    if net.entry_tanh:
         entered = torch.tanh(entered)
-        through = (1.0 - entered**2) / std
+        through = (1.0 - entered**2) / net.std
     delta = torch.empty_like(hidden)
     output = torch.empty_like(path[1:])
     back = slope[steps]
     for k in range(steps - 1, -1, -1):
         d = torch.mul(back, data.dt[k].unsqueeze(-1), out=output[k])
         for layer in range(depth - 1, -1, -1):
-            above = out if layer == depth - 1 else matrices[layer + 1]
+            above = net.out if layer == depth - 1 else net.matrices[layer + 1]
             d = multiply(d, above, out=delta[k, layer]).mul_(bend[k, layer])
         if through is None:
-            back = add(back, d, entry).add_(slope[k])
+            back = add(back, d, net.entry).add_(slope[k])
         else:
-            back = torch.addcmul(back, d @ entry, through[k]).add_(slope[k])
+            back = torch.addcmul(back, d @ net.entry, through[k]).add_(slope[k])
 
-    deltas = [*(delta[:, layer] for layer in range(depth)), output * scale.output_std]
+    deltas = [*(delta[:, layer] for layer in range(depth)), output * net.output_std]
     below = [torch.cat((entered, data.driven[:-1]), -1), *(hidden[:, i] for i in range(depth))]
     gradients: list[Tensor] = []
     for d, h in zip(map(_rows, deltas), map(_rows, below), strict=True):
         gradients += [d.mT @ h, d.sum(-2)]
-    return loss, gradients
+    return gradients
 
 
 def _rows(values: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ Knows no disk: what must last is handed to `checkpoint`, and comes back as `resu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import torch
@@ -67,7 +67,6 @@ def paper(
     weights = [p.detach().clone() for p in model.weights]
     moments = [torch.zeros_like(w) for w in [*weights, *weights]]
     scale = (model.scaling, model.shape)
-    rate, decay = settings.learning_rate, 2.0 * settings.regularisation
     stream = random_streams.generator(seed, "batches")
     if resume is None:
         start = network_gradient.loss_only(weights, validation, *scale)
@@ -89,15 +88,9 @@ def paper(
     until = math.inf if pause is None else progress.epoch + pause
     while not paper_done(progress, settings) and progress.epoch < until:
         progress.epoch += 1
-        total = 0.0
-        for rows in torch.tensor_split(torch.randperm(count, generator=stream), settings.subsets):
-            if len(rows) == 0:
-                continue
-            picked = training.pick(rows)
-            loss, gradients = network_gradient.loss_and_gradient(weights, picked, *scale)
-            progress.steps += 1
-            network_gradient.adam(weights, moments, gradients, progress.steps, rate, decay)
-            total += loss * len(rows) / count
+        order = torch.randperm(count, generator=stream)
+        subsets = torch.tensor_split(order, settings.subsets)
+        total = _epoch(weights, moments, training, scale, subsets, settings, progress)
         loss = network_gradient.loss_only(weights, validation, *scale)
         _note(progress, weights, total, loss, settings.smoothing)
         if checkpoint is not None and progress.epoch % every == 0:
@@ -107,6 +100,28 @@ def paper(
             report(share_done(progress.epoch, settings))
     snapshot()
     return progress
+
+
+def _epoch(
+    weights: list[Tensor],
+    moments: list[Tensor],
+    training: Batch,
+    scale: tuple,
+    subsets: Sequence[Tensor],
+    settings: Paper,
+    progress: Progress,
+) -> float:
+    """Adam on each subset of window numbers, in place; the mean loss over all of them."""
+    rate, decay = settings.learning_rate, 2.0 * settings.regularisation
+    total = 0.0
+    for rows in subsets:
+        if len(rows) == 0:
+            continue
+        loss, gradients = network_gradient.loss_and_gradient(weights, training.pick(rows), *scale)
+        progress.steps += 1
+        network_gradient.adam(weights, moments, gradients, progress.steps, rate, decay)
+        total += loss * len(rows) / training.velocity.shape[1]
+    return total
 
 
 def share_done(epoch: int, settings: Paper) -> float:

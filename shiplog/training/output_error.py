@@ -85,32 +85,17 @@ def identify(
     before = _used(losses(model, np.array(start, dtype=float), data), weight)
     if not np.isfinite(_used(losses(model, values, data), weight)).all():
         values = _from_short_windows(model, start, held, data, (low, high), free, values)
-    samples = 3.0 * float((weight * data.dt.sum(1)).sum())
-    loss = float(weight @ _used(losses(model, values, data), weight))
-    noise = max(CORRELATION * loss / samples, TINY)
+    noise = _noise(_used(losses(model, values, data), weight), data)
     evaluations, converged, message = 0, True, "converged"
     for _ in range(rounds):
         problem = _Problem(model, start, held, data, free, noise)
-        guess = (values - start)[free] / held[free]
-        side = [(b - start)[free] / held[free] for b in (low, high)]
-        inside = np.clip(guess, side[0] + 1e-9, side[1] - 1e-9)
-        done = least_squares(
-            problem.residual,
-            inside,
-            problem.jacobian,  # type: ignore[arg-type]  # scipy's stub knows strings only
-            bounds=(side[0], side[1]),
-            method="trf",
-            xtol=1e-4,
-            ftol=TOLERANCE,
-            gtol=1e-10,
-            max_nfev=most,
-        )
+        done = problem.solved(values, (low, high), most)
         evaluations += problem.evaluations
         values = problem.whole(done.x)
         converged = done.status > 0
         message = "converged" if converged else _unsettled(done, model.names, free, most)
         after = _used(losses(model, values, data), weight)
-        now = max(CORRELATION * float(weight @ after) / samples, TINY)
+        now = _noise(after, data)
         settled = abs(now / noise - 1.0) < 0.05
         noise = now
         if settled:
@@ -126,6 +111,12 @@ def identify(
         converged=converged,
         message=message,
     )
+
+
+def _noise(loss: np.ndarray, data: WindowSeries) -> float:
+    """Weighted variance of one independent observation of the error, of L of each window [N]."""
+    samples = 3.0 * float((data.weight * data.dt.sum(1)).sum())
+    return max(CORRELATION * float(data.weight @ loss) / samples, TINY)
 
 
 def _from_short_windows(
@@ -186,6 +177,23 @@ class _Problem:
         self.free, self.noise = free, noise
         self.evaluations = 0
         self._at: np.ndarray | None = None
+
+    def solved(self, values: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], most: int):
+        """Scipy's solution from `values` [P] on, within bounds, in at most `most` evaluations."""
+        free, scale = self.free, self.spread[self.free]
+        guess = (values - self.start)[free] / scale
+        low, high = ((b - self.start)[free] / scale for b in bounds)
+        return least_squares(
+            self.residual,
+            np.clip(guess, low + 1e-9, high - 1e-9),
+            self.jacobian,  # type: ignore[arg-type]  # scipy's stub knows strings only
+            bounds=(low, high),
+            method="trf",
+            xtol=1e-4,
+            ftol=TOLERANCE,
+            gtol=1e-10,
+            max_nfev=most,
+        )
 
     def whole(self, x: np.ndarray) -> np.ndarray:
         values = self.start.copy()

@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from shiplog.exceptions import RunError
+from shiplog.exceptions import RunError, listed
+from shiplog.models import FAMILIES, MODELS, NETWORK, Family
 from shiplog.toml_section import Section
 from shiplog.voyages.split_settings import Split
 
@@ -83,10 +84,6 @@ class Config(Section):
     fast: Fast = Fast()
     physics: Physics = Physics()
 
-    @property
-    def physical(self) -> bool:
-        return self.model != "feedforward"
-
     @model_validator(mode="before")
     @classmethod
     def _wind_as_the_recipe_has_it(cls, values: dict) -> dict:
@@ -98,15 +95,29 @@ class Config(Section):
         return {**values, "network": network}
 
     @property
-    def kind(self) -> str:
+    def legend(self) -> str:
         """What a legend says of the model in a word: the recipe, or the physics."""
-        if not self.physical:
+        if self._family is NETWORK:
             return self.recipe
         return "identified" if self.physics.fit else "as given"
 
+    def label(self, wind: bool) -> str:
+        """How results are headed: model, data, recipe, and how the wind enters where it does."""
+        if self._family is NETWORK:
+            how = f", wind {self.network.wind_input}" if wind else ""
+            return f"{self.model} {self.data} ({self.recipe} recipe{how})"
+        how = f"identified on {self.data}" if self.physics.fit else "as given"
+        off = f", without {listed(self.physics.without)}" if self.physics.without else ""
+        return f"{self.model} {how}{off}"
+
+    @property
+    def _family(self) -> Family:
+        return MODELS[self.model].family
+
     def to_toml(self) -> str:
-        """As it is saved; the sections of the other kind of model left out."""
-        other = {"network", "paper", "fast"} if self.physical else {"physics"}
+        """As it is saved; the sections that its model does not read left out."""
+        other = {name for family in FAMILIES for name in family.sections}
+        other -= set(self._family.sections)
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True, exclude=other))
 
 

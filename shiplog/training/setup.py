@@ -5,14 +5,16 @@ from __future__ import annotations
 import fnmatch
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 
 from shiplog.exceptions import RunError, WindowError, listed, nearest
-from shiplog.models import mmg
+from shiplog.models import MODELS
+from shiplog.models.coefficients import Parameters
 from shiplog.profile import Profile
 from shiplog.simulation.sensitivities import WindowSeries, losses, series
 from shiplog.training.run_config import Config
@@ -33,8 +35,8 @@ class Prepared:
     unseen          windows of the validation voyages; None without
     """
 
-    model: mmg.MMG
-    start: mmg.Parameters
+    model: Any
+    start: Parameters
     data: WindowSeries
     voyages: list[str]
     days: list[str]
@@ -55,14 +57,10 @@ def prepare(
     learnt, held   seconds of the training and of the validation voyages
     planned        the training windows
     """
-    off = config.physics.without
-    ship, main, estimates = mmg.geometry_of(profile, off)
+    equations = MODELS[config.model].equations
+    model, start, estimates = equations.begin(profile, config.physics, parameters)
     for sentence in estimates:
         log.info(sentence)
-    path = parameters or mmg.beside(profile.source)
-    start = mmg.load(path, ship, off) if path else mmg.estimated(ship, main)
-    if path is None:
-        log.info("no published coefficients for this ship: %s", start.source)
     names = (profile.actuator_names, profile.wind_names)
     cut = windows.cut(learnt, planned, config.window, *names)
     _refuse_none(planned, config.window, config.split.training)
@@ -79,7 +77,7 @@ def prepare(
     )
     voyages = [twin.get(name, name) for name in map(str, cut.plan["voyage"])]
     data = series(cut)
-    model = _stable(mmg.MMG(ship, config.physics.substeps), start.values, data)
+    model = _stable(model, start.values, data)
     return Prepared(
         model, start, data, voyages, [first[v] for v in voyages],
         _free(config.physics.free, start.names), unseen,
@@ -93,10 +91,10 @@ def _refuse_none(planned: pl.DataFrame, size: int, voyages: Sequence[str]) -> No
         )
 
 
-def _stable(model: mmg.MMG, values: np.ndarray, data: WindowSeries) -> mmg.MMG:
+def _stable(model: Any, values: np.ndarray, data: WindowSeries) -> Any:
     """With as many Euler steps a second as a small, quick ship needs to hold every window."""
     for substeps in (1, 2, 4, 8):
-        finer = mmg.MMG(model.geometry, max(substeps, model.substeps))
+        finer = replace(model, substeps=max(substeps, model.substeps))
         if np.isfinite(losses(finer, values, data)).all():
             if finer.substeps > model.substeps:
                 log.info("%d Euler steps within each second keep the ship stable", finer.substeps)

@@ -33,7 +33,8 @@ from pydantic import ValidationError
 from shiplog import files
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.logs.health_report import CONTRACT, VoyageReport
-from shiplog.profile import Profile, advice
+from shiplog.profile import Profile
+from shiplog.profile_file import advice
 from shiplog.voyages import one_hertz, parts
 
 if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 import straight
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import discrepancy
 from shiplog.diagnosis.discrepancy import SEEN, UNSEEN, WAVES
 from shiplog.diagnosis.segment_nodes import Knots
+from shiplog.profile import Profile
 
 PUSH = np.array([0.08, 0.05, 0.03])
 TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw
 
 
-def profile(actuators: str, wind: bool = True) -> profiles.Profile:
+def profile(actuators: str, wind: bool = True) -> Profile:
     """A ship of 3 m with these [[actuators]]."""
     blows = '[sensors.wind]\ntopic = "/w"\nfields = ["speed", "angle"]\nunits = ["m/s", "deg"]\n'
     return profiles.parse(
@@ -64,12 +65,12 @@ def knots(state=None, controls=None, share=None, wind=None, seed: int = 0) -> Kn
     return Knots(state, np.concatenate((controls, share, wind), -1))
 
 
-def products(name: str, of: profiles.Profile, at: Knots) -> np.ndarray:
+def products(name: str, of: Profile, at: Knots) -> np.ndarray:
     """[S, J, F] of the products alone, before they are scaled."""
     return np.concatenate(discrepancy.PRODUCTS[name](of, at), -1)
 
 
-def one(name: str, of: profiles.Profile, *at: Knots) -> discrepancy.Family:
+def one(name: str, of: Profile, *at: Knots) -> discrepancy.Family:
     (family,) = discrepancy.of(of, PUSH, 0, (name,), *at).families
     return family
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import likelihood, linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear_segments import Path, Wide
 from shiplog.diagnosis.segments import Cut

@@ -19,7 +19,7 @@ from shiplog.diagnosis.setup import trial_of
 from shiplog.diagnosis.trial_voyages import in_ship_time, record_of, windows_of
 from shiplog.exceptions import RunError
 from shiplog.report import verdict as verdicts
-from shiplog.training import run_folder
+from shiplog.training import extension_file, load_model
 from shiplog.training.run_config import Config, Fast, NetworkSettings
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
@@ -157,8 +157,10 @@ def test_what_refutes_a_cause_of_a_network_is_its_mmg(afloat):
     ref = afloat.trial.reference
     assert judge.theta == pytest.approx(ref.theta) and judge.model.causes == ()
     assert type(judge.model.base).__name__ == "MMG"
-    extended = run_folder.extend(
-        afloat.run, afloat.work / "current", afloat.held.extended(afloat.decision)
+    extended = load_model.load(
+        extension_file.extend(
+            afloat.run, afloat.work / "current", afloat.held.extended(afloat.decision)
+        )
     )
     trial = trial_of(extended, None, afloat.recorded, ()).trial
     again = trials.simulator(extended, trial)
@@ -202,8 +204,8 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     after = held.extended(alone)
     assert np.abs(after.model.base.bent).max() > 0.0
     assert not np.allclose(after.losses(cut), before.losses(cut), rtol=1e-3)
-    kept = run_folder.extend(afloat.run, afloat.work / "extended", after)
-    again = run_folder.load(kept.path).extended(afloat.run.config.seeds[0], afloat.recorded)
+    kept = load_model.load(extension_file.extend(afloat.run, afloat.work / "extended", after))
+    again = kept.extended(afloat.run.config.seeds[0], afloat.recorded)
     assert again.losses(cut) == pytest.approx(after.losses(cut), rel=1e-9)
     bent = again.model.base.bent
     assert kept.base()[0].bent == pytest.approx(bent)
@@ -213,12 +215,12 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
 
 def test_a_network_that_an_earlier_program_bent_is_told_of(afloat):
     plain = afloat.run.extended(afloat.run.config.seeds[0], afloat.recorded)
-    kept = run_folder.extend(afloat.run, afloat.work / "earlier", plain)
-    assert kept.extension is not None
-    file = kept.path / "extension.safetensors"
+    path = extension_file.extend(afloat.run, afloat.work / "earlier", plain)
+    assert load_model.load(path).extension is not None
+    file = path / "extension.safetensors"
     arrays = dict(load_file(file))
     save_file(arrays | {"coefficients": np.ones(72)}, file)
     with pytest.raises(RunError, match="earlier shiplog"):
-        _ = kept.extension
+        load_model.load(path)
     save_file(arrays | {"coefficients": np.zeros(72)}, file)
-    assert kept.base()[0].bent is None
+    assert load_model.load(path).base()[0].bent is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import weighed
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import name_of

@@ -19,10 +19,10 @@ from pipelines import diagnose as pipeline
 from pipelines.experiments.simulated_ship import Laws, cases, sensors
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import (
     likelihood,
-    linear_segments,  # fmt: skip
+    linear_segments,
     linearisation,
     measurement_correction,
     next_manoeuvre,

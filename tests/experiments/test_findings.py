@@ -8,7 +8,7 @@ from pipelines.convert import convert
 from pipelines.demo import sample_logs
 from pipelines.experiments.findings import faults, kvlcc2, milliampere
 from pipelines.prepare import expand, ingest_logs
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.voyages import sensor_consistency
 from shiplog.voyages.store import Store
 

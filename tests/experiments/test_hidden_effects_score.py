@@ -25,7 +25,7 @@ from pipelines.experiments.hidden_effects.parameters import compare
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from pipelines.experiments.hidden_effects.score import Answer, Sealed, calibration, open_key
 from pipelines.experiments.simulated_ship.cases import CATALOGUE, OUTSIDE, draw
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.models.causes import Setting
 
 ROOT = Path(__file__).parents[2]

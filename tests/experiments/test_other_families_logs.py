@@ -18,7 +18,7 @@ from pipelines.experiments.other_families import cases, instruments
 from pipelines.experiments.other_families.disturbance import CALM, Wind
 from pipelines.experiments.other_families.effects import Effects
 from pipelines.experiments.other_families.voyage import sail
-from shiplog import profile
+from shiplog import profile_file
 
 FOLDER = Path(other_families.__file__).parent
 START = datetime(2026, 5, 1, 6, 0, tzinfo=UTC)
@@ -135,7 +135,7 @@ def test_a_case_is_blind_and_readable(family, tmp_path, monkeypatch):
         if name.endswith(".mcap"):
             assert hashlib.sha256(content).hexdigest() == key["sha256"][path.stem]
             assert metadata(path) == metadata(plain[name])
-    loaded = profile.load(other["ship.toml"])
+    loaded = profile_file.load(other["ship.toml"])
     topics = {topic for topic, _ in metadata(other["trial_1.mcap"])[0]}
     assert set(loaded.wanted()) == topics
 

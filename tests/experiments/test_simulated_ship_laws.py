@@ -30,7 +30,7 @@ from pipelines.experiments.simulated_ship.laws import (
     drawn,
 )
 from pipelines.experiments.simulated_ship.noise import oscillator, process_noise
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis.nominal_reference import UNREST_TIME
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.causes.environment import Bank as CatalogueBank

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from pipelines.convert import convert
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.exceptions import ChannelMissing, ProfileError
 from shiplog.logs.conversion import clock, heartbeat
 from shiplog.logs.conversion.columns import schema_of

@@ -15,7 +15,7 @@ import polars as pl
 import pytest
 
 from pipelines.convert import convert
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.logs.read import contents, read
 from shiplog.logs.write import Series, write_log
 from shiplog.voyages.ingest import ingest

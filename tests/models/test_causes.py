@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.models import causes as catalogue
 from shiplog.models import mmg
 from shiplog.models.causes import CATALOGUE, Setting

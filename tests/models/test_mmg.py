@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
 from shiplog.models.mmg import body, parameters
 from shiplog.models.mmg.geometry import Geometry, geometry_of
 from shiplog.models.mmg.hull import cross_flow
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters
+from shiplog.profile import Profile
 
 SENSORS = """
 [ship]
@@ -113,7 +114,7 @@ class Ship:
         return np.asarray(self.model.acceleration(*arguments))
 
 
-def estimated(profile: profiles.Profile, without=()) -> Ship:
+def estimated(profile: Profile, without=()) -> Ship:
     g, main, _ = geometry_of(profile, without)
     return Ship(MMG(g), parameters.estimated(g, main))
 

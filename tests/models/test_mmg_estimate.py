@@ -5,7 +5,7 @@ from math import isfinite
 
 import pytest
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.models.mmg import estimate
 from shiplog.models.mmg.estimate import Particulars
 from shiplog.models.mmg.geometry import geometry_of

@@ -19,8 +19,8 @@ from pipelines.experiments import simulated_ship
 from pipelines.identify import identify_run
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
+from shiplog.training import extension_file, load_model, regularisation
 from shiplog.training import output_error as identification
-from shiplog.training import regularisation, run_folder
 from shiplog.training.run_config import Config
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.split import choose_physical_split
@@ -116,23 +116,23 @@ def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
     mine = tmp_path / "mine.py"
     mine.write_text(f"{GOOD}\nwith open({str(ran)!r}, 'a') as f:\n    f.write('x')\n")
     causes = user.load([mine])
-    run = run_folder.load(published[0])
+    run = load_model.load(published[0])
     after = run.extended(0).with_causes(
         causes, {"tide_gate": np.array([3.0])}, {"tide_gate": np.array([[0.01]])}
     )
-    kept = run_folder.extend(run, tmp_path / "extended", after, [mine])
-    assert kept.label == "mmg with tide_gate"
+    kept = extension_file.extend(run, tmp_path / "extended", after, [mine])
+    assert load_model.load(kept, causes).label == "mmg with tide_gate"
     was = ran.read_text()
     for command in ("evaluate", "compare"):
-        code, _, said = call(command, kept.path, "--store", store, "--voyages", "trip_3")
+        code, _, said = call(command, kept, "--store", store, "--voyages", "trip_3")
         assert code == 1 and "'tide_gate'" not in said and "tide_gate" in said
-        assert f"--cause FILE; a copy to look over first: {kept.path / 'extension-0.py'}" in said
+        assert f"--cause FILE; a copy to look over first: {kept / 'extension-0.py'}" in said
     assert ran.read_text() == was
     with pytest.raises(RunError, match="--cause"):
-        run_folder.load(kept.path).models()
-    again = run_folder.load(kept.path, user.load([mine])).models()[0]
+        load_model.load(kept).models()
+    again = load_model.load(kept, user.load([mine])).models()[0]
     assert again.theta == pytest.approx(after.theta)
-    code, said, _ = call("evaluate", kept.path, "--store", store, "--voyages", "trip_3",
+    code, said, _ = call("evaluate", kept, "--store", store, "--voyages", "trip_3",
                          "--cause", mine)  # fmt: skip
     assert code == 0 and "mmg with tide_gate" in said
     assert ran.read_text() == was + "xx"
@@ -142,20 +142,20 @@ def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_pa
     """Also where the owner's causes were tested and not named: nothing of theirs is in it."""
     mine = tmp_path / "mine.py"
     mine.write_text(GOOD)
-    run = run_folder.load(published[0])
+    run = load_model.load(published[0])
     (current,) = [c for c in CATALOGUE if c.label == "current"]
     numbers = {"current": np.array([0.1, -0.05])}
     after = run.extended(0).with_causes([current], numbers, {"current": 1e-4 * np.eye(2)})
-    kept = run_folder.extend(run, tmp_path / "extended", after, [mine])
-    assert run_folder.load(kept.path).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
-    assert not list(kept.path.glob("*.py"))
+    kept = extension_file.extend(run, tmp_path / "extended", after, [mine])
+    assert load_model.load(kept).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
+    assert not list(kept.glob("*.py"))
 
 
 def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
     """Its folder holds neither names nor numbers of the five coefficients."""
     old = tmp_path / "old"
     shutil.copytree(published[0], old)
-    table = run_folder.load(old).identified()
+    table = load_model.load(old).identified()
     late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
     assert late.sum() == 5
     table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
@@ -165,7 +165,7 @@ def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_p
     save_file(
         {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
     )
-    now, was = run_folder.load(published[0]), run_folder.load(old)
+    now, was = load_model.load(published[0]), load_model.load(old)
     assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
     start = was.base()[1]
     assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
@@ -173,7 +173,7 @@ def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_p
 
 
 def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
-    run = run_folder.load(published[0])
+    run = load_model.load(published[0])
     identified = run.identified()
     assert (identified["value"] == identified["start"]).all()
     assert not identified["free"].any() and (identified["standard_error"] == 0.0).all()
@@ -187,7 +187,7 @@ def test_a_force_left_out_is_said_and_gone(store, tmp_path):
         store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
     )
     assert code == 0 and "mmg as given, without propeller, rudder, wind in" in said
-    names = run_folder.load(tmp_path / "r").identified()["name"]
+    names = load_model.load(tmp_path / "r").identified()["name"]
     assert {name.split(".")[0] for name in names} == {"body", "hull"}
 
 
@@ -210,7 +210,7 @@ def test_the_answer_says_what_was_found(fitted):
 
 
 def test_the_training_windows_fit_better_than_at_the_start(fitted):
-    run = run_folder.load(fitted[0])
+    run = load_model.load(fitted[0])
     identified = run.identified()
     assert (identified["standard_error"] > 0.0).all() and identified["free"].all()
     assert (identified["standard_error"] <= 1.05 * identified["spread"]).all()
@@ -220,22 +220,22 @@ def test_the_training_windows_fit_better_than_at_the_start(fitted):
 
 
 def test_voyages_are_held_out_in_as_many_parts_as_are_asked_for(fitted, store, tmp_path):
-    assert run_folder.load(fitted[0]).config.physics.folds == 5
+    assert load_model.load(fitted[0]).config.physics.folds == 5
     code, _, _ = train(
         store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, "--folds", 2, "--free", "hull.x_0f"
     )
-    assert code == 0 and run_folder.load(tmp_path / "r").config.physics.folds == 2
+    assert code == 0 and load_model.load(tmp_path / "r").config.physics.folds == 2
     assert call("train", "--store", store, "--out", tmp_path / "n", "--folds", 2)[0] == 2
 
 
 def test_one_identification_stands_for_all_seeds(fitted):
-    run = run_folder.load(fitted[0])
+    run = load_model.load(fitted[0])
     assert run.config.seeds == (0,)
     assert sorted(p.name for p in run.path.glob("seed*")) == ["seed0"]
 
 
 def test_the_run_folder_holds_what_it_says(fitted):
-    run = run_folder.load(fitted[0])
+    run = load_model.load(fitted[0])
     settings = tomllib.loads((run.path / "config.toml").read_text(encoding="utf-8"))
     assert not {"network", "paper", "fast"} & settings.keys()
     assert settings["physics"]["without"] == ["propeller", "rudder"]
@@ -270,14 +270,14 @@ def test_identified_parameters_can_be_given_again(fitted, published, store, tmp_
     )
     assert other == pytest.approx(one, rel=1e-9)
     assert before != pytest.approx(one, rel=1e-3)
-    again = run_folder.load(tmp_path / "again")
+    again = load_model.load(tmp_path / "again")
     assert again.config.physics.parameters == "identified by shiplog in fitted"
 
 
 def test_only_the_free_parameters_move(store, tmp_path):
     code, _, _ = train(store, tmp_path / "r", "--model", "mmg", "--free", "wind.*", *BOTH, *HULL)
     assert code == 0
-    found = run_folder.load(tmp_path / "r").identified()
+    found = load_model.load(tmp_path / "r").identified()
     wind = pl.col("name").str.starts_with("wind.")
     moved, held = found.filter(wind), found.filter(~wind)
     assert moved.height == 10 and moved["free"].all()
@@ -294,7 +294,7 @@ def test_one_voyage_leaves_the_gain_untested(store, tmp_path):
     assert code == 0 and "One voyage only: nothing was held out" in said
     assert "held-out" not in said
     assert not (run / "cross_validation.parquet").exists()
-    assert run_folder.load(run).band() is None
+    assert load_model.load(run).band() is None
     content = scored(run, store, tmp_path / "e.json")
     assert math.isfinite(content["loss"]) and content["band_90"] == {}
 
@@ -304,7 +304,7 @@ def test_a_validation_voyage_is_where_the_band_comes_from(store, tmp_path):
     code, _, _ = train(store, run, "--model", "mmg", "--voyages", "trip_1", "--validation",
                        "trip_2", "--free", "wind.*", *HULL)  # fmt: skip
     assert code == 0
-    loaded = run_folder.load(run)
+    loaded = load_model.load(run)
     assert loaded.config.split.validation == ("trip_2",)
     assert loaded.training()["voyage"].unique().to_list() == ["trip_1"]
     assert loaded.band() is not None
@@ -360,7 +360,7 @@ def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
     assert answer(run / "provenance.json")["chosen"]["ridge"]["value"] == 0.25
     assert [factor for factor, _ in asked[:6]] == [1.0, 2.0, 4.0, 8.0, 0.5, 0.25]
     assert asked[6:] == [(0.25, True)] * 2  # a fold begins at the start: it knows nothing of all
-    found, loose = run_folder.load(run).identified(), run_folder.load(validated[0]).identified()
+    found, loose = load_model.load(run).identified(), load_model.load(validated[0]).identified()
     away = (pl.col("value") - pl.col("start")).abs() / pl.col("spread")
     moved = found.filter("free").select(away.mean()).item()
     assert 0.0 < moved < loose.filter("free").select(away.mean()).item()
@@ -478,7 +478,7 @@ def test_a_damaged_model_is_named(hybrid, tmp_path):
     path = copy / "seed0" / "model.safetensors"
     path.write_bytes(path.read_bytes()[:50])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
-        run_folder.load(copy).simulator(0)
+        load_model.load(copy).simulator(0)
 
 
 # ---------------------------------------------------------------- the split

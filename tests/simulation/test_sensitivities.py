@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 import torch
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.models.mmg import parameters
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG

@@ -7,9 +7,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
 from shiplog.models.mmg import MMG, estimated, geometry_of
+from shiplog.profile import Profile
 from shiplog.simulation import coverage, force_breakdown, sensitivities
 from shiplog.simulation.sensitivities import Simulator, WindowSeries
 from shiplog.training import hybrid_training
@@ -67,7 +68,7 @@ def driven(seed: int) -> WindowSeries:
 
 
 @pytest.fixture(scope="module")
-def ship() -> profiles.Profile:
+def ship() -> Profile:
     return profiles.parse(SHIP, "ship.toml")
 
 

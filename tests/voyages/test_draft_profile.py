@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from pipelines.convert import convert
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.exceptions import LogUnreadable, ProfileError
 from shiplog.logs.write import Series, write_log
 from shiplog.voyages.draft_profile import draft, draft_table

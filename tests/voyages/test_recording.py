@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from shiplog import frames
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.channels import Quality
 from shiplog.voyages import recording
 

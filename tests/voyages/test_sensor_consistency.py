@@ -11,14 +11,14 @@ import pytest
 import sailing
 
 from pipelines.experiments.simulated_ship import Effects, Wind, sail, write_voyage
-from shiplog import frames, profile
+from shiplog import frames, profile_file
 from shiplog.channels import Quality
 from shiplog.voyages import sensor_consistency
 from shiplog.voyages.ingest import ingest
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 DEGREE = np.pi / 180.0
-VECTWIN = profile.load("esso-vectwin")
+VECTWIN = profile_file.load("esso-vectwin")
 BODY = sailing.profile(
     sailing.PROFILE.replace('kind = "sog_cog"', 'kind = "body"')
     .replace('units = ["kn", "deg"]', 'unit = "m/s"')

@@ -6,7 +6,7 @@ import closed
 import numpy as np
 import pytest
 
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.diagnosis import segments, trial_voyages
 from shiplog.voyages import timescale
 from shiplog.voyages.timescale import NODE_ROWS, Timescale

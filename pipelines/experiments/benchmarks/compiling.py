@@ -22,7 +22,7 @@ from pipelines.experiments.benchmarks.rollouts import (
     processor,
     report,
 )
-from shiplog import jit_cache, profile
+from shiplog import jit_cache, profile_file
 from shiplog.diagnosis import linearisation
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
@@ -40,7 +40,7 @@ def main() -> None:
     )
     parser.add_argument("--rounds", type=int, default=3)
     rounds = parser.parse_args().rounds
-    model = MMG(geometry_of(profile.load(SHIP))[0])
+    model = MMG(geometry_of(profile_file.load(SHIP))[0])
     path = beside(SHIP)
     assert path is not None, f"{SHIP} has no parameter file"
     theta = jnp.asarray(load(path, model.geometry).values)

@@ -20,7 +20,7 @@ import jax
 import numpy as np
 
 from pipelines.experiments.benchmarks.machine import processor
-from shiplog import profile
+from shiplog import profile_file
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
@@ -178,7 +178,7 @@ def main() -> None:
     parser.add_argument("--no-peer", action="store_true")
     options = parser.parse_args()
 
-    model = MMG(geometry_of(profile.load(SHIP))[0])
+    model = MMG(geometry_of(profile_file.load(SHIP))[0])
     path = beside(SHIP)
     assert path is not None, f"{SHIP} has no parameter file"
     known = load(path, model.geometry)

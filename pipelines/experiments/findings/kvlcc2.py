@@ -12,7 +12,7 @@ from pipelines.evaluate import evaluate_runs
 from pipelines.experiments.findings.said import diagnosed
 from pipelines.identify import identify_run
 from pipelines.prepare import expand, ingest_logs
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.training.run_config import Config
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store

@@ -14,7 +14,7 @@ from pipelines.experiments.extrapolation import physics
 from pipelines.experiments.findings.said import diagnosed, variant
 from pipelines.prepare import ingest_logs
 from shiplog import frames
-from shiplog import profile as profiles
+from shiplog import profile_file as profiles
 from shiplog.report import tables
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store

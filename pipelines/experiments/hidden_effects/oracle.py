@@ -27,7 +27,7 @@ from shiplog.diagnosis.trial_voyages import record_of, setting_of, windows_of
 from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import CATALOGUE, Cause, Setting, constants_of
 from shiplog.simulation.error_reduction import gain
-from shiplog.training import run_folder
+from shiplog.training import load_model
 from shiplog.voyages.store import Store
 
 Truth = Mapping[str, Any]  # a cause of a key: name, and parameters as the contract has them
@@ -77,7 +77,7 @@ def oracle(
     base: Path, store: Store, voyages: Sequence[str], hidden: Sequence[Truth]
 ) -> dict[str, float] | None:
     """L of the trial's windows before and with the truth, and the reduction."""
-    run = run_folder.load(base)
+    run = load_model.load(base)
     names = store.select(list(voyages))
     profile = store.profile(names)
     recorded = record_of(store, names, profile)

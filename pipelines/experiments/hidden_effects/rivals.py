@@ -37,7 +37,7 @@ from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.segments import Cut
 from shiplog.diagnosis.setup import trial_of
 from shiplog.exceptions import RunError, ShiplogError
-from shiplog.training import run_folder
+from shiplog.training import load_model
 from shiplog.voyages import recording
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
@@ -72,7 +72,7 @@ def said(scores: Mapping[str, float], wanted: Mapping[str, float] | float = 0.0)
 
 def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, Said]:
     """Of every method. Raises ShiplogError."""
-    run = run_folder.load(run_path)
+    run = load_model.load(run_path)
     names = store.select(list(voyages))
     trained = [*run.config.split.training, *run.config.split.validation]
     if set(names) & set(trained):

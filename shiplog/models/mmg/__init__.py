@@ -2,23 +2,50 @@
 
 from __future__ import annotations
 
-import jax
+from collections.abc import Mapping
+from pathlib import Path
 
+import jax
+import numpy as np
+
+from shiplog.models.coefficients import Parameters
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning, neutral
+from shiplog.models.mmg.parameters import beside, estimated, load
+from shiplog.models.physical import Beginning, PhysicalModel, Settings
+from shiplog.profile import Profile
 
 jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
 __all__ = [
     "MMG",
+    "MODEL",
     "PARTS",
     "Geometry",
     "Parameters",
+    "begin",
     "beside",
     "estimated",
     "geometry_of",
     "load",
-    "meaning",
-    "neutral",
+    "opened",
 ]
+
+
+def begin(profile: Profile, settings: Settings, path: Path | None = None) -> Beginning:
+    """The ship's MMG with the coefficients of a file, else those published beside the profile,
+    else those that the particulars suggest. Raises ProfileError."""
+    ship, main, estimates = geometry_of(profile, settings.without)
+    path = path or beside(profile.source)
+    start = load(path, ship, settings.without) if path else estimated(ship, main)
+    if path is None:
+        estimates = (*estimates, f"no published coefficients for this ship: {start.source}")
+    return Beginning(MMG(ship, settings.substeps), start, estimates)
+
+
+def opened(profile: Profile, settings: Settings, arrays: Mapping[str, np.ndarray]) -> MMG:
+    """The equations of a run. Raises ProfileError."""
+    return MMG(geometry_of(profile, settings.without)[0], settings.substeps)
+
+
+MODEL = PhysicalModel(begin, opened)

@@ -12,7 +12,7 @@ from math import log10, pi, sqrt
 
 import numpy as np
 
-from shiplog.profile import Actuator, Profile
+from shiplog.profile import Actuator, Profile, Ship
 
 GRAVITY = 9.80665  # m/s²
 VISCOSITY = 1.1e-6  # m²/s, water of 16 °C
@@ -68,6 +68,30 @@ def particulars(profile: Profile) -> tuple[Particulars, tuple[str, ...]]:
         density, water = (SALT, "salt") if length > 20.0 else (FRESH, "fresh")
         said.append(f"water density {density:.0f} kg/m³ taken as {water}, by the ship's length")
 
+    draught, block, mass, floating = _afloat(ship, density, length, breadth)
+    said += floating
+    x_g = ship.x_g_m
+    if x_g is None:
+        x_g = 0.0
+        said.append("centre of gravity assumed amidships")
+
+    frontal, lateral = ship.frontal_area_m2, ship.lateral_area_m2
+    beam = wide or breadth
+    if frontal is None:
+        frontal = 0.57 * beam**2
+        said.append(f"frontal area {frontal:.3g} m² estimated as 0.57 of the breadth squared")
+    if lateral is None:
+        lateral = 0.355 * (long or length) * beam
+        said.append(f"lateral area {lateral:.3g} m² estimated as 0.355 of length by breadth")
+    main = Particulars(length, breadth, draught, mass, block, x_g, density, frontal, lateral)
+    return main, tuple(said)
+
+
+def _afloat(
+    ship: Ship, density: float, length: float, breadth: float
+) -> tuple[float, float, float, list[str]]:
+    """Draught [m], block coefficient and mass [kg] that go together, and what was estimated."""
+    said: list[str] = []
     draught, block, mass = ship.draught_m, ship.block_coefficient, ship.mass_kg
     if draught is None and mass is not None:
         floating = mass / (density * length * breadth * (block or 0.7))
@@ -92,22 +116,7 @@ def particulars(profile: Profile) -> tuple[Particulars, tuple[str, ...]]:
     if mass is None:
         mass = block * box
         said.append(f"mass {mass:.3g} kg estimated from the block coefficient {block:.2g}")
-
-    x_g = ship.x_g_m
-    if x_g is None:
-        x_g = 0.0
-        said.append("centre of gravity assumed amidships")
-
-    frontal, lateral = ship.frontal_area_m2, ship.lateral_area_m2
-    beam = wide or breadth
-    if frontal is None:
-        frontal = 0.57 * beam**2
-        said.append(f"frontal area {frontal:.3g} m² estimated as 0.57 of the breadth squared")
-    if lateral is None:
-        lateral = 0.355 * (long or length) * beam
-        said.append(f"lateral area {lateral:.3g} m² estimated as 0.355 of length by breadth")
-    main = Particulars(length, breadth, draught, mass, block, x_g, density, frontal, lateral)
-    return main, tuple(said)
+    return draught, block, mass, said
 
 
 def rudder_size(rudder: Actuator, count: int, p: Particulars) -> tuple[float, float, str]:

@@ -99,6 +99,32 @@ def geometry_of(
                 hint=f"--without can be {listed(PARTS[1:])}.",
             )
     main, said = particulars(profile)
+    propellers, rudders, thrusters, sizes = _units(profile, main, off)
+    return (
+        Geometry(
+            length=main.length,
+            draught=main.draught,
+            mass=main.mass,
+            x_g=main.x_g,
+            density=main.density,
+            frontal_area=main.frontal_area,
+            lateral_area=main.lateral_area,
+            actuators=len(profile.actuators),
+            propellers=propellers,
+            rudders=rudders,
+            thrusters=thrusters,
+            wind=profile.has_wind and "wind" not in off,
+        ),
+        main,
+        (*said, *sizes),
+    )
+
+
+def _units(
+    profile: Profile, main: Particulars, off: set[str]
+) -> tuple[tuple[Propeller, ...], tuple[Rudder, ...], tuple[Thruster, ...], tuple[str, ...]]:
+    """What drives and steers, without the kinds that are `off`, and a sentence for each rudder
+    whose size had to be estimated."""
     column = {actuator.name: i for i, actuator in enumerate(profile.actuators)}
     propellers = tuple(
         Propeller(
@@ -109,7 +135,6 @@ def geometry_of(
     )  # fmt: skip
     blades = [a for a in profile.actuators if a.kind == "rudder" and "rudder" not in off]
     sizes = [rudder_size(a, len(blades), main) for a in blades]
-    said = (*said, *(sentence for *_, sentence in sizes if sentence))
     rudders = tuple(
         Rudder(
             column[a.name], a.name, *a.position_m, area, span,
@@ -129,25 +154,8 @@ def geometry_of(
         for a in profile.actuators
         if a.kind == "thruster" and "thruster" not in off
     )
-    has_wind = profile.has_wind and "wind" not in off
-    return (
-        Geometry(
-            length=main.length,
-            draught=main.draught,
-            mass=main.mass,
-            x_g=main.x_g,
-            density=main.density,
-            frontal_area=main.frontal_area,
-            lateral_area=main.lateral_area,
-            actuators=len(profile.actuators),
-            propellers=propellers,
-            rudders=rudders,
-            thrusters=thrusters,
-            wind=has_wind,
-        ),
-        main,
-        said,
-    )
+    said = tuple(sentence for *_, sentence in sizes if sentence)
+    return propellers, rudders, thrusters, said
 
 
 def _needed(actuator: Actuator, key: str, part: str) -> float:

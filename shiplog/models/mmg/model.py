@@ -8,6 +8,7 @@ from functools import reduce
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from shiplog.models.mmg import body, hull, parameters, propeller, rudder, thruster, wind
@@ -32,6 +33,11 @@ class MMG:
     @property
     def names(self) -> tuple[str, ...]:
         return parameters.names(self.geometry)
+
+    @property
+    def fixed(self) -> dict[str, np.ndarray]:
+        """Arrays that are no coefficients and belong to a run of it: none."""
+        return {}
 
     def forces(
         self, theta: Array, state: Array, actuator: Array, true_wind: Array

@@ -6,38 +6,16 @@ TOML of the same sections and keys, beside the ship's profile: `<profile>.mmg.to
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-import numpy as np
-import tomli_w
-
 from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.models import coefficients
+from shiplog.models.coefficients import ParameterEntry, Parameters
 from shiplog.models.mmg import estimate
 from shiplog.models.mmg.estimate import Particulars
 from shiplog.models.mmg.geometry import Geometry
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterEntry:
-    """One coefficient. Its plausible spread is `share` of its value, or `least` where that is more.
-
-    low, high   outside, it is no ship's: refused when read, and a fit stops there
-    neutral     the value that leaves its term out, where a ship's file does not name it
-    """
-
-    symbol: str
-    meaning: str
-    share: float
-    least: float
-    low: float
-    high: float
-    neutral: float | None = None
-    unit: str = "1"
-
 
 _E = ParameterEntry
 TABLE: dict[str, dict[str, ParameterEntry]] = {
@@ -132,58 +110,12 @@ TABLE: dict[str, dict[str, ParameterEntry]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Parameters:
-    """Names `part.key` in the order of every parameter vector, with start and plausible spread.
-
-    source   where the values are from, for reports
-    """
-
-    names: tuple[str, ...]
-    values: np.ndarray  # [P]
-    spread: np.ndarray  # [P]
-    low: np.ndarray  # [P]
-    high: np.ndarray  # [P]
-    source: str
-
-    def entry(self, name: str) -> ParameterEntry:
-        return _entry(name)
-
-    def with_values(self, values: np.ndarray, source: str | None = None) -> Parameters:
-        return Parameters(
-            self.names, np.asarray(values), self.spread, self.low, self.high, source or self.source
-        )
-
-    def sections(self) -> dict[str, dict[str, float]]:
-        """As a TOML has them."""
-        out: dict[str, dict[str, float]] = {}
-        for name, value in zip(self.names, self.values, strict=True):
-            part, key = name.split(".", 1)
-            out.setdefault(part, {})[key] = float(value)
-        return out
-
-    def to_toml(self) -> str:
-        return tomli_w.dumps({"source": self.source, **self.sections()})
-
-
 _NEEDS = {
     "wind": "[sensors.wind]",
     "propeller": "actuator of kind propeller",
     "rudder": "actuator of kind rudder",
     "thruster": "actuator of kind thruster",
 }
-
-
-def meaning(name: str) -> str:
-    """What a parameter is, in words."""
-    if name.startswith("network."):
-        return "weight of the residual network"
-    return _entry(name).meaning
-
-
-def neutral(name: str) -> float | None:
-    """The value that leaves a parameter's term out; None where it has none."""
-    return None if name.startswith("network.") else _entry(name).neutral
 
 
 def names(geometry: Geometry) -> tuple[str, ...]:
@@ -227,16 +159,7 @@ def load(path: Path | str, geometry: Geometry, without: Iterable[str] = ()) -> P
     without   forces that are switched off: their sections may stand in the file
     """
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ProfileError(
-            f"{path} cannot be read: {error.strerror}.",
-            hint="give --parameters the path of a TOML of MMG coefficients.",
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ProfileError(f"{path} is not valid TOML: {error}.", hint="mend that line.") from error
-    source = str(content.pop("source", path.name))
+    content, source = coefficients.read(path, "MMG")
     for part in content:
         if part in TABLE and part not in (*geometry.parts, *without, "body"):
             raise ProfileError(
@@ -289,34 +212,11 @@ def _from(
                     f"{where}: {part}.{key} is not a coefficient{nearest(key, known[part])}.",
                     hint=f"[{part}] can hold {listed(known[part], most=40)}.",
                 )
-    values, missing = [], []
-    for name in wanted:
-        part, key = name.split(".", 1)
-        value = content.get(part, {}).get(key, _entry(name).neutral)
-        if value is None:
-            missing.append(name)
-        values.append(value)
-    if missing:
-        parts = sorted({name.split(".")[0] for name in missing} - {"body", "hull"})
-        off = f", or leave the force out with --without {' --without '.join(parts)}"
-        raise ProfileError(
-            f"{where} lacks {listed(missing, most=8)}.",
-            hint=f"add them{off if parts else ''}.",
-        )
-    entries = [_entry(name) for name in wanted]
-    array = np.array(values, dtype=float)
-    for name, value, entry in zip(wanted, array, entries, strict=True):
-        if not entry.low <= value <= entry.high:
-            raise ProfileError(
-                f"{where}: {name} ({entry.symbol}) is {value:g}, outside the physical range "
-                f"{entry.low:g} to {entry.high:g}.",
-                hint="correct its value or sign; coefficients are non-dimensional by ½ρL²d.",
-            )
-    spread = widen * np.array(
-        [max(e.share * abs(v), e.least) for e, v in zip(entries, array, strict=True)]
-    )
-    low, high = (np.array([getattr(e, side) for e in entries]) for side in ("low", "high"))
-    return Parameters(wanted, array, spread, low, high, source)
+    entries = {name: _entry(name) for name in wanted}
+    return coefficients.parameters(
+        entries, content, source, widen=widen, where=where,
+        scale="coefficients are non-dimensional by ½ρL²d",
+    )  # fmt: skip
 
 
 def _entry(name: str) -> ParameterEntry:

@@ -1,0 +1,118 @@
+"""The options of `train`: one list for the command line, for Python and for what does it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from shiplog.exceptions import UsageError, listed, nearest
+from shiplog.models import MODELS, PHYSICS, taking
+from shiplog.training.run_config import RECIPES, WIND_INPUTS, Config
+from shiplog.voyages.augmentation import AUGMENTATIONS
+from shiplog.voyages.split_settings import Split
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainOptions:
+    """What is asked of a training. An option that is left as it is says nothing.
+
+    model        which dynamic model, a name in MODELS
+    data         the paper's window set: ref, sli2, ..., d-ref
+    voyages      names or shell patterns of the voyages to learn from; all where there are none
+    validation   those to validate on
+    seeds        how many: 0, 1, ...
+    window       samples in a window, at 1 Hz
+
+    Of networks:
+    recipe       fast, or paper: the published one, which takes hours
+    width        units of each hidden layer
+    wind_input   angle (default of the paper's recipe) or components (of the fast one)
+    epochs       cap on the epochs (paper) or iterations (fast)
+
+    Of physical models:
+    fit          identify; else the coefficients as they are published or estimated
+    parameters   TOML of coefficients to start from
+    without      forces to switch off, such as wind
+    free         patterns of the parameters that may move, such as wind.*; all where there are none
+    folds        parts that voyages are held out in, 5 unless given; 0 holds none out
+    """
+
+    model: str = "feedforward"
+    data: str = "ref"
+    voyages: tuple[str, ...] = ()
+    validation: tuple[str, ...] = ()
+    seeds: int = 1
+    window: int = 100
+    recipe: str = "fast"
+    width: int = 256
+    wind_input: str | None = None
+    epochs: int | None = None
+    fit: bool = True
+    parameters: Path | None = None
+    without: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
+    folds: int | None = None
+
+    def check(self) -> None:
+        """Raises UsageError for a word that names nothing, and for an option that says nothing to
+        the model."""
+        for value, allowed, option in (
+            (self.model, MODELS, "--model"),
+            (self.data, AUGMENTATIONS, "--data"),
+            (self.recipe, RECIPES, "--recipe"),
+            (self.wind_input or WIND_INPUTS[0], WIND_INPUTS, "--wind-input"),
+        ):
+            if value not in allowed:
+                raise UsageError(
+                    f"{option} {value!r} does not exist{nearest(value, allowed)}.",
+                    hint=f"{option} can be {listed(allowed)}.",
+                )
+        kind = MODELS[self.model]
+        for name in self._given():
+            flag = "--no-fit" if name == "fit" else f"--{name.replace('_', '-')}"
+            hint = f"it goes with --model {' or '.join(taking(name))}."
+            if name in kind.family.options and not kind.takes(name):
+                raise UsageError(
+                    f"A {self.model}'s network has to be fitted.", hint=f"{flag}: {hint}"
+                )
+            if not kind.takes(name):
+                raise UsageError(f"{flag} says nothing to {kind.family.noun}.", hint=hint)
+        if AUGMENTATIONS[self.data].copies and not kind.takes("copies"):
+            raise UsageError(
+                f"--data {self.data} is of noisy copies, which an identification has no use for.",
+                hint=f"choose {listed(n for n, a in AUGMENTATIONS.items() if not a.copies)}.",
+            )
+
+    def config(self, split: Split) -> Config:
+        """The configuration of the run, with its voyages."""
+        return Config.model_validate({**self.settings(), "split": split})
+
+    def settings(self) -> dict[str, Any]:
+        """The same without its voyages: the sections that the model reads."""
+        shared = {
+            "model": self.model, "data": self.data, "window": self.window,
+            "seeds": tuple(range(self.seeds)),
+        }  # fmt: skip
+        if MODELS[self.model].family is PHYSICS:
+            physics = {"fit": self.fit, "without": self.without, "free": self.free}
+            return shared | {"physics": physics | _known(folds=self.folds)}
+        return shared | {
+            "recipe": self.recipe,
+            "network": {"width": self.width} | _known(wind_input=self.wind_input),
+            "paper": _known(most_epochs=self.epochs),
+            "fast": _known(iterations=self.epochs),
+        }
+
+    def _given(self) -> list[str]:
+        """Options of one family only that are not as they are left."""
+        return [
+            field.name
+            for field in fields(self)
+            if taking(field.name) and getattr(self, field.name) != field.default
+        ]
+
+
+def _known(**values: Any) -> dict[str, Any]:
+    """Those that somebody gave."""
+    return {name: value for name, value in values.items() if value is not None}

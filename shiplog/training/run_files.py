@@ -1,0 +1,66 @@
+"""Single files of a run folder: arrays, tables and JSON, written whole, and named where spoilt."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import torch
+from safetensors import SafetensorError
+from safetensors.numpy import load_file as load_arrays
+from safetensors.numpy import save_file as save_numpy
+from safetensors.torch import load_file, save_file
+
+from shiplog import files
+from shiplog.exceptions import RunError
+
+
+def unreadable(path: Path, why: object) -> RunError:
+    return RunError(f"{path} cannot be read: {why}.", hint="train the run again.")
+
+
+def json_of(path: Path) -> Any:
+    """Raises RunError."""
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise unreadable(path, error) from error
+
+
+def table(path: Path) -> pl.DataFrame:
+    """Raises RunError."""
+    try:
+        return pl.read_parquet(path)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        raise unreadable(path, error) from error
+
+
+def tensors(path: Path) -> dict[str, torch.Tensor]:
+    """Raises RunError."""
+    try:
+        return load_file(path)
+    except (OSError, SafetensorError) as error:
+        raise unreadable(path, error) from error
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """Raises RunError."""
+    try:
+        return load_arrays(path)
+    except (OSError, SafetensorError) as error:
+        raise unreadable(path, error) from error
+
+
+def save_tensors(path: Path, values: dict[str, torch.Tensor]) -> None:
+    with files.whole(path) as partial:
+        save_file(values, partial)
+
+
+def save_arrays(path: Path, values: Mapping[str, np.ndarray]) -> None:
+    with files.whole(path) as partial:
+        plain = {name: np.array(a, dtype=float, order="C") for name, a in values.items()}
+        save_numpy(plain, partial)

@@ -1,0 +1,111 @@
+"""One seed of a run as its folder keeps it: weights, coefficients, checkpoints.
+
+<seed>/model.safetensors  training.parquet    a network: weights; epoch, losses; never redone
+<seed>/checkpoint.safetensors                 while the paper's recipe trains it
+<seed>/model.safetensors  parameters.toml  identified.parquet    a physical model
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import torch
+
+from shiplog import files
+from shiplog.models.feedforward import FeedForward
+from shiplog.simulation.sensitivities import Simulator
+from shiplog.training import run_files
+from shiplog.training.network_training import HISTORY, Progress
+
+
+def save_network(folder: Path, progress: Progress) -> None:
+    """The best weights and the history; the checkpoint has served its purpose."""
+    folder.mkdir(exist_ok=True)
+    run_files.save_tensors(folder / "model.safetensors", _named(progress.best_weights))
+    history = pl.DataFrame(progress.history, schema=list(HISTORY), orient="row")
+    files.write_frame(folder / "training.parquet", history)  # last: `finished` looks for it
+    (folder / "checkpoint.safetensors").unlink(missing_ok=True)
+
+
+def fill(model: FeedForward, folder: Path) -> FeedForward:
+    """The network with the weights of a seed, in float64. Raises RunError."""
+    path = folder / "model.safetensors"
+    tensors = run_files.tensors(path)
+    try:
+        with torch.no_grad():
+            for name, parameter in zip(_named(model.weights), model.weights, strict=True):
+                parameter.copy_(tensors[name])
+    except (KeyError, RuntimeError) as error:  # of another size than the settings say
+        raise run_files.unreadable(path, error) from error
+    return model.double()
+
+
+def save_checkpoint(folder: Path, progress: Progress) -> None:
+    """Everything a killed training needs to go on as if nothing had happened."""
+    folder.mkdir(exist_ok=True)
+    tensors = {
+        **_named(progress.weights),
+        **{f"best.{name}": w for name, w in _named(progress.best_weights).items()},
+        **{f"moment.{i:02d}": m.contiguous() for i, m in enumerate(progress.moments)},
+        "history": torch.tensor(progress.history, dtype=torch.float64),
+        "numbers": torch.tensor(
+            [progress.best, progress.first, progress.smoothed, progress.steps],
+            dtype=torch.float64,
+        ),
+    }
+    if progress.stream is not None:
+        tensors["stream"] = progress.stream
+    run_files.save_tensors(folder / "checkpoint.safetensors", tensors)
+
+
+def load_checkpoint(folder: Path) -> Progress | None:
+    """Where an unfinished seed stands, or None."""
+    path = folder / "checkpoint.safetensors"
+    if not path.is_file():
+        return None
+    tensors = run_files.tensors(path)
+    rows = [(int(row[0]), *row[1:]) for row in tensors["history"].tolist()]
+    best, first, smoothed, steps = tensors["numbers"].tolist()
+    order = list(_named([torch.empty(0)] * sum(n.startswith("layer") for n in tensors)))
+    return Progress(
+        epoch=rows[-1][0],
+        weights=[tensors[name] for name in order],
+        best_weights=[tensors[f"best.{name}"] for name in order],
+        best=best,
+        first=first,
+        smoothed=smoothed,
+        moments=[tensors[n] for n in sorted(tensors) if n.startswith("moment.")],
+        steps=int(steps),
+        stream=tensors.get("stream"),
+        history=rows,
+    )
+
+
+def _named(weights: list[torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {
+        f"layer{i // 2:02d}.{('weight', 'bias')[i % 2]}": w.contiguous()
+        for i, w in enumerate(weights)
+    }
+
+
+def save_physics(
+    folder: Path,
+    simulator: Simulator,
+    fixed: Mapping[str, np.ndarray],
+    parameters: str,
+    identified: pl.DataFrame,
+) -> None:
+    """A physical model.
+
+    fixed       arrays that are no coefficients (the hybrid's scaling and anchors)
+    parameters  TOML that --parameters takes
+    identified  a row a coefficient: name, value, standard error, start, spread
+    """
+    folder.mkdir(exist_ok=True)
+    arrays = {"theta": simulator.theta, "covariance": simulator.covariance, **fixed}
+    run_files.save_arrays(folder / "model.safetensors", arrays)
+    (folder / "parameters.toml").write_text(parameters, encoding="utf-8")
+    identified.write_parquet(folder / "identified.parquet")
