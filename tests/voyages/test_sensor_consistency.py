@@ -198,8 +198,7 @@ def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
     for seed in range(70, 82):
         voyage = sail(500.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
         write_voyage(tmp_path / "a.mcap", voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
-        table = ingest(tmp_path / "a.mcap", VECTWIN).table
-        for e in sensor_consistency.estimates(table, VECTWIN):
+        for e in ingest(tmp_path / "a.mcap", VECTWIN).estimates:
             if e.channel == "yaw_rate":
                 inside.append(e.low <= truth[e.kind] <= e.high)
     assert len(inside) == 36
