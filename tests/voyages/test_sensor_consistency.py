@@ -291,6 +291,6 @@ def test_too_short_a_voyage_says_nothing():
 
 def test_eight_hours_take_seconds():
     hours = pl.concat([in_body_axes(8, late={"yaw_rate": 0.5})] * 32)
-    began = time.perf_counter()
+    began = time.process_time()  # whatever else the machine does
     assert ("clock_offset", "yaw_rate") in found(hours)
-    assert time.perf_counter() - began < 15.0  # 2 s on an idle machine
+    assert time.process_time() - began < 10.0  # 1 s on an idle machine
