@@ -105,7 +105,7 @@ def linear(seen: Record) -> Linear:
     g = segments.grid(seen)
     cut = segments.cut(seen, residual_acceleration.covering(seen))
     path = linearisation.pulled(model, THETA, cut, g, WIDE)
-    y, z = linearisation._run(model, THETA, cut, path, g)
+    y, z = linearisation.simulated(model, THETA, cut, path, g)
     at = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
     return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

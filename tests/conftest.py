@@ -1,4 +1,4 @@
-"""What tests share: the folder of real logs, where there is one."""
+"""What tests share: compiled functions, their order, the folder of real logs where there is one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,30 @@ from pathlib import Path
 
 import pytest
 
+from shiplog import disk_cache
+
 # Many small matrices: BLAS's threads would wait for each other. Set before numpy is loaded.
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
+# What one worker, or a command that a test starts, has compiled serves the others.
+disk_cache.keep_compiled()
+
+# Modules of more than twenty seconds, the longest first: the workers then end together. A module is
+# one worker's, with the fixtures that are made once for it.
+LONGEST = (
+    "pipelines/test_real_logs.py", "pipelines/test_demo.py", "diagnosis/test_whole_way.py",
+    "diagnosis/test_network_base.py", "pipelines/test_tour.py", "pipelines/test_paper.py",
+    "pipelines/test_train_physics.py", "voyages/test_sensor_consistency.py", "cli/test_endings.py",
+    "experiments/test_simulated_ship.py", "voyages/test_sensor_correction.py",
+    "training/test_hybrid_training.py", "diagnosis/test_residual_acceleration.py",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest modules first; the others as they were found."""
+    tests = Path(__file__).parent
+    rank = {tests / name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path, len(rank)))
 
 
 @pytest.fixture(scope="session")

@@ -36,11 +36,11 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         verdict, named = "named", _named(search, found, best, names)
     elif best.kind != NOMINAL and (kind is not None or names):
         verdict, structure = "unknown", _structure(search, best)
-        if best.kind == INTERMITTENT and best.pulses is not None and _is_device(search, best):
+        if best.kind == INTERMITTENT and best.pulses is not None and is_device(search, best):
             verdict, structure, pulses = "named", None, best.pulses
     elif found.none >= thresholds.STATED:
         verdict = "none"
-    if verdict == "named" and best.kind == INTERMITTENT and _is_device(search, best):
+    if verdict == "named" and best.kind == INTERMITTENT and is_device(search, best):
         pulses = best.pulses
     traces = ()
     if verdict == "none":
@@ -116,7 +116,7 @@ def _structure(search: Search, best: Hypothesis) -> Structure:
     return Structure(family, gained, acts_on)
 
 
-def _is_device(search: Search, best: Hypothesis) -> bool:
+def is_device(search: Search, best: Hypothesis) -> bool:
     assert best.pulses is not None
     trial = search.trial
     kept = trial.unrest

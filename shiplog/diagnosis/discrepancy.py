@@ -60,7 +60,7 @@ class Family:
 
     def features(self, knots: Knots) -> np.ndarray:
         """[S, J, 3, 3F]: acceleration of each weight, in units of the process noise."""
-        values = (_features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
+        values = (features(self.name, self.profile, self.waves, knots) - self.level) / self.scale
         plain = EVEN.get(self.name, 0)
         out = segment_nodes.in_each_channel(values[..., plain:] / np.sqrt(values.shape[-1] - plain))
         if self.name == "position":
@@ -106,7 +106,7 @@ def of(
         waves = _waves(name, *campaigns)
         if waves is None:
             continue
-        parts = [_features(name, profile, waves, knots) for knots in campaigns]
+        parts = [features(name, profile, waves, knots) for knots in campaigns]
         both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
         # a push that is always there depends on nothing
         level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
@@ -137,7 +137,7 @@ def _waves(name: str, *campaigns: Knots) -> Waves | None:
     return Waves(z.mean(0), np.where(width > 1e-9, width, 1.0), frequency, phase)
 
 
-def _features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
+def features(name: str, profile: Profile, waves: Waves, knots: Knots) -> np.ndarray:
     """[S, J, F]"""
     inputs = _inputs(name, knots)
     smooth = waves(inputs)
@@ -169,10 +169,10 @@ def _inputs(name: str, knots: Knots) -> np.ndarray:
         return state[..., [1, 3, 5]]
     if name == "controls":
         return np.concatenate((driven[..., :-3], state[..., [1]]), -1)
-    return _apparent(knots)
+    return apparent_flow(knots)
 
 
-def _apparent(knots: Knots) -> np.ndarray:
+def apparent_flow(knots: Knots) -> np.ndarray:
     """[..., 2] where the apparent wind comes from, ahead and to starboard [m/s]."""
     state = knots.state
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
@@ -204,13 +204,13 @@ def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
             continue
         angle = knots.driven[..., [i]]
         found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
-        for j in _driven_by(profile, i, driving):
+        for j in driven_by(profile, i, driving):
             thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
     return found
 
 
-def _driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
+def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
     """Units whose jet an angle turns: those at the same place; of a rudder the first two."""
     place = profile.actuators[angle].position_m
     same = [j for j in driving if profile.actuators[j].position_m == place]
@@ -218,7 +218,7 @@ def _driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
 
 
 def _of_wind(profile: Profile, knots: Knots) -> list[np.ndarray]:
-    wind = _apparent(knots)
+    wind = apparent_flow(knots)
     square, angle = (wind**2).sum(-1, keepdims=True), np.arctan2(wind[..., [1]], wind[..., [0]])
     return [square * wave(k * angle) for k in (1, 2, 3) for wave in (np.cos, np.sin)]
 

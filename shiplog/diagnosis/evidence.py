@@ -45,7 +45,7 @@ class TrialEvidence:
         self.rows = segments.begins(record)
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
         self.first: Point | None = None
-        self._modes: list[tuple[Weighed, Modes]] = []
+        self.kept_modes: list[tuple[Weighed, Modes]] = []
         self._volumes: dict[tuple[float, bytes], float] = {}
         self.rested: dict[tuple[tuple[str, ...], bytes], tuple[dict, Path, float]] = {}
         self.weight = np.ones(len(self.rows))
@@ -155,12 +155,12 @@ class TrialEvidence:
         if self.unrest.pulse is not None:
             found = likelihood.modes(point.weighed, self.unrest.louder(louder))
             return self._misfitting(found, point), 1.0
-        for of, found in self._modes:
+        for of, found in self.kept_modes:
             if of is point.weighed:
                 return found, louder
         found = self._misfitting(likelihood.modes(point.weighed, self.unrest), point)
         # the first point's, for `volume`, and the last two
-        self._modes = [*self._modes[:1], *self._modes[1:][-1:], (point.weighed, found)]
+        self.kept_modes = [*self.kept_modes[:1], *self.kept_modes[1:][-1:], (point.weighed, found)]
         return found, louder
 
     def _misfitting(self, modes: Modes, point: Point) -> Modes:
@@ -307,7 +307,7 @@ class TrialEvidence:
             found.append(max(tried, key=lambda f: f.evidence))
         base = Found(
             "nothing", 0.0, best.louder,
-            *self._numbers(best, point, included),
+            *self.numbers_of(best, point, included),
         )  # fmt: skip
         moved = [replace(f, evidence=f.evidence - best.value) for f in found]
         return replace(base, evidence=best.value), sorted(moved, key=lambda f: -f.evidence)
@@ -336,7 +336,7 @@ class TrialEvidence:
             left * np.outer(unit, unit), told,
         )  # fmt: skip
 
-    def _numbers(
+    def numbers_of(
         self, level: Level, point: Point, included: Sequence[str]
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         columns = self.reference.columns
@@ -363,7 +363,7 @@ class TrialEvidence:
             level = self.level(point, louder, included)
         finally:
             self.weight = kept
-        return self._numbers(level, point, included)[0], self._coefficients(level)
+        return self.numbers_of(level, point, included)[0], self._coefficients(level)
 
     def coefficients(self, point: Point, base: Found) -> np.ndarray:
         """[P] of the base, beside a hypothesis of that point; of a network its bends [F, 3]."""

@@ -71,8 +71,8 @@ class HeldOut(Rollouts):
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
         states = np.empty(tuple(self.cut.state.shape))
         needed = self._constants(decision)
-        for voyage, half, rows in self._folds():
-            numbers, coefficients = self._without(decision, voyage, half)
+        for voyage, half, rows in self.folds():
+            numbers, coefficients = self.without(decision, voyage, half)
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
             )
@@ -154,7 +154,7 @@ class HeldOut(Rollouts):
         """Whether halves of voyages are left out: of one alone."""
         return len(set(self.voyages)) == 1
 
-    def _folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
+    def folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
         """(voyage, half of it, window rows) that are left out: whole voyages, or halves of one."""
         elapsed = self.cut.plan["elapsed"].to_numpy()
         for name in dict.fromkeys(self.voyages):
@@ -169,7 +169,7 @@ class HeldOut(Rollouts):
                 if len(rows):
                     yield name, (middle, late), rows
 
-    def _without(
+    def without(
         self, decision: Decision, voyage: str, half: Half
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         """Numbers of the named causes from all else alone, and the coefficients beside them where

@@ -73,7 +73,7 @@ def _ab2(values: Array, before: Array, first) -> Array:
 
 
 @traced
-def _path(model, theta, start, push, driven, step):
+def states_along(model, theta, start, push, driven, step):
     """States [S, K, 6] at the nodes, accelerations `push` [S, K, 3] added."""
 
     def advance(carry, along):
@@ -136,7 +136,7 @@ def accelerations(
 ) -> np.ndarray:
     """ν̇ [S, n, 3] at states [S, n, 6]."""
     said = np.empty((*states.shape[:2], 3))
-    for part, filled in _chunks(len(states)):
+    for part, filled in chunks(len(states)):
         found = _accelerations(model, theta, filled(states), filled(driven))
         said[part] = np.asarray(found)[: len(said[part])]
     return said
@@ -167,7 +167,7 @@ def pulled(
     """Each segment's path onto what was measured: Gauss-Newton in start and knots."""
     path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
-        y, z = _run(model, theta, segments, path, g)
+        y, z = simulated(model, theta, segments, path, g)
         path = _closer(path, segments.y - y, z, segments.used, wide)
     return path
 
@@ -216,7 +216,7 @@ def linear(
     wide    how freely the path was pulled: what is FAR times that from its measurement has run
             away; FAR times what the segments span where it is not given
     """
-    y, columns = _run(model, theta, segments, path, g, moved)
+    y, columns = simulated(model, theta, segments, path, g, moved)
     lost = _lost(segments, y, columns, wide)
     if lost.any():
         used = segments.used & ~lost[:, None, None]
@@ -248,7 +248,7 @@ def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) 
     return ~(near & np.isfinite(y).all((1, 2)) & np.isfinite(columns).all((1, 2, 3)))
 
 
-def _chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
+def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
     """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
     up: one compilation serves all."""
     for at in range(0, count, SEGMENTS_AT_A_TIME):
@@ -284,7 +284,7 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
     return every
 
 
-def _run(model, theta, segments, path, g, moved=None):
+def simulated(model, theta, segments, path, g, moved=None):
     """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
     model runs away."""
     with np.errstate(all="ignore"):
@@ -297,10 +297,12 @@ def _every(model, theta, segments, path, g, moved):
     push, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
     per = many * (g.nodes - 1) // g.bins
     ys, columns = [], []
-    for part, filled in _chunks(len(segments)):
+    for part, filled in chunks(len(segments)):
         driven = _between(filled(segments.driven), many)
         states = np.asarray(
-            _path(model, theta, filled(path.start), _between(filled(push), many), driven, step)
+            states_along(
+                model, theta, filled(path.start), _between(filled(push), many), driven, step
+            )
         )
         keep = slice(part.stop - part.start)
         by_state, by_driven, by_theta = _along(

@@ -207,14 +207,14 @@ class Search:
             levels.append(trial.level(point, 1.0, included))
         usual = self._best(levels, NOMINAL).louder
         if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # it is drawn towards the usual noise
-            levels += self._drawn(point, included, usual)
+            levels += self.levels_of(point, included, usual)
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
         if len(labels) == 1:
             gained = self.found[labels, NOMINAL].evidence - self.nothing.evidence
             self.alone[labels[0]] = max(gained, self.alone.get(labels[0], -math.inf))
         best = max((self.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
-        changed = [self._changed(point, included, levels, family) for family in trial.families]
+        changed = [self.changed(point, included, levels, family) for family in trial.families]
         scores = [self._score(c.value, labels, c.remainder.kind) for c in changed]
         near = max((best.score, *(score - SEARCH_NATS for score in scores)))
         for one, score in zip(changed, scores, strict=True):
@@ -223,7 +223,7 @@ class Search:
             self._pulses(point, labels)
         self._forget()
 
-    def _drawn(self, point: Point, included: Sequence[str], usual: float) -> list[Level]:
+    def levels_of(self, point: Point, included: Sequence[str], usual: float) -> list[Level]:
         """Levels about the best one under `nominal`, as made under RAISED."""
         trial = self.trial
         trial.remainder = Remainder(NOMINAL)
@@ -246,7 +246,7 @@ class Search:
         expected = self.trial.expected
         return expected(noise, Remainder(RAISED)) - expected(noise, Remainder(NOMINAL))
 
-    def _changed(
+    def changed(
         self, point: Point, included: Sequence[str], levels: Sequence[Level], family: str
     ) -> Change:
         """A change of one family's weights beside included causes, at its best size and noise.
@@ -296,7 +296,7 @@ class Search:
     def _keep(
         self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level
     ) -> None:
-        numbers, covariance = self.trial._numbers(level, point, self._included(labels))
+        numbers, covariance = self.trial.numbers_of(level, point, self._included(labels))
         found = Found("+".join(labels), level.value, level.louder, numbers, covariance)
         self._put(labels, remainder, level.value, point, found)
 

@@ -74,7 +74,7 @@ class Trial(evidence.TrialEvidence):
         self.voyage = record.voyage[self.rows[[part[0] for part in self.parts]]]  # of each part
         self.remainder = Remainder()  # that `scan` includes
         self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model runs away
-        self._begun = False
+        self.begun = False
         self._totals: list[tuple[weakref.ref[Weighed], tuple, np.ndarray, float]] = []
 
     @property
@@ -90,7 +90,7 @@ class Trial(evidence.TrialEvidence):
         point = super().at(numbers, near, louder)
         lost = point.linear.lost
         if lost is not None and (lost & (self.weight > 0.0)).any():
-            if point is not self.first and self._begun:
+            if point is not self.first and self.begun:
                 raise np.linalg.LinAlgError("the model runs away with these numbers")
             self.weight = np.where(lost, 0.0, self.weight)
             self.lost = lost
@@ -98,7 +98,7 @@ class Trial(evidence.TrialEvidence):
 
     def begin(self, numbers: Mapping[str, np.ndarray]) -> Point:
         point = super().begin(numbers)
-        self._begun = True
+        self.begun = True
         return point
 
     def robust(self, point: Point) -> None:
@@ -240,7 +240,7 @@ class Trial(evidence.TrialEvidence):
             at(here * FINER**top)
         return list(tried.values())
 
-    def _numbers(self, level, point, included):
+    def numbers_of(self, level, point, included):
         """Numbers and covariance of the included causes; a family's weights come after them."""
         found: dict[str, np.ndarray] = {}
         columns = self.reference.columns
@@ -264,7 +264,7 @@ class Trial(evidence.TrialEvidence):
         finally:
             self.weight = kept
         level = self.solve(total, 0.0, louder, point, included, ref.information, ref.pull)
-        return self._numbers(level, point, included)[0], self._coefficients(level)
+        return self.numbers_of(level, point, included)[0], self._coefficients(level)
 
     def of_parts(self, linear: Linear, point: Point, base: Found) -> Linear:
         """A pass of this trial without what each part's own deviations do, under a hypothesis of

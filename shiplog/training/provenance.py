@@ -31,7 +31,7 @@ def provenance(store: Store, split: Split, began: float) -> dict:
     used = [*split.training, *split.validation]
     return {
         "shiplog": version("shiplog"),
-        "commit": _commit(),
+        "commit": commit_of_source(),
         "python": platform.python_version(),
         "torch": torch.__version__,
         "polars": pl.__version__,
@@ -48,7 +48,7 @@ def _utc(stamp: float) -> str:
     return datetime.datetime.fromtimestamp(stamp, datetime.UTC).isoformat(timespec="seconds")
 
 
-def _commit() -> str | None:
+def commit_of_source() -> str | None:
     """The source's commit, where shiplog runs from its own checkout.
 
     Installed into an environment inside somebody's repository, git would name their commit.

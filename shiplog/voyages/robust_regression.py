@@ -75,11 +75,12 @@ def bins(starts: np.ndarray, margin: int) -> Bins:
 
 def shifted(values: np.ndarray, rows: float) -> np.ndarray:
     """[n, c] as it is `rows` later, between rows by a straight line; the ends stand still."""
-    whole = int(np.floor(rows))
+    whole, count = int(np.floor(rows)), len(values)
     share = rows - whole
-    at = np.arange(len(values)) + whole
-    low, high = at.clip(0, len(values) - 1), (at + 1).clip(0, len(values) - 1)
-    return values[low] + share * (values[high] - values[low])
+    lead, tail = (min(max(n, 0), count + 1) for n in (-whole, whole + 1))
+    inside = values[max(whole, 0) : max(count + 1 + min(whole, -1), 0)]
+    held = np.concatenate((np.repeat(values[:1], lead, 0), inside, np.repeat(values[-1:], tail, 0)))
+    return held[:-1] + share * (held[1:] - held[:-1])
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 import polars as pl
@@ -36,6 +37,7 @@ VOYAGE_ROWS = 36_000  # of a long voyage the liveliest hour says it all
 ROUGH_ROWS = 6_000
 CHUNK_ROWS = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
+POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, or neither
 MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
 SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be away from none, to be said
 CERTAIN = 4.0  # the same, to be put right where that is asked for
@@ -195,14 +197,15 @@ def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
         of_heading = grid.change(motion.heading[:, None])
         turned = _integral(motion.yaw_rate[:, None])
 
-        def late(p: np.ndarray) -> np.ndarray:
-            return grid.change(shifted(turned, p[TAU_R] / STEP_S))
+        @lru_cache(maxsize=POINTS_KEPT)
+        def late(delay: float) -> np.ndarray:
+            return grid.change(shifted(turned, delay / STEP_S))
 
         def model(p: np.ndarray) -> np.ndarray:
-            return late(p) - (1.0 + p[RATE_SCALE]) * of_heading - p[RATE_BIAS]
+            return late(p[TAU_R]) - (1.0 + p[RATE_SCALE]) * of_heading - p[RATE_BIAS]
 
         def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
-            return {RATE_SCALE: -(late(p) - p[RATE_BIAS]) / (1.0 + p[RATE_SCALE])}
+            return {RATE_SCALE: -(late(p[TAU_R]) - p[RATE_BIAS]) / (1.0 + p[RATE_SCALE])}
 
         return Problem(
             model, grid, steps=np.array([STEP_S, 1e-3, 1e-4]),
@@ -229,17 +232,24 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
     def problem(motion: Motion, margin: float) -> Problem:
         grid = bins(motion.starts, round(margin / STEP_S) + 2)
 
+        @lru_cache(maxsize=POINTS_KEPT)
+        def travelled(delay: float, offset: float, ahead: float, starboard: float) -> np.ndarray:
+            antenna = _turned(motion.heading - offset, arm + np.array((ahead, starboard)))
+            return grid.change(shifted(motion.position, delay / STEP_S) - antenna)
+
+        @lru_cache(maxsize=POINTS_KEPT)
+        def logged(delay: float, offset: float) -> np.ndarray:
+            velocity = shifted(motion.velocity, delay / STEP_S)
+            over_ground = _turned(motion.heading - offset, velocity) if body else velocity
+            return grid.change(_integral(over_ground))
+
         def sides(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            heading = motion.heading - p[OFFSET]
-            velocity = shifted(motion.velocity, p[TAU_V] / STEP_S)
-            over_ground = _turned(heading, velocity) if body else velocity
-            antenna = _turned(heading, arm + p[[AHEAD, STARBOARD]])
-            travel = shifted(motion.position, p[TAU_P] / STEP_S) - antenna
-            return grid.change(travel) - p[[DRIFT_X, DRIFT_Y]], grid.change(_integral(over_ground))
+            travel = travelled(p[TAU_P], p[OFFSET], p[AHEAD], p[STARBOARD])
+            return travel - p[[DRIFT_X, DRIFT_Y]], logged(p[TAU_V], p[OFFSET])
 
         def model(p: np.ndarray) -> np.ndarray:
-            travelled, said = sides(p)
-            return travelled - said / (1.0 + p[SPEED_SCALE])
+            travel, said = sides(p)
+            return travel - said / (1.0 + p[SPEED_SCALE])
 
         def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
             return {SPEED_SCALE: sides(p)[0] / (1.0 + p[SPEED_SCALE])}

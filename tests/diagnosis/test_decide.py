@@ -64,9 +64,10 @@ def test_a_name_that_is_sure_beside_one_that_is_not(trial):
 
 
 def test_nothing(trial):
-    found = verdict(trial, {((), NOMINAL): 0.95, (DRAG, NOMINAL): 0.05})
+    sure, unsure = thresholds.STATED + 0.01, thresholds.STATED - 0.01
+    found = verdict(trial, {((), NOMINAL): sure, (DRAG, NOMINAL): 1.0 - sure})
     assert (found.verdict, named(found), found.traces) == ("none", [], ())
-    found = verdict(trial, {((), NOMINAL): 0.85, (DRAG, NOMINAL): 0.15})
+    found = verdict(trial, {((), NOMINAL): unsure, (DRAG, NOMINAL): 1.0 - unsure})
     assert found.verdict == "undecided"
 
 
@@ -93,14 +94,14 @@ def test_a_kind_of_remainder_is_unknown_and_says_its_family(trial, kind, family)
 
 
 def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
-    """80 nats together, of which the cause has 30 by itself: unknown. Of 70 by itself: a name."""
-    assert thresholds.MOST == 0.5
+    """Of 80 nats together it must have the share MOST by itself: with less, unknown."""
+    least = 80.0 * thresholds.MOST
     sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
-    evidence = {(DRAG, "time"): 80.0, (DRAG, NOMINAL): 30.0}
+    evidence = {(DRAG, "time"): 80.0, (DRAG, NOMINAL): least - 5.0}
     little = verdict(trial, sure, evidence=evidence)
     assert (little.verdict, named(little)) == ("unknown", [])
     assert little.structure.family == "time"
-    much = verdict(trial, sure, evidence=evidence | {(DRAG, NOMINAL): 70.0})
+    much = verdict(trial, sure, evidence=evidence | {(DRAG, NOMINAL): least + 5.0})
     assert (much.verdict, named(much)) == ("named", ["drag"])
 
 
@@ -132,7 +133,7 @@ def test_a_name_of_two_kinds_is_shown_in_the_likelier(trial):
 def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, monkeypatch):
     sure = {((), INTERMITTENT): 0.98, ((), NOMINAL): 0.02}
     for device, wanted in ((True, "named"), (False, "unknown")):
-        monkeypatch.setattr(deciding, "_is_device", lambda *_, device=device: device)
+        monkeypatch.setattr(deciding, "is_device", lambda *_, device=device: device)
         found = verdict(trial, sure, pulses=PULSES)
         assert found.verdict == wanted
         assert (found.pulses is PULSES) == device

@@ -112,8 +112,8 @@ def test_an_azimuth_turns_the_thruster_at_its_own_place():
         + actuator("bow", "thruster", (1.5, 0.0))
         + actuator("tunnel", "thruster", (1.0, 0.0))
     )
-    assert discrepancy._driven_by(of, 0, [1, 3, 4]) == [3]
-    assert discrepancy._driven_by(of, 2, [1, 3, 4]) == [1]
+    assert discrepancy.driven_by(of, 0, [1, 3, 4]) == [3]
+    assert discrepancy.driven_by(of, 2, [1, 3, 4]) == [1]
     given = np.array([[[0.5, 2.0, -0.7, 3.0, 1.0]]])
     found = products("controls", of, knots(np.zeros((1, 1, 6)), given))[0, 0]
     # three thrusters of two products each, then four of each angle
@@ -129,7 +129,7 @@ def test_a_rudder_turns_two_screws_at_most():
         "".join(actuator(f"screw_{i}", "propeller", (0.0, i)) for i in (1, 2, 3))
         + actuator("rudder", "rudder", (-1.5, 0.0))
     )
-    assert discrepancy._driven_by(of, 3, [0, 1, 2]) == [0, 1]
+    assert discrepancy.driven_by(of, 3, [0, 1, 2]) == [0, 1]
 
 
 def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
@@ -138,7 +138,7 @@ def test_wind_goes_with_its_square_and_harmonics_of_its_angle():
     state = np.zeros((1, 1, 6))
     state[..., 1], state[..., 4] = 1.0, 0.5 * math.pi
     at = knots(state, wind=np.array([[[2.0, 0.0]]]))
-    assert discrepancy._apparent(at)[0, 0] == pytest.approx([1.0, -2.0])
+    assert discrepancy.apparent_flow(at)[0, 0] == pytest.approx([1.0, -2.0])
     angle = math.atan2(-2.0, 1.0)
     wanted = [5.0 * f(k * angle) for k in (1, 2, 3) for f in (math.cos, math.sin)]
     assert products("wind", TWIN, at)[0, 0] == pytest.approx(wanted)
@@ -177,7 +177,7 @@ def test_only_what_no_model_has_is_taken_from_its_mean():
         assert (one(name, TWIN, at).level == 0.0).all()
     for name in UNSEEN:
         family = one(name, TWIN, at)
-        features = discrepancy._features(name, TWIN, family.waves, at)
+        features = discrepancy.features(name, TWIN, family.waves, at)
         even = discrepancy.EVEN[name]
         assert (family.level[:even] == 0.0).all()
         assert family.level[even:] == pytest.approx(features.mean((0, 1))[even:])

@@ -75,7 +75,7 @@ def test_the_integration_is_of_second_order():
     for step in (0.2, 0.1, 0.05):
         nodes = round(seconds / step) + 1
         start = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
-        states = linearisation._path(
+        states = linearisation.states_along(
             Coasting(), np.array([k]), start, np.zeros((1, nodes, 3)), np.zeros((1, nodes, 3)), step
         )
         last = np.asarray(states)[0, -1]
@@ -90,7 +90,7 @@ def test_a_push_is_an_acceleration():
     nodes, step = 61, 0.2
     push = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
-        linearisation._path(
+        linearisation.states_along(
             Coasting(), np.zeros(1), np.zeros((1, 6)), push, np.zeros((1, nodes, 3)), step
         )
     )
@@ -182,7 +182,7 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
     record = measurement_correction.corrected(model.causes, SEEN, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
-        linearisation._path(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
+        linearisation.states_along(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
     )
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     return cut.y - pairs.reshape(len(ROWS), GRID.bins, -1, 6).mean(2)
@@ -249,7 +249,7 @@ def test_columns_of_causes_that_read(linearised, label, i, column):
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
     """Segments whose measurements are the toy's own."""
     cut = segments.cut(SEEN, ROWS)
-    y, _ = linearisation._run(Toy(), theta, cut, at, GRID)
+    y, _ = linearisation.simulated(Toy(), theta, cut, at, GRID)
     return replace(cut, y=y)
 
 
@@ -293,7 +293,7 @@ def test_a_path_is_pulled_onto_a_known_push():
     true = Path(SEEN.state[ROWS], np.tile(push, (4, 1, 1)))
     cut = simulated(true)
     found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
-    y, _ = linearisation._run(Toy(), THETA, cut, found, GRID)
+    y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
     # within, where bins on both sides see a knot
@@ -309,7 +309,7 @@ def test_a_path_is_pulled_on_a_longer_grid_too():
     true = Path(SEEN.state[rows], np.tile(push, (2, 1, 1)))
     cut, moved, shown = measurement_correction.read(Toy(), SETTING, seen, rows)
     assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
-    y, _ = linearisation._run(Toy(), THETA, cut, true, g)
+    y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)
     found = linearisation.pulled(Toy(), THETA, cut, g, tight, rounds=3)
@@ -325,7 +325,7 @@ def test_what_was_not_used_does_not_pull():
     wrong = np.where(used, cut.y, 1e3)
     bad = replace(cut, y=wrong, used=used)
     found = linearisation.pulled(Toy(), THETA, bad, GRID, WIDE, true)
-    y, _ = linearisation._run(Toy(), THETA, bad, found, GRID)
+    y, _ = linearisation.simulated(Toy(), THETA, bad, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-6)
 
 
@@ -436,10 +436,10 @@ def test_what_training_holds_is_held_here():
     """Damping of 7 1/s, stable with four Euler steps a second: u = e^(-7t). With the nodes' step
     alone the speed would grow by half from step to step."""
     cut, at, y = coasting()
-    found, columns = linearisation._run(Stiff(4), np.array([7.0]), cut, at, GRID)
+    found, columns = linearisation.simulated(Stiff(4), np.array([7.0]), cut, at, GRID)
     assert found[:, 1:] == pytest.approx(y[:, 1:], abs=0.02)  # of the whole way, 1/7 m
     assert np.abs(columns[..., 1]).max() < 1.0
-    wild, _ = linearisation._run(Stiff(1), np.array([7.0]), cut, at, GRID)
+    wild, _ = linearisation.simulated(Stiff(1), np.array([7.0]), cut, at, GRID)
     assert not np.isfinite(wild).all() or np.abs(wild).max() > 1e6
 
 
@@ -450,7 +450,7 @@ def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
     found = linearisation.linear(model, theta, cut, GRID, at, *none)
 
     def y(theta, at):
-        return linearisation._run(model, theta, cut, at, GRID)[0]
+        return linearisation.simulated(model, theta, cut, at, GRID)[0]
 
     for i in range(4):
         h = 1e-5 * np.eye(4)[i]
@@ -477,13 +477,15 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     model = mmg.MMG(ship)
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
-    ((_, filled),) = linearisation._chunks(4)  # as many at a time, so that rounding is the same
+    ((_, filled),) = linearisation.chunks(4)  # as many at a time, so that rounding is the same
     start, push, driven = map(filled, (at.start, at.at_nodes(GRID), plain.driven))
-    states = np.asarray(linearisation._path(model, theta, start, push, driven, cut.step))[:4]
+    states = np.asarray(linearisation.states_along(model, theta, start, push, driven, cut.step))[:4]
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     wanted = pairs.reshape(4, GRID.bins, -1, 6).mean(2)
     for substeps in (1, 2):
-        found, _ = linearisation._run(replace(model, substeps=substeps), theta, plain, at, GRID)
+        found, _ = linearisation.simulated(
+            replace(model, substeps=substeps), theta, plain, at, GRID
+        )
         assert np.array_equal(found, wanted)
 
 

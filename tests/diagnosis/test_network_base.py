@@ -11,12 +11,11 @@ from pipelines.diagnose import diagnose_run
 from pipelines.experiments.simulated_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
-from shiplog.diagnosis import network_base, placebo, search
+from shiplog.diagnosis import network_base, setup
 from shiplog.diagnosis import trial_voyages as trials
-from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.setup import trial_of
-from shiplog.diagnosis.trial_voyages import in_ship_time, record_of, windows_of
+from shiplog.diagnosis.trial_voyages import in_ship_time, record_of
 from shiplog.exceptions import RunError
 from shiplog.report import verdict as verdicts
 from shiplog.training import extension_file, load_model
@@ -47,19 +46,19 @@ def afloat(tmp_path_factory):
     )  # fmt: skip
     run = train_run(config, store, work / "run")
     _, recorded = in_ship_time(run, None, record_of(store, names, run.profile))
-    made = trial_of(run, None, recorded, ())
-    trial, untested = made.trial, made.untested
-    point = trial.begin({})
-    found = search.Search(trial, point, placebo.placebos(trial.campaign))
-    found.run()
-    decision, _ = decide(found)
-    network = network_base.Own(run, trial)
-    cut = windows_of(run, store, names, run.profile)
-    before = run.extended(run.config.seeds[0], recorded)
+    made = []
+
+    def kept(*given):
+        made.append(trial_of(*given))
+        return made[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup, "trial_of", kept)
+        done = diagnose_run(run.path, store, names, work / "out")
     return SimpleNamespace(
-        work=work, run=run, store=store, names=names, trial=trial, untested=untested, case=case,
-        recorded=recorded, point=point, decision=decision, network=network,
-        held=HeldOut(cut, before, trial, network),
+        work=work, run=run, names=names, case=case, recorded=recorded, done=done,
+        trial=done.trial, untested=made[0].untested, point=done.decision.first,
+        decision=replace(done.decision, adapted=False), network=done.held.own, held=done.held,
     )  # fmt: skip
 
 
@@ -136,7 +135,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
     decision = replace(afloat.decision, adapted=True)
     names = afloat.names
     (numbers, bends), (others, bent) = (
-        afloat.held._without(decision, name, None) for name in names[:2]
+        afloat.held.without(decision, name, None) for name in names[:2]
     )
     whole = afloat.held.extended(decision).model.base.bent
     assert bends.shape == bent.shape == whole.shape
@@ -183,7 +182,7 @@ def test_the_network_is_fitted_again_where_that_makes_its_error_less(afloat):
 
 
 def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
-    done = diagnose_run(afloat.run.path, afloat.store, afloat.names, afloat.work / "out")
+    done = afloat.done
     judge = HeldOut(afloat.held.cut, trials.simulator(afloat.run, done.trial), done.trial)
     found = judge.gain(replace(done.decision, adapted=False))
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())

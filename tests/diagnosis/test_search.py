@@ -205,7 +205,7 @@ def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the
     trial.changed = lambda p, level, labels, family: (gain, 3.0)
     found = Search(trial, point, {})
     trial.remainder = Remainder("raised")
-    levels = found._drawn(point, (), 1.0)
+    levels = found.levels_of(point, (), 1.0)
     raised = max(level.value for level in levels)
     usual = max(
         level.value
@@ -214,7 +214,7 @@ def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the
         for level in levels
     )
     assert usual + 2.0 < raised < usual + 60.0
-    change = found._changed(point, (), levels, "time")
+    change = found.changed(point, (), levels, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == pytest.approx((raised if noisy else usual) + gain)
 

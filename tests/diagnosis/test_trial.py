@@ -128,15 +128,15 @@ def test_a_hypothesis_that_was_linearised_elsewhere_has_the_same_evidence(trial)
     assert other.value == pytest.approx(one.value, abs=1e-6)
     wanted = nats(trial, there, 1.0, ("drag",)) - nats(trial, here, 1.0)
     assert other.value - level(trial, here, 1.0).value == pytest.approx(wanted, abs=1e-4)
-    moved, _ = trial._numbers(other, there, ("drag",))
-    stood, _ = trial._numbers(one, here, ("drag",))
+    moved, _ = trial.numbers_of(other, there, ("drag",))
+    stood, _ = trial.numbers_of(one, here, ("drag",))
     assert moved["drag"] == pytest.approx(stood["drag"], rel=1e-6)
 
 
 def test_numbers_are_the_dense_posteriors(trial):
     """Mean and covariance of drag and of both numbers of `two`, by conditioning."""
     point, included = trial.at({}), ("two", "drag")
-    found, covariance = trial._numbers(level(trial, point, 1.0, included), point, included)
+    found, covariance = trial.numbers_of(level(trial, point, 1.0, included), point, included)
     e, j, x, _, c, mean, usual, _, _, _ = gaussian(trial, point, 1.0, included)
     whole = c / SHARE + j @ usual @ j.T + x @ x.T
     gain = np.linalg.solve(whole, x).T
@@ -155,7 +155,7 @@ def test_a_fixed_cause_stays_where_it_is(made):
     trial = straight.Straight(*made, ("drag",))
     stands = {"drag": np.array([0.7])}
     point = trial.at(stands)
-    found, covariance = trial._numbers(level(trial, point, 1.0, ("drag",)), point, ("drag",))
+    found, covariance = trial.numbers_of(level(trial, point, 1.0, ("drag",)), point, ("drag",))
     assert found["drag"] == pytest.approx([0.7], abs=1e-5)
     assert covariance[0, 0] < 2.0 / HELD_INFORMATION
     nothing = level(trial, point, 1.0).value
@@ -377,7 +377,7 @@ def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
     assert abs(trial.total(here, 1.0)[0][0, 0] / wanted[0, 0] - 1.0) > 1e-3
     stood, again = id(here.weighed), there.weighed
     del here
-    trial._modes.clear()
+    trial.kept_modes.clear()
     gc.collect()
     others = []
     for _ in range(20000):
@@ -402,7 +402,7 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made, monkeypatch
     trials.Trial.at(trial, {})
     assert trial.weight.tolist() == [1, 1, 0, 1, 1, 1, 1, 1]
     assert trial.lost.tolist() == lost.tolist()
-    trial._begun = True
+    trial.begun = True
     trials.Trial.at(trial, {})  # the same one again is no failure
     lost[5] = True
     with pytest.raises(np.linalg.LinAlgError, match="runs away"):

@@ -37,7 +37,7 @@ def test_azimuths_follow_their_orders_late(shared_data):
     """0.6 to 0.7 s is where ordered and measured angles correlate best, unit by unit."""
     folder = shared_data / "milliampere1_physical" / "nlp1"
     _, raw, delay, left, dead, lag, both = map(
-        lambda text: float(text.strip("%")), milliampere._follows(folder, 3)
+        lambda text: float(text.strip("%")), milliampere.follows(folder, 3)
     )
     order = pl.read_parquet(folder / "actuator_ref_3.parquet")
     stood = pl.read_parquet(folder / "actuators__actuator_3__azimuth_angle.parquet")
@@ -86,7 +86,7 @@ def turning(seconds: float = 60.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 def test_a_moved_antenna_moves_as_its_velocity_says():
     t, c = turning()
-    faults._antenna(c, 0.3, -0.25)
+    faults.move_antenna(c, 0.3, -0.25)
     north, east = np.gradient(c["x0"], t), np.gradient(c["y0"], t)
     cos, sin = np.cos(c["heading"]), np.sin(c["heading"])
     inner = slice(1, -1)
@@ -97,10 +97,10 @@ def test_a_moved_antenna_moves_as_its_velocity_says():
 
 def test_what_is_late_was_so_before_and_what_lags_follows():
     t, c = turning()
-    faults._late(c, t, -1.0, "rudder")
+    faults.delay(c, t, -1.0, "rudder")
     assert c["rudder_port"][:500] == pytest.approx(np.sin(0.2 * (t[:500] + 1.0)), abs=1e-3)
     t, c = turning()
-    faults._ahead(c, t, 1.2, "rudder")
+    faults.hold_back(c, t, 1.2, "rudder")
     # x = y + T y' of a sine; the averaging over a second, twice, takes 0.4 % off
     assert c["rudder_starboard"][20:-20] == pytest.approx(
         (np.sin(0.2 * t) + 0.24 * np.cos(0.2 * t))[20:-20], abs=0.006
@@ -116,7 +116,7 @@ def test_a_fault_is_written_into_a_voyage_of_its_own_and_nowhere_else(tmp_path):
     before = store.tables(["voyage_1"])[0].collect()
     size, write = faults.FAULTS["yaw_rate_bias"]
     assert size(0.3) == "value 0.09 deg/s"
-    name = faults._written(store, log, profile, "yaw_rate_bias-0.3", write, 0.3)
+    name = faults.written(store, log, profile, "yaw_rate_bias-0.3", write, 0.3)
     assert store.select() == ["voyage_1", name]
     assert store.tables(["voyage_1"])[0].collect().equals(before)
     after = store.tables([name])[0].collect()

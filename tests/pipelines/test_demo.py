@@ -1,26 +1,44 @@
 """The main job on the sample logs, with a training of a few iterations."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 from rerun.chunk import RrdReader
 
 from pipelines import demo
+from shiplog.cli.arguments import sample_logs
 from shiplog.training.run_config import Fast
 from shiplog.voyages.store import Store
+
+VOYAGES = [f"voyage_{i}" for i in range(1, 7)]
+
+
+def test_the_sample_logs_are_six_voyages_and_three_seasons():
+    seasons = [f"season{i}_{k}" for i in (2, 3, 4) for k in (1, 2)]
+    assert sorted(path.stem for path in sample_logs(None).glob("*.mcap")) == [*seasons, *VOYAGES]
+
+
+def few_logs(folder: Path) -> Path:
+    """The six voyages, and of the seasons half of the one that the demo diagnoses."""
+    folder.mkdir()
+    for path in sample_logs(None).glob("*.mcap"):
+        if path.stem in (*VOYAGES, "season2_1"):
+            (folder / path.name).symlink_to(path)
+    return folder
 
 
 def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monkeypatch):
     monkeypatch.setattr(demo, "SEEDS", (0,))
     monkeypatch.setattr(demo, "RECIPE", Fast(iterations=4, warm_epochs=2))
-    first = demo.run_demo(tmp_path / "demo", None)
+    logs = few_logs(tmp_path / "logs")
+    first = demo.run_demo(tmp_path / "demo", logs)
     said = str(RrdReader(str(first.recording)).store().summary())
     for word in ("/track/voyage_6/measured", "/track/voyage_6/simulated", "/hist/wind/training",
                  "/error/voyage_6", "/state/voyage_6/surge/measured", "/report"):  # fmt: skip
         assert word in said, word
     names = {e.name: e.findings for e in Store(tmp_path / "demo" / "store").entries()}
-    seasons = [f"season{i}_{k}" for i in (2, 3, 4) for k in (1, 2)]
-    assert sorted(names) == [*seasons, *(f"voyage_{i}" for i in range(1, 7))]
+    assert sorted(names) == ["season2_1", *VOYAGES]
     # What its README says is wrong with voyage_4: two spikes, and no GNSS for three seconds,
     # which position and velocity both lack.
     assert names["voyage_4"] == 4 and sum(names.values()) == 4
@@ -36,7 +54,7 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     # a diagnosis is made again, for a minute, and what it says is tested elsewhere
     said = SimpleNamespace(said="as before", as_json=dict)
     monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=said))
-    again = demo.run_demo(tmp_path / "demo", None)
+    again = demo.run_demo(tmp_path / "demo", logs)
     assert again.content["runs"] == first.content["runs"]
     path = tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors"
     assert path.stat().st_mtime_ns == trained

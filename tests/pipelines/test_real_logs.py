@@ -81,7 +81,7 @@ def test_a_quick_training_beats_a_quadratic_regression_on_the_published_split(tr
     store = ("--store", trials.store.path)
     chosen = [a for n in names for a in ("--voyages", n)]
     code, _, said = call("train", *store, *chosen, "--validation", held, "--out", tmp_path / "run",
-                         "--epochs", 40)  # fmt: skip
+                         "--width", 32, "--epochs", 40)  # fmt: skip
     assert code == 0, said
     test = trials.runs.filter(pl.col("wakita2022_test"))["run_id"]
     chosen = [a for n in test for a in ("--voyages", n)]

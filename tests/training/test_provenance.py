@@ -11,11 +11,11 @@ ROOT = Path(__file__).parents[2]
 def test_the_commit_is_that_of_the_checkout_the_source_lies_in(monkeypatch):
     """Installed somewhere else, there is none: git would name whose repository that is."""
     source = Path(provenance.__file__).parents[2]
-    found = provenance._commit()
+    found = provenance.commit_of_source()
     if source == ROOT and (ROOT / ".git").exists():
         done = subprocess.run(
             ["git", "-C", ROOT, "rev-parse", "HEAD"], capture_output=True, text=True, check=True
         )
         assert found == done.stdout.strip()
     monkeypatch.setattr(provenance, "__file__", "/nowhere/at/all/provenance.py")
-    assert provenance._commit() is None
+    assert provenance.commit_of_source() is None

@@ -198,8 +198,7 @@ def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
     for seed in range(70, 82):
         voyage = sail(500.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
         write_voyage(tmp_path / "a.mcap", voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
-        table = ingest(tmp_path / "a.mcap", VECTWIN).table
-        for e in sensor_consistency.estimates(table, VECTWIN):
+        for e in ingest(tmp_path / "a.mcap", VECTWIN).estimates:
             if e.channel == "yaw_rate":
                 inside.append(e.low <= truth[e.kind] <= e.high)
     assert len(inside) == 36
@@ -292,6 +291,6 @@ def test_too_short_a_voyage_says_nothing():
 
 def test_eight_hours_take_seconds():
     hours = pl.concat([in_body_axes(8, late={"yaw_rate": 0.5})] * 32)
-    began = time.perf_counter()
+    began = time.process_time()  # whatever else the machine does
     assert ("clock_offset", "yaw_rate") in found(hours)
-    assert time.perf_counter() - began < 15.0  # 2 s on an idle machine
+    assert time.process_time() - began < 10.0  # 1 s on an idle machine

@@ -41,18 +41,18 @@ FAULTS: dict[str, tuple[Callable[[float], str], Callable[[Columns, np.ndarray, f
     "yaw_rate_scale": (
         lambda s: f"value {1 + 0.06 * s:.3f}", lambda c, t, s: _scale(c, "yaw_rate", 1 + 0.06 * s)),
     "clock_offset, position": (
-        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: _late(c, t, 0.5 * s, "x0", "y0")),
+        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: delay(c, t, 0.5 * s, "x0", "y0")),
     "clock_offset, velocity": (
-        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: _late(c, t, 0.5 * s, "surge", "sway")),
+        lambda s: f"time {0.5 * s:.2g} s", lambda c, t, s: delay(c, t, 0.5 * s, "surge", "sway")),
     "antenna_offset": (
         lambda s: f"x {0.3 * s:.2g} m, y {-0.25 * s:.2g} m",
-        lambda c, t, s: _antenna(c, 0.3 * s, -0.25 * s)),
+        lambda c, t, s: move_antenna(c, 0.3 * s, -0.25 * s)),
     "rudder_offset": (
         lambda s: f"{3 * s:.2g} deg each", lambda c, t, s: _add(c, "rudder", -3.0 * s * DEGREE)),
     "rudder_delay": (
-        lambda s: f"time {s:.2g} s", lambda c, t, s: _late(c, t, -s, "rudder")),
+        lambda s: f"time {s:.2g} s", lambda c, t, s: delay(c, t, -s, "rudder")),
     "rudder_lag": (
-        lambda s: f"time {1.2 * s:.2g} s", lambda c, t, s: _ahead(c, t, 1.2 * s, "rudder")),
+        lambda s: f"time {1.2 * s:.2g} s", lambda c, t, s: hold_back(c, t, 1.2 * s, "rudder")),
     "thrust_loss": (
         lambda s: f"factor about {1 - 0.15 * s:.3g}",
         lambda c, t, s: _scale(c, "prop", (1 - 0.15 * s) ** -0.5)),
@@ -98,14 +98,14 @@ def _table(
             label = fault.replace(", ", "-") + ("" if share == 1.0 else f"-{share:g}")
             folder = out / label
             if not (folder / "verdict.json").exists():
-                names = [_written(store, of[n], profile, label, write, share) for n in trial]
+                names = [written(store, of[n], profile, label, write, share) for n in trial]
                 diagnose_run(run, store, names, folder)
             said = json.loads((folder / "verdict.json").read_text("utf-8"))
             rows.append((fault, size(share), *_said(said, fault)))
     return tables.table(("written", "size", "said", "least that would be seen"), rows)
 
 
-def _written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:
+def written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:
     """The voyage with that share of a fault in the store, under a name of its own."""
     voyage = ingest(log, profile)
     seconds = voyage.table["time"].dt.epoch("ns").to_numpy() / 1e9
@@ -154,14 +154,14 @@ def _scale(c: Columns, name: str, factor: float) -> None:
         c[n] *= factor
 
 
-def _late(c: Columns, t: np.ndarray, seconds: float, *names: str) -> None:
+def delay(c: Columns, t: np.ndarray, seconds: float, *names: str) -> None:
     """What is shown was so many seconds ago; negative: it is shown before it is so."""
     for name in names:
         for n in _of(c, name):
             c[n] = np.interp(t - seconds, t, c[n])
 
 
-def _ahead(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
+def hold_back(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
     """What is shown, that the ship's own follows with this time constant; of its own without steps,
     or what is shown would be a row of spikes."""
     second = np.ones(11) / 11.0
@@ -171,7 +171,7 @@ def _ahead(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
         c[n] = smooth + seconds * np.gradient(smooth, t)
 
 
-def _antenna(c: Columns, ahead: float, aside: float) -> None:
+def move_antenna(c: Columns, ahead: float, aside: float) -> None:
     """It stands so far from where the profile has it: position and velocity are of there."""
     cos, sin = np.cos(c["heading"]), np.sin(c["heading"])
     c["x0"] += ahead * cos - aside * sin

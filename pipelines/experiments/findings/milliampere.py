@@ -32,7 +32,7 @@ def milliampere(folder: Path, out: Path) -> str:
     voyages = sorted(p.name for p in folder.iterdir() if p.is_dir())
     for voyage in voyages:
         for unit in UNITS:
-            rows.append((voyage, unit, *_follows(folder / voyage, unit)))
+            rows.append((voyage, unit, *follows(folder / voyage, unit)))
     head = (
         "voyage", "unit", "used", "as ordered, deg", "delay alone, s", "deg", "dead time, s",
         "lag, s", "deg",
@@ -40,7 +40,7 @@ def milliampere(folder: Path, out: Path) -> str:
     return f"{tables.table(head, rows)}\n\n{_from_motion(folder, out, voyages)}"
 
 
-def _follows(folder: Path, unit: int) -> tuple[str, str, str, str, str, str, str]:
+def follows(folder: Path, unit: int) -> tuple[str, str, str, str, str, str, str]:
     """Share of the time used; RMS of measured less ordered; the best delay; the best dead time
     with a lag of the first order. Only where the order stays near where the unit stands."""
     order, stood = (pl.read_parquet(folder / name.format(unit)) for name in FILES)

@@ -50,5 +50,6 @@ def figure(height: float, path: Path) -> Iterator[Figure]:
                 said = {"Date": None} if kind == "svg" else {}
                 with files.whole(path.with_suffix(f".{kind}")) as partial:
                     drawn.savefig(partial, format=kind, metadata=said)
+                drawn.set_layout_engine("none")  # laid out once, and alike in both files
         finally:
             pyplot.close(drawn)
