@@ -173,7 +173,7 @@ def campaign(
     anchor = np.zeros(count)
     kept = [reduced(one[: 1 + count, : 1 + count], spread)[0] for one in each]
     information, pull = prior(kept, sizes**-2.0, anchor, spread, share)
-    model = SimpleNamespace(causes=columns.causes, base=None)
+    model = SimpleNamespace(causes=columns.causes, base=None, bends=False)
     made = Reference(
         model, SETTING, np.zeros(COEFFICIENTS), columns, UNREST,  # type: ignore[arg-type]
         linear_segments.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor,

@@ -315,7 +315,7 @@ class TrialEvidence:
     def fit(self, point: Point, included: Sequence[str], louder: float) -> Found:
         """The base hypothesis at one level of process noise."""
         level = self.level(point, louder, included)
-        return Found("nothing", level.value, louder, *self._numbers(level, point, included))
+        return Found("nothing", level.value, louder, *self.numbers_of(level, point, included))
 
     def _with(self, level: Level, label: str) -> Found:
         """One cause more, its change from the usual with a prior of its size."""

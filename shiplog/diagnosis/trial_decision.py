@@ -22,7 +22,7 @@ from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import listed
 from shiplog.models.causes import Cause
 from shiplog.simulation.error_reduction import Gain
-from shiplog.training.run_folder import Run
+from shiplog.training.load_model import Run
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 

@@ -10,7 +10,7 @@ import straight
 from scipy.stats import multivariate_normal, norm
 from straight import CAUSES, UNREST
 
-from shiplog.diagnosis import nominal_campaign
+from shiplog.diagnosis import campaign_parts
 from shiplog.diagnosis import trial as trials
 from shiplog.diagnosis.discrepancy import EVEN
 from shiplog.diagnosis.evidence import TrialEvidence as Former
@@ -363,7 +363,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
         r = e - both @ left
         chi2.append(r @ np.linalg.solve(c, r))
     wanted = np.minimum(1.0, 1.5 * np.median(chi2) / np.array(chi2))
-    monkeypatch.setattr(nominal_campaign, "ROBUST", 1.5)
+    monkeypatch.setattr(campaign_parts, "ROBUST", 1.5)
     trial.robust(point)
     assert trial.weight == pytest.approx(wanted, rel=1e-5)
 

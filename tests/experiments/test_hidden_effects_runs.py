@@ -27,9 +27,9 @@ from pipelines.experiments.hidden_effects.__main__ import main
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from shiplog.diagnosis import (
     baseline_check,
+    campaign_characteristics,
     discrepancy,
     nominal_cache,
-    nominal_campaign,
     placebo,
     posterior,
     refutation,
@@ -229,7 +229,7 @@ def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
         "placebo": (placebo, "placebos"), "form-error": (thresholds, "FORM_ERROR"),
         "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (nominal_cache, "characteristics"),
         "share-of-trial": (nominal_cache, "characteristics"),
-        "robust-weights": (nominal_campaign, "robust_weights"),
+        "robust-weights": (campaign_characteristics, "robust_weights"),
         "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
         "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
         "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.Trial, "imitated"),
