@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from pipelines.bars import reach, staged
 from shiplog import files
 from shiplog.diagnosis import (
     baseline_check,
@@ -43,6 +44,14 @@ log = logging.getLogger(__name__)
 NOMINAL = 8  # segments, fewer of which do not show what is usual
 
 
+# seconds of the sample logs' second season
+STAGES = {
+    "nominal voyages": 20.0, "external forces": 5.0, "hypotheses": 20.0, "held-out voyages": 5.0,
+    "report": 5.0,
+}  # fmt: skip
+
+
+@staged("diagnosing", STAGES)
 @threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def diagnose_run(
     run_path: Path,
@@ -126,11 +135,14 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     )  # fmt: skip
     point = tried.begin(run.extension_numbers())
     whole = tried.covering(point)
+    reach("external forces")
     pushed = error_location.pushed(tried, point, whole)
     cut = trial_voyages.windows_of(run, store, names, profile)
     judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, tried), tried)
+    reach("hypotheses")
     weighed = search.Search(tried, point, placebo.placebos(tried.campaign))
     weighed.run()
+    reach("held-out voyages")
     decision, _, found, dropped = refutation.judged(weighed, judge)
     held, network, alone = judge, None, None
     if not run.config.physical:
@@ -157,6 +169,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         if decision.adapted:
             alone = held.adapted(decision).reduction
             notes.append(f"{run.name} is fitted again beside what is named.")
+    reach("report")
     context = Context(
         run,
         before_effect and nominal is not None,

@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 import torch
 
+from pipelines.bars import reach, staged
 from shiplog.channels import STATE
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.models.causes import user
@@ -108,6 +109,7 @@ class EvaluatedRuns:
         return "\n".join(lines)
 
 
+@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
 def evaluate_runs(
     paths: Sequence[Path],
     store: Store,
@@ -137,12 +139,16 @@ def evaluate_runs(
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
     numbered = _numbered(cut)
+    reach("simulating")
     scored, bands = [], {}
     for run in opened:
         models = run.models()
         scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
         scored += [(run, seed, one) for seed, one in scores.items()]
         bands[run.name] = _half_widths(run, models, scores, cut)
+    reach("coverage")
+    covered = _coverage(first, rows, numbered, size)
+    reach("forces")
     return EvaluatedRuns(
         runs=opened,
         voyages=tuple(names),
@@ -154,7 +160,7 @@ def evaluate_runs(
         rollouts=pl.concat(
             [_rollout(numbered, cut, run, seed, s, bands[run.name]) for run, seed, s in scored]
         ),
-        coverage=_coverage(first, rows, numbered, size),
+        coverage=covered,
         floors=_floors(first, cut),
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),

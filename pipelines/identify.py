@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
+from pipelines.bars import reach, staged
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models import mmg
@@ -33,6 +34,11 @@ from shiplog.voyages.store import Store
 log = logging.getLogger(__name__)
 
 
+# seconds of the sample logs' first two voyages
+STAGES = {"fit": 20.0, "held-out voyages": 10.0, "held-out days": 1.0, "saving": 2.0}
+
+
+@staged("identifying", STAGES)
 @threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def identify_run(
     config: Config, store: Store, out: Path, parameters: Path | None = None
@@ -87,10 +93,12 @@ def identify_run(
         return kept[key]
 
     before = losses(ready.model, ready.start.values, ready.data)
+    reach("held-out voyages")
     by_voyage = cross_validate(
         lambda part: _simulator(ready.model, refit(part)),
         ready.data, ready.voyages, config.physics.folds,
     )  # fmt: skip
+    reach("held-out days")
     by_day = None
     if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
         by_day = cross_validate(
@@ -110,6 +118,7 @@ def identify_run(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
         mmg.meaning,
     )  # fmt: skip
+    reach("saving")
     choices: dict = {"ridge": chosen.as_json()}
     validated = by_voyage
     for seed in config.seeds:

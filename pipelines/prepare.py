@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipelines.bars import tracked
 from shiplog import profile as profiles
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.logs.check import check
@@ -52,7 +53,7 @@ def ingest_logs(
     refused: dict[str, ShiplogError] = {}
     said: set[str] = set()
     store.mend()  # or what a killed ingest left out of the catalogue stayed so, being "unchanged"
-    for path in paths:
+    for path in tracked(paths, "ingesting"):
         try:
             found = contents(path)
             profile_of = chosen or fitting_profile(found)
@@ -116,7 +117,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
-    for path in expand(paths):
+    for path in tracked(expand(paths), "checking"):
         try:
             health = check(path)
         except ShiplogError as error:

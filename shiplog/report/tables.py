@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import polars as pl
 
+from shiplog.channels import WINDOW
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
-from shiplog.voyages.one_hertz import WINDOW
-
-if TYPE_CHECKING:
-    from shiplog.voyages.store import CatalogueEntry
+from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
 MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
@@ -24,37 +21,6 @@ MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
 SELDOM_HZ = 4.5
 # A coarser step is said: about three times what a good instrument is accurate to.
 COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "wind": 0.3}
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table with aligned columns."""
-    text = [[_cell(value) for value in row] for row in rows]
-    widths = [
-        max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
-        for i, h in enumerate(head)
-    ]
-    numeric = [
-        bool(rows) and all(isinstance(r[i], (int, float)) for r in rows) for i in range(len(head))
-    ]
-
-    def line(cells: Sequence[str]) -> str:
-        padded = [
-            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)
-        ]
-        return f"| {' | '.join(padded)} |"
-
-    rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
-    return "\n".join([line(list(head)), line(rule), *map(line, text)])
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, float):
-        return str(value)
-    if not math.isfinite(value):
-        return "diverged" if value > 0 else "-"
-    if value != 0 and abs(value) < 0.001:
-        return f"{value:.1e}"
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def voyage_lines(report: VoyageReport) -> list[str]:
@@ -126,23 +92,6 @@ def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object])
         "voyages": [report.as_json() for report in reports],
         "refused": {path: str(why) for path, why in refused.items()},
     }
-
-
-def catalogue(entries: Sequence[CatalogueEntry]) -> str:
-    """What is in a store; figures that an older program did not write down stay open."""
-    rows = [
-        (
-            e.name, e.ship, e.start[:19], e.seconds,
-            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
-            e.findings,
-        )
-        for e in entries
-    ]  # fmt: skip
-    head = (
-        "voyage", "ship", "start", "seconds", "slowest, Hz", "usable, s", f"windows of {WINDOW} s",
-        "findings",
-    )  # fmt: skip
-    return table(head, rows)
 
 
 def estimated(profile: Profile) -> list[str]:
