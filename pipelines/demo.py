@@ -80,12 +80,12 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     if extended.exists():
         both.append(extended)
         again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again").verdict
-        repeated, content["diagnosis_again"] = again.said, again.as_json()
+        repeated, content["diagnosis_again"] = again.sentence, again.as_json()
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
         f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship and another sea:\n\n"
-        f"{diagnosis.verdict.said}\n\nThe extended model, diagnosed again: {repeated}\n\n"
+        f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
         f"Look at it again: rerun {result.recording} {season.recording}\n"

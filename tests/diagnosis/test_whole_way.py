@@ -239,7 +239,7 @@ def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
     told = json.loads((sea.work / "away" / "verdict.json").read_text("utf-8"))
     shaped(told)
     assert (done.verdict.verdict, told["causes"]) == ("undecided", [])
-    assert "runs away" in told["sentence"] and "evaluate" in told["sentence"]
+    assert "diverges" in told["sentence"] and "evaluate" in told["sentence"]
 
 
 def test_voyages_of_another_ship_are_refused(sea, tmp_path):

@@ -34,7 +34,7 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
         (tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors").stat().st_mtime_ns
     )
     # a diagnosis is made again, for a minute, and what it says is tested elsewhere
-    said = SimpleNamespace(said="as before", as_json=dict)
+    said = SimpleNamespace(sentence="as before", as_json=dict)
     monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=said))
     again = demo.run_demo(tmp_path / "demo", None)
     assert again.content["runs"] == first.content["runs"]
