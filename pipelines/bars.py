@@ -36,7 +36,7 @@ class Bars:
         self._began = self._latest = time.monotonic()
         self._own: dict[str, TaskID] = {}
         self._progress: Progress | None = None
-        if costs and shown():
+        if costs and drawable():
             self._progress = _columns()
             self._all = self._progress.add_task(f"{len(costs)} trainings", total=1.0)
 
@@ -115,17 +115,17 @@ def staged(title: str, seconds: Mapping[str, float]) -> Callable[[Callable[P, R]
 
 
 def reach(stage: str) -> None:
-    """The function that is `staged` begins this stage. Nothing happens where no bar is shown."""
+    """The function that is `staged` begins this stage. Without a bar nothing happens."""
     bar = _CURRENT.get()
     if bar is not None:
         bar.reach(stage)
 
 
 class Schedule:
-    """Share done and time left of a sequence of stages, from their usual lengths.
+    """Share done and time left of a sequence of stages, from their expected lengths.
 
     Within a stage the share grows with time, but never beyond the stage's end. The time left is
-    scaled by how long the finished stages took against their usual lengths.
+    scaled by how long the finished stages took against their expected lengths.
     """
 
     def __init__(self, seconds: Mapping[str, float], now: float) -> None:
@@ -176,14 +176,14 @@ class _StageBar(Progress):
 _CURRENT: ContextVar[_StageBar | None] = ContextVar("bar", default=None)
 
 
-def shown() -> bool:
-    """Whether a bar can be seen: stderr is a terminal."""
+def drawable() -> bool:
+    """Whether a bar can be drawn: stderr is a terminal."""
     return sys.stderr.isatty()
 
 
 @contextmanager
 def _stages(title: str, seconds: Mapping[str, float]) -> Iterator[None]:
-    if not shown() or _CURRENT.get() is not None:  # one display at a time
+    if not drawable() or _CURRENT.get() is not None:  # one display at a time
         yield
         return
     bar = _StageBar(title, Schedule(seconds, time.monotonic()))

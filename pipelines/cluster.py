@@ -65,8 +65,8 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
                 log.warning("%s: %s", one.name, one.failure)
             elif one.ended:
                 run.save_seed(seed, one.progress)
-                said = (one.name, one.progress.best, one.progress.epoch)
-                log.info("%s: best validation L %.0f after %d epochs", *said)
+                line = (one.name, one.progress.best, one.progress.epoch)
+                log.info("%s: best validation L %.0f after %d epochs", *line)
             else:
                 run.save_checkpoint(seed, one.progress)
             reached = one.progress.epoch if one.progress else 0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pipelines.bars import shown, tracked
+from pipelines.bars import drawable, tracked
 from shiplog.exceptions import ProfileError, ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.conversion import columns
@@ -43,7 +43,7 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     done = Converted()
     for path in tracked(sources, "converting"):
         try:
-            with nullcontext() if shown() else saying(f"{path.name}: converting"):
+            with nullcontext() if drawable() else saying(f"{path.name}: converting"):
                 for target in _each(path, profile, out, done):
                     done.logs.append(target)
         except ShiplogError as error:

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 DATASETS = ("ref", "d-ref")  # the paper's two voyages, and four that met the test's wind
 SEEDS = (0, 1, 2)
 NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden in its logs
-RECIPE = Fast(iterations=200)  # a hundred fewer than usual: a demo is waited for
+RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits for a demo
 
 
 @dataclass(frozen=True)

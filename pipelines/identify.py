@@ -79,10 +79,10 @@ def identify_run(
         ready.start.source,
     )  # fmt: skip
     if not config.physics.fit:
-        said = _keep(run, ready)
-        return run.finish(provenance(store, split, began)), said
+        notes = _keep(run, ready)
+        return run.finish(provenance(store, split, began)), notes
 
-    chosen, found, said = choose_ridge(ready, config.physics)
+    chosen, found, notes = choose_ridge(ready, config.physics)
     kept = {ready.data.weight.tobytes(): found}
 
     def refit(part: WindowSeries) -> Identified:
@@ -105,16 +105,16 @@ def identify_run(
             lambda part: _simulator(ready.model, refit(part)),
             ready.data, ready.days, config.physics.folds,
         )  # fmt: skip
-    said += [_sentence("training windows", before, losses(ready.model, found.values, ready.data))]
-    said += [
+    notes += [_sentence("training windows", before, losses(ready.model, found.values, ready.data))]
+    notes += [
         _sentence(f"windows of held-out {name}", before, one.loss)
         for name, one in (("voyages", by_voyage), ("days", by_day))
         if one is not None
     ]
     if by_voyage is None:
-        why = "One voyage only" if config.physics.folds > 1 else "No folds were asked for"
-        said.append(f"{why}: nothing was held out, so the gain is not tested.")
-    said += identifiability.note(
+        why = "One voyage only" if config.physics.folds > 1 else "--folds is below two"
+        notes.append(f"{why}: nothing was held out, so the gain is not tested.")
+    notes += identifiability.note(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
         mmg.meaning,
     )  # fmt: skip
@@ -128,13 +128,13 @@ def identify_run(
             )
             save(run, seed, ready, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
-            said.append(sentence)
+            notes.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
     if by_voyage is not None:
         _save_cross_validation(run, before, by_voyage, by_day)
     _band(run, ready, validated)
-    return run.finish(provenance(store, split, began) | {"chosen": choices}), said
+    return run.finish(provenance(store, split, began) | {"chosen": choices}), notes
 
 
 def save(
@@ -175,7 +175,7 @@ def _apart(days: list[str], voyages: list[str]) -> bool:
 
 
 def _keep(run: Run, ready: Prepared) -> list[str]:
-    """A run of the starting values as they are; their errors here no fit has seen."""
+    """A run of the starting values as they are; no fit has used these errors."""
     nothing = np.zeros((len(ready.start.values),) * 2)
     simulator = Simulator(ready.model, ready.start.values, nothing)
     for seed in run.config.seeds:
@@ -273,9 +273,9 @@ def identify_command(
             | ({} if folds is None else {"folds": folds}),
         }
     )
-    run, said = identify_run(config, store, out, parameters)
+    run, notes = identify_run(config, store, out, parameters)
     identified = run.identified()
-    lines = [f"{run.label} in {run.path}.", *said, ""]
+    lines = [f"{run.label} in {run.path}.", *notes, ""]
     if fit:
         lines += [tables.parameters_table(identified), ""]
     lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
@@ -284,7 +284,7 @@ def identify_command(
         "run": str(run.path),
         "label": run.label,
         "windows": run.windows().height,
-        "notes": said,
+        "notes": notes,
         "parameters": identified.to_dicts(),
         "split": split.model_dump(mode="json"),
     }

@@ -43,9 +43,9 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     tasks = tasks_of(begun.run)
     failures = do(tasks)
     if failures:
-        said = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        line = "; ".join(f"{name}: {why}" for name, why in failures.items())
         raise RunError(
-            f"{len(failures)} of {len(tasks)} trainings did not end: {said}.",
+            f"{len(failures)} of {len(tasks)} trainings did not end: {line}.",
             hint="give the same command again: finished seeds and checkpoints are kept.",
         )
     return finish(begun)
@@ -118,8 +118,8 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
                 log.warning("%s: %s", event.task.name, event.failure)
             else:
                 best, epochs, took = event.result
-                said = (event.task.name, best, epochs, took)
-                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *said)
+                line = (event.task.name, best, epochs, took)
+                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *line)
     return failures
 
 
@@ -194,7 +194,7 @@ def train_command(
     wind_input: str | None,
     epochs: int | None,
 ) -> Answer:
-    """`shiplog train`: choices checked, split chosen and said, every seed trained."""
+    """`shiplog train`: choices checked, split chosen and reported, every seed trained."""
     refuse_taken(out)
     store = Store(store_path)
     split = choose_split(store, voyages, validation, data, window)
@@ -205,9 +205,9 @@ def train_command(
     config = Config.model_validate({**settings, "model": model, "data": data, "split": split})
     run = train_run(config, store, out)
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
-    said = ", ".join(f"{loss:.0f}" for loss in best.values())
+    line = ", ".join(f"{loss:.0f}" for loss in best.values())
     text = (
-        f"{run.label} in {run.path}: best validation L {said} (seeds 0 to {seeds - 1}).\n"
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {seeds - 1}).\n"
         f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
     content = {

@@ -1,5 +1,5 @@
-"""What a command line asks for, checked before anything heavy is loaded: a wrong word is said at
-once, and not after the work."""
+"""Arguments of a command line, checked before anything heavy is loaded: a wrong word is reported
+at once, and not after the work."""
 
 from __future__ import annotations
 

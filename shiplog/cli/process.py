@@ -1,4 +1,4 @@
-"""The process of a command: its streams, signals, exit code, and what is said of an exception.
+"""The process of a command: its streams, signals, exit code, and the message for an exception.
 
 Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fault, 2 wrong usage,
 3 done but something was lost or refused.
@@ -61,7 +61,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         app(arguments)
     except SystemExit as ended:  # as every command ends
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
-        if code == STOPPED:  # as typer has it; SIGTERM has said so itself
+        if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message
             typer.echo(STOPPED_SENTENCE, err=True)
         return code
     except Exception as error:

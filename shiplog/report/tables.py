@@ -15,11 +15,11 @@ from shiplog.report.judgement import FEWEST_WINDOWS
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
-MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
+MOST_ALIKE = 3  # findings of a kind and channel that are listed one by one
 
-# Slower is said: a manoeuvring ship turns by degrees between two samples.
+# A lower rate is reported: a manoeuvring ship turns by degrees between two samples.
 SELDOM_HZ = 4.5
-# A coarser step is said: about three times what a good instrument is accurate to.
+# A coarser step is reported: about three times what a good instrument is accurate to.
 COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "wind": 0.3}
 
 
@@ -150,7 +150,9 @@ def summary(errors: pl.DataFrame) -> dict:
     }
 
 
-def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame) -> dict:
+def evaluation_json(
+    errors: pl.DataFrame, baselines: dict[str, float], coverage: pl.DataFrame
+) -> dict:
     """The contract's answer of `evaluate`.
 
     coverage: one row per window, with voyage, window and coverage (0 to 1).
@@ -163,13 +165,13 @@ def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl
         row["voyage"]: {key: row[key] for key in ("loss", "windows", "coverage")}
         for row in per_voyage.join(covered, on="voyage").sort("voyage").to_dicts()
     }
-    return {"contract": CONTRACT, **summary(errors), "floors": floors, "voyages": voyages}
+    return {"contract": CONTRACT, **summary(errors), "floors": baselines, "voyages": voyages}
 
 
-def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on: str) -> str:
-    """One line a model and a floor: what a reader looks at first.
+def models_table(summaries: dict[str, dict], baselines: dict[str, float], fitted_on: str) -> str:
+    """One row for each model and each baseline.
 
-    fitted_on: the run whose training data the fitted floor had.
+    fitted_on: the run whose training data the least-squares baseline was fitted to.
     """
     rows = []
     for label, s in summaries.items():
@@ -187,11 +189,11 @@ def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on
             )
         )
     names = {
-        "hold": "floor: hold the velocity",
-        "least_squares": f"floor: quadratic least squares on the data of {fitted_on}",
+        "hold": "baseline: hold the velocity",
+        "least_squares": f"baseline: quadratic least squares on the data of {fitted_on}",
     }
     dash = "-"
-    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
+    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in baselines.items()]
     head = (
         "model",
         "L",
@@ -219,7 +221,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
         )
         .rows()
     )
-    shown = [
+    cells = [
         (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
     ]
     return table(
@@ -232,7 +234,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
             "covered",
             "outside the training data",
         ),
-        shown,
+        cells,
     )
 
 
@@ -299,7 +301,7 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
 
 
 def voyages_table(answer: dict) -> str:
-    """L, windows and coverage of each voyage; of a few windows no share is said."""
+    """L, windows and coverage of each voyage; for a few windows no share is given."""
     rows = [
         (
             name,

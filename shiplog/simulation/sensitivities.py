@@ -248,7 +248,7 @@ def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=N
     slope = slopes[:, :, VELOCITY] * scale[..., None]
     pull = jnp.einsum("nki,nkip->np", error, slope)
     loss = (error**2).sum((1, 2))
-    # A window of weight 0 may have run away, and 0 · inf is not 0.
+    # A window of weight 0 may have diverged, and 0 · inf is not 0.
     used = (weight > 0.0)[:, None, None, None]
     slope = jnp.where(used, slope * jnp.sqrt(weight)[:, None, None, None], 0.0)
     flat = slope.reshape(-1, slope.shape[-1])

@@ -2,12 +2,12 @@
 
     store/catalogue.parquet               one row a voyage, made again from the folders
     store/voyage=<name>/table.parquet     10 Hz, zstd
-    store/voyage=<name>/voyage.json       ship, profile, source hash, report, what was put right
+    store/voyage=<name>/voyage.json       ship, profile, source hash, report, corrections
     store/.lock                           held by the one process that writes
 
-A voyage is written beside its place and renamed when whole. The folders are the truth: a process
-that is killed between a folder's rename and the catalogue's leaves a catalogue that is out of
-date, which every reader notices. The same log through the same profile is recognised by its
+A voyage is written under a hidden name and renamed when complete. The folders are the truth: a
+process that is killed between a folder's rename and the catalogue's leaves a catalogue that is out
+of date, which every reader notices. The same log through the same profile is recognised by its
 content and left alone; another log under a taken name is refused. What was put right is part of
 that: the same log ingested without is the table as it was measured.
 """
@@ -141,7 +141,7 @@ class Store:
 
     def holds(self, name: str, sha256: str, profile: Profile, correct: bool = False) -> bool:
         """Whether this very log, read through this very profile, is here already and whole, and
-        was put right if that is asked for."""
+        was corrected if that is requested."""
         folder = self._folder(name)
         facts = catalogue.known(folder) if folder.is_dir() else None
         fingerprint = fingerprint_of(sha256, profile, correct)

@@ -83,7 +83,7 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     assert set(content["floors"]) == {"hold", "least_squares"}
     (voyage,) = content["voyages"].values()
     assert set(voyage) == {"loss", "windows", "coverage"}
-    assert "floor: hold the velocity" in said
+    assert "baseline: hold the velocity" in said
 
 
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):

@@ -407,8 +407,8 @@ def test_a_prior_is_not_the_middle_of_what_is_hidden(name):
     rng, hide = np.random.default_rng(0), cases.CATALOGUE[name]
     sizes = []
     for _ in range(4000):
-        said = {k: v["value"] for k, v in hide(rng, 1.0)[1].items()}
-        sizes.append(abs(PRIORS[name](said)))
+        reported = {k: v["value"] for k, v in hide(rng, 1.0)[1].items()}
+        sizes.append(abs(PRIORS[name](reported)))
     cause = next(one for one in CATALOGUE if one.name == name)
     prior = cause.on(_setting()).sizes(_setting())[0]
     assert not 0.45 < np.mean(np.array(sizes) < prior) < 0.55

@@ -18,7 +18,7 @@ import polars as pl
 from pipelines.diagnose import diagnose_run
 from pipelines.experiments.esso_osaka import trials_store
 from pipelines.experiments.extrapolation import physics
-from pipelines.experiments.findings.said import parameters, unit
+from pipelines.experiments.findings.reported import parameters, unit
 from pipelines.prepare import expand, ingest_logs
 from shiplog.profile import Profile
 from shiplog.report import tables
@@ -100,8 +100,8 @@ def _table(
             if not (folder / "verdict.json").exists():
                 names = [_written(store, of[n], profile, label, write, share) for n in trial]
                 diagnose_run(run, store, names, folder)
-            said = json.loads((folder / "verdict.json").read_text("utf-8"))
-            rows.append((fault, size(share), *_said(said, fault)))
+            reported = json.loads((folder / "verdict.json").read_text("utf-8"))
+            rows.append((fault, size(share), *_reported(reported, fault)))
     return tables.table(("written", "size", "said", "least that would be seen"), rows)
 
 
@@ -123,19 +123,19 @@ def _written(store: Store, log: Path, profile: Profile, label: str, write, share
     return name
 
 
-def _said(said: dict, fault: str) -> tuple[str, str]:
+def _reported(reported: dict, fault: str) -> tuple[str, str]:
     causes = [
         f"{c['name']} ({c['probability']:.2f}): {parameters(c['parameters'])}"
-        for c in said["causes"]
+        for c in reported["causes"]
     ]
     name, _, channel = fault.partition(", ")
     least = [
         ", ".join(f"{k} {p['value']:.2g} {unit(p)}".strip() for k, p in one["parameters"].items())
-        for one in said["limits"]
+        for one in reported["limits"]
         if one["name"] == name and one.get("channel", channel) == channel
     ]
-    structure = said.get("structure") or {}
-    word = f"{said['verdict']} {structure.get('family', '')}".strip()
+    structure = reported.get("structure") or {}
+    word = f"{reported['verdict']} {structure.get('family', '')}".strip()
     return "; ".join(causes) or word, "" if causes else "; ".join(least)
 
 

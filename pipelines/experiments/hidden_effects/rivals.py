@@ -59,7 +59,7 @@ class Said:
         return {"answer": self.answer, "ranking": ranking}
 
 
-def said(scores: Mapping[str, float], wanted: Mapping[str, float] | float = 0.0) -> Said:
+def reported(scores: Mapping[str, float], wanted: Mapping[str, float] | float = 0.0) -> Said:
     """The first cause, where its score exceeds what is wanted of it."""
     order = dict(sorted(scores.items(), key=lambda pair: -pair[1]))
     first = next(iter(order), None)
@@ -122,7 +122,7 @@ def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Said:
             )
             own.append((low - high)[used] / (2.0 * step))  # what is left falls as it explains
         by[cause.label] = np.stack(own, -1)
-    return said(bic(beyond(model, theta, y, driven)[used], by, sd))
+    return reported(bic(beyond(model, theta, y, driven)[used], by, sd))
 
 
 def _with(theta: np.ndarray, at: int, value: float) -> np.ndarray:
@@ -203,7 +203,7 @@ def likelihood_ratio(trial: TrialEvidence, point: Point) -> Said:
     price = {label: 0.5 * len(at) * math.log(count) for label, at in tried.items()}
     share = (1.0 - SURE) / max(len(tried), 1)  # Bonferroni
     wanted = {n: 0.5 * float(chdtri(len(at), share)) - price[n] for n, at in tried.items()}
-    return said({label: 0.5 * found[label] - price[label] for label in tried}, wanted)
+    return reported({label: 0.5 * found[label] - price[label] for label in tried}, wanted)
 
 
 def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarray) -> White:
@@ -269,7 +269,7 @@ def ratios(
 def linear(trial: TrialEvidence, point: Point) -> Said:
     causes = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
     _, found = trial.scan(point, causes, trial.fixed)
-    return said({one.name: one.evidence for one in found}, SHOWS_NATS)
+    return reported({one.name: one.evidence for one in found}, SHOWS_NATS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

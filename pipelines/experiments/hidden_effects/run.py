@@ -92,11 +92,11 @@ def in_turn(
         for planned in cases:
             if stop.is_set():
                 return
-            said = case(planned)
-            if said is None:
+            reported = case(planned)
+            if reported is None:
                 stop.set()
             else:
-                log.info("%s: %s", planned.label, said)
+                log.info("%s: %s", planned.label, reported)
 
     with ThreadPoolExecutor(jobs) as pool:
         try:
@@ -151,7 +151,7 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
             break
         if name == "train" and settings.share:
             _mark(base, logs)
-    said = seal(folder, steps)
+    reported = seal(folder, steps)
     compared = None
     if steps[-1]["step"] == "diagnose" and settings.rivals:  # where it failed they may not
         compared = ask_rivals(folder, base_of(out, planned), store, settings)
@@ -162,8 +162,8 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
     if not settings.keep:
         for name in LARGE:
             shutil.rmtree(folder / name, ignore_errors=True)
-    said = f"{said} after {sum(done['wall_s'] for done in steps):.0f} s"
-    return f"{said}; {compared}" if compared else said
+    reported = f"{reported} after {sum(done['wall_s'] for done in steps):.0f} s"
+    return f"{reported}; {compared}" if compared else reported
 
 
 def diagnosing(settings: Settings, base: Path, store: Path, folder: Path) -> list[str]:
@@ -260,7 +260,7 @@ def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> d
         finally:
             timer.cancel()
     child.returncode = os.waitstatus_to_exitcode(status)
-    said = path.read_text(encoding="utf-8", errors="replace")
+    reported = path.read_text(encoding="utf-8", errors="replace")
     path.unlink()
     unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kB elsewhere
     return {
@@ -269,7 +269,7 @@ def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> d
         "wall_s": round(time.perf_counter() - began, 3),
         "cpu_s": round(used.ru_utime + used.ru_stime, 3),
         "peak_mb": round(used.ru_maxrss * unit / 1e6, 1),  # not below this process's own
-        "stderr": said[-TAIL:],
+        "stderr": reported[-TAIL:],
     }
 
 

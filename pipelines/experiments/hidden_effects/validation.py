@@ -100,9 +100,9 @@ def one_program(answers: Sequence[Answer]) -> str:
     """The program of all verdicts. Raises Mixed where there are several."""
     counts = Counter(name for answer in answers for name in program.of_answers(answer.steps))
     if len(counts) > 1:
-        said = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
+        reported = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
         raise Mixed(
-            f"The answers are of several programs: {said}. One table holds one program's figures.",
+            f"The answers are of several programs: {reported}. One table holds one program's figures.",
             hint="replay the cases with one commit, or give the folders of one.",
         )
     return next(iter(counts))
@@ -173,7 +173,7 @@ def misses(answers: Sequence[Answer]) -> str:
     wrong.sort(key=lambda a: (WORST.index(how(a)), a.planned.family, a.planned.label))
     rows = [
         (a.planned.label, *([a.planned.family] if a.abroad else []), f"{a.planned.seconds} s",
-         score_tables.hidden(a), score_tables.said(a), _probability(a), how(a))
+         score_tables.hidden(a), score_tables.reported(a), _probability(a), how(a))
         for a in wrong
     ]  # fmt: skip
     family = ["family"] if wrong[0].abroad else []

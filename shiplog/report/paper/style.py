@@ -47,8 +47,8 @@ def figure(height: float, path: Path) -> Iterator[Figure]:
         try:
             yield drawn
             for kind in ("svg", "png"):
-                said = {"Date": None} if kind == "svg" else {}
+                facts = {"Date": None} if kind == "svg" else {}
                 with files.whole(path.with_suffix(f".{kind}")) as partial:
-                    drawn.savefig(partial, format=kind, metadata=said)
+                    drawn.savefig(partial, format=kind, metadata=facts)
         finally:
             pyplot.close(drawn)
