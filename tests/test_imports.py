@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-# A package and what it is. `words` are the modules beside the packages; all may use them.
+# A package and what it is. `words` are the modules next to the packages; all may use them.
 ROWS = {
     "words": "exceptions, channels, units, frames, files, profile",
     "logs": "MCAP in and out; health of a log",

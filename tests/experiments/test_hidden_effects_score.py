@@ -135,7 +135,7 @@ def test_the_goals_table_counts_by_hand():
 
 
 def test_a_network_that_learned_the_trial_has_goals_of_its_own():
-    """A current it cannot take in, thrust it can: naming that is wrong, silence is right."""
+    """A current it cannot absorb, thrust it can: naming that is wrong, silence is right."""
 
     def learned(key, verdict):
         planned = Planned("1", 1, None, 1.0, 7000, "feedforward")
@@ -439,8 +439,8 @@ import json, os, pathlib, sys
 command, first, *options = sys.argv[1:]
 given = {k: v for k, v in zip(options, options[1:])}
 assert os.environ["OMP_NUM_THREADS"] == "1"
-with open(os.environ["SAID"], "a") as said:
-    print(command, "keys" in " ".join(sys.argv), file=said)
+with open(os.environ["SAID"], "a") as reported:
+    print(command, "keys" in " ".join(sys.argv), file=reported)
 print("words on stderr", file=sys.stderr)
 if command == "ingest":
     found = sorted(p.name for p in pathlib.Path(first).iterdir())
@@ -520,7 +520,7 @@ def test_a_diagnosis_that_breaks_is_a_wrong_answer_and_is_tried_again(
 
 
 def test_one_wrong_name_is_too_many(tmp_path, stubs, capsys):
-    """However many are right beside it."""
+    """However many are right next to it."""
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
     key = out / "keys" / "6.json"

@@ -154,7 +154,7 @@ def test_the_rows_of_the_goals_count_by_hand():
     assert found["outside, size 1: unknown or undecided, right family"] == pytest.approx(2 / 3)
     assert found["two at once, size 1: both, no third"] == 0.0
     assert found["traceback, or no verdict in time"] == pytest.approx(1 / 10)
-    # said with 0.9 and more: current and one of two (right), fouling, and another family
+    # stated with 0.9 and more: current and one of two (right), fouling, and another family
     assert found[goals.CERTAIN] == pytest.approx(2 / 4)
     assert goals.cell([True, False]) == "50 % (1/2) [2.5, 97.5]"  # 1 - √0.95 = 2.5 %
 
@@ -200,7 +200,7 @@ def test_the_repair_utility_is_the_mean_over_all_orders_of_testing():
 def test_the_group_score_is_the_mean_of_what_is_left_open():
     f = scores.COMPONENTS
     assert f == len(parameters.NAMES) + 1 == 22
-    wrong = 1.0 - (22 / 2 + 1) / f  # one missed of 21 not said, one false of one
+    wrong = 1.0 - (22 / 2 + 1) / f  # one missed of 21 not reported, one false of one
     silent = 1.0 - (23 / 2) / f
     expected = {
         (1.0 + wrong) / 2: (CURRENT, named("fouling", group=["current"])),
@@ -253,7 +253,7 @@ def test_the_log_score_by_hand_and_at_its_floor():
     assert reported == "nothing 2/10, one cause 4/10, two at once 1/10, outside 3/10"
 
 
-# --- the methods beside ---------------------------------------------------------------------------
+# --- the other methods ---------------------------------------------------------------------------
 
 
 def test_scores_in_nats_become_probabilities_beside_none():

@@ -59,7 +59,7 @@ def _estimates(store: Store, name: str) -> dict[tuple[str, str], Estimate]:
 
 
 def _cell(e: Estimate | None) -> str:
-    """Value and 90 % interval; in brackets where it is not said, since it may be none."""
+    """Value and 90 % interval; in brackets where it is not reported, since it may be none."""
     if e is None:
         return "-"
     digits = 2 if e.unit == "s" else 3

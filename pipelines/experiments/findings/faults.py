@@ -1,7 +1,7 @@
 """Known faults, written into measured voyages.
 
 The ship and its model, the waves, the wind and the noise are not ours; one thing is changed in what
-two of its voyages recorded. Its model was learned from the others. What is written is worked out
+two of its voyages recorded. Its model was trained on the others. What is written is worked out
 here from the table alone, and shares nothing with the causes that are to find it.
 """
 
@@ -87,7 +87,7 @@ def other_ship(folder: Path, out: Path) -> str:
 def _table(
     store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path
 ) -> str:
-    """A row a fault and share: what was written, and what was said of it."""
+    """A row a fault and share: what was written, and what was reported of it."""
     of = {path.stem: path for path in logs}
     others = tuple(n for n in store.select([nominal]) if n not in trial and "+" not in n)
     run = physics(store, out / "base", Split(training=others, validation=()))
@@ -102,7 +102,7 @@ def _table(
                 diagnose_run(run, store, names, folder)
             reported = json.loads((folder / "verdict.json").read_text("utf-8"))
             rows.append((fault, size(share), *_reported(reported, fault)))
-    return tables.table(("written", "size", "said", "least that would be seen"), rows)
+    return tables.table(("written", "size", "reported", "smallest detectable size"), rows)
 
 
 def _written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:

@@ -1,4 +1,4 @@
-"""What a diagnosis said, in a few lines; and profiles that differ in one thing."""
+"""What a diagnosis reported, in a few lines; and profiles that differ in one thing."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-Values = Mapping[str, Any]  # name → {"value", "unit"} and, as said, "low" and "high"
+Values = Mapping[str, Any]  # name → {"value", "unit"} and, as reported, "low" and "high"
 
 NAMES = (  # the contract's, section 6
     "current", "wind_force", "shallow_water", "bank",
@@ -33,7 +33,7 @@ FACTORS = (  # new over old: 1 is none, and the error is a share of what was add
     "wind_speed_scale",
 )  # fmt: skip
 BEARINGS = ("heading_offset", "wind_direction_offset")
-SURVIVE = (  # what a network that was trained on the affected voyages cannot take in
+SURVIVE = (  # what a network that was trained on the affected voyages cannot absorb
     "current", "rudder_delay", "clock_offset", "yaw_rate_bias", "thrust_drift", "shallow_water",
     "rudder_lag", "yaw_rate_scale", "bank",
 )  # fmt: skip
@@ -59,8 +59,8 @@ class Comparison:
 
 
 def compare(name: str, truth: Values, reported: Values) -> Comparison:
-    """The error is that of the vector: |said - true| over |true - none|. What a key says in words,
-    such as which unit has lost thrust, is no number and is left out."""
+    """The error is that of the vector: |reported - true| over |true - none|. What a key says in
+    words, such as which unit has lost thrust, is no number and is left out."""
     truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
     if not any(parameter in reported for parameter in truth):
         return Comparison(None, ())
@@ -77,7 +77,7 @@ def compare(name: str, truth: Values, reported: Values) -> Comparison:
 
 
 def _plain(truth: Values, reported: Values, none: float) -> tuple[float, float]:
-    """A parameter that is not said is one that is not there."""
+    """A parameter that is not reported is one that is not there."""
     true = [(parameter, float(_value(truth, parameter, none))) for parameter in truth]
     away = math.hypot(*(float(_value(reported, p, none)) - v for p, v in true))
     return away, math.hypot(*(v - none for _, v in true))
@@ -104,7 +104,7 @@ def _wrapped(degrees: float) -> float:
 
 
 def _payload(truth: Values, reported: Values, none: float) -> tuple[float, float]:
-    """kg and kg m over a lever of 1 m, the largest there is: beside 30 kg, 1 m would not count."""
+    """kg and kg m over a lever of 1 m, the largest there is: next to 30 kg, 1 m would not count."""
     (mass, moment), (found, turning) = (
         (m, m * _value(p, "position", 0.0))
         for p in (truth, reported)
@@ -136,8 +136,8 @@ VECTORS: dict[str, Callable[[Values, Values, float], tuple[float, float]]] = {
 
 
 def _intervals(name: str, truth: Values, reported: Values) -> Iterator[tuple[bool, float]]:
-    """For every parameter of the key that is said with an interval: whether the truth lies within,
-    and where it stands."""
+    """For every parameter of the key that is reported with an interval: whether the truth lies
+    within, and where it stands."""
     for parameter, one in truth.items():
         interval = reported.get(parameter)
         if not isinstance(interval, Mapping) or parameter == "channel":

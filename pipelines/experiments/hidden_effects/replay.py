@@ -24,7 +24,7 @@ MADE = ("logs", "ingest", "train")  # steps of the first run that a replay stand
 
 
 def folder_of(source: Path) -> Path:
-    """Where a replay of `source` goes unless told otherwise: beside it, named after the commit."""
+    """Where a replay of `source` goes unless told otherwise: next to it, named after the commit."""
     return source.with_name(f"{source.name}-{name(identity()).replace(' ', '-')}")
 
 
@@ -58,7 +58,7 @@ def _left(out: Path, planned: Planned, settings: Settings) -> bool:
 
 
 def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What was said, for the log; None where somebody stopped it."""
+    """What was reported, for the log; None where somebody stopped it."""
     first = plans.case_folder(source, planned).resolve()
     folder = plans.case_folder(out, planned).resolve()
     store, base = first / "store", run.base_of(source, planned)

@@ -84,8 +84,8 @@ def run(out: Path, plan: Plan, settings: Settings) -> None:
 def in_turn(
     groups: Sequence[Sequence[Planned]], case: Callable[[Planned], str | None], jobs: int
 ) -> None:
-    """`case` on all: groups beside each other, the cases of one group one after another, since they
-    may share a base. Raises KeyboardInterrupt where a case was stopped (`case` gives None)."""
+    """`case` on all: groups next to each other, the cases of one group one after another, since
+    they may share a base. Raises KeyboardInterrupt where a case was stopped (`case` gives None)."""
     stop = threading.Event()
 
     def group(cases: Sequence[Planned]) -> None:
@@ -119,7 +119,7 @@ def finished(folder: Path) -> bool:
 
 
 def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What was said, for the log; None where somebody stopped it, and nothing is sealed."""
+    """What was reported, for the log; None where somebody stopped it, and nothing is sealed."""
     folder = plans.case_folder(out, planned).resolve()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -288,7 +288,7 @@ def _mark(base: Path, logs: Path) -> None:
 
 
 def _trained_on(base: Path) -> Path:
-    return base.with_name(f"{base.name}.trained_on.json")  # beside: the run folder is shiplog's
+    return base.with_name(f"{base.name}.trained_on.json")  # next to: the run folder is shiplog's
 
 
 def _nominal(logs: Path) -> dict[str, str]:
@@ -316,7 +316,7 @@ def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:
 
 
 def _seal_file(path: Path) -> None:
-    """NAME.sha256 beside NAME.json, whole or not at all."""
+    """NAME.sha256 next to NAME.json, whole or not at all."""
     files.write_text(path.with_suffix(".sha256"), f"{_sha256(path.read_bytes())}  {path.name}\n")
 
 

@@ -64,7 +64,7 @@ def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was hidden in one case, and what was said of it; by simpler methods, too, if asked.
+    """What was hidden in one case, and what was reported of it; by simpler methods, too, if asked.
 
     oracle   share of the held-out error that exactly what was hidden would take off; None where
              it was not asked, or has no term here
@@ -110,7 +110,7 @@ class Answer:
 
     @cached_property
     def named(self) -> tuple[str, ...]:
-        """Causes in the order said; a clock of two channels is one name."""
+        """Causes in the order reported; a clock of two channels is one name."""
         if self.word != "named":
             return ()
         return tuple(dict.fromkeys(_name(cause["name"]) for cause in self.reported))
@@ -133,7 +133,7 @@ class Answer:
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Of what is hidden, what may be found: of what a network has taken in nothing is."""
+        """The hidden causes that can be found: none that a network has absorbed."""
         taken = parameters.ABSORBED if self.planned.model == "feedforward" else ()
         return tuple(name for name in self.hidden if name not in taken)
 
@@ -179,7 +179,7 @@ class Answer:
 
     @property
     def found(self) -> bool:
-        """Right; or every truth is in a group of its own that is said, and no group is left; or
+        """Right; or every truth is in a group of its own that is reported, and no group is left; or
         `undecided`, with all that is true first or second in the ranking."""
         if self.right:
             return True
@@ -211,7 +211,7 @@ class Answer:
 
     @cached_property
     def compared(self) -> dict[str, Comparison]:
-        """Hidden causes that were named, whatever else was."""
+        """Hidden causes that were named, whatever else was named."""
         reported = {
             _name(cause["name"]): cause for cause in reversed(self.reported)
         }  # the first counts

@@ -213,7 +213,7 @@ def methods(answers: Sequence[Answer]) -> str:
 
 
 def per_cause(answers: Sequence[Answer]) -> str:
-    """Right of n for what is hidden alone, named of n beside another, errors wherever named."""
+    """Right of n for what is hidden alone, named of n next to another, errors wherever named."""
     columns = {
         "size 1": among("one", full), "0.3 to 1": among("one", small),
         "below": among("one", tiny), "500 s": among("one", seconds=500),

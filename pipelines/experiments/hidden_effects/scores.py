@@ -17,7 +17,7 @@ from pipelines.experiments.hidden_effects.parameters import NAMES
 from pipelines.experiments.hidden_effects.score import FAILED, Answer
 from shiplog.report import tables
 
-OUTSIDE = "outside the catalogue"  # a component of its own, beside the names
+OUTSIDE = "outside the catalogue"  # a component of its own, next to the names
 COMPONENTS = len(NAMES) + 1
 FLOOR = 0.01  # least probability that the log score takes: a ranking lists nothing below it
 KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside": "outside"}
@@ -27,8 +27,8 @@ KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside":
 
 
 def alarms_on_effects(answers: Sequence[Answer]) -> list[bool]:
-    """Detection rate: of the cases with something hidden, those that anything was said of. A case
-    without a verdict is not detected."""
+    """Detection rate: of the cases with something hidden, those that anything was reported of. A
+    case without a verdict is not detected."""
     return [alarmed(a) and a.word != FAILED for a in answers if a.kind != "none"]
 
 
@@ -80,13 +80,12 @@ def repair_utility(
 
         m_utl = 1 - n (N + 1) / (f (n + 1)) - n' (N' + 1) / (f (n' + 1))
 
-    f components; n true ones that are not said, to be found among the N = f - |said| that are not
-    said; n' that are said and not true, to be found among the N' = |said|. n (N + 1) / (n + 1) is
-    the expected number of tests, in random order, until the last of n among N is found. 1 where
-    said is true, 0 where all that is not true is said. Kurtoglu et al. 2009; Feldman et al. 2010,
-    "Empirical evaluation of diagnostic algorithm performance using a generic framework", metric
-    "system repair utility".
-    """
+    f components; n true ones that are not reported, to be found among the N = f - |reported| that
+    are not reported; n' that are reported and not true, to be found among the N' = |reported|. n (N
+    + 1) / (n + 1) is the expected number of tests, in random order, until the last of n among N is
+    found. 1 where reported is true, 0 where all that is not true is reported. Kurtoglu et al. 2009;
+    Feldman et al. 2010, "Empirical evaluation of diagnostic algorithm performance using a generic
+    framework", metric "system repair utility"."""
     missed, false = len(set(true) - set(reported)), len(set(reported) - set(true))
     tests = _tests(missed, components - len(set(reported))) + _tests(false, len(set(reported)))
     return 1.0 - tests / components

@@ -37,7 +37,7 @@ class Page:
     picture: str  # SVG
 
     def write(self, path: Path) -> None:
-        """Page and, beside it, its picture."""
+        """Page and, next to it, its picture."""
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(self.text + "\n", encoding="utf-8")
         picture_of(path).write_text(self.picture, encoding="utf-8")
@@ -102,7 +102,7 @@ def one_program(answers: Sequence[Answer]) -> str:
     if len(counts) > 1:
         reported = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
         raise Mixed(
-            f"The answers are of several programs: {reported}. One table holds one program's figures.",
+            f"The answers are of several programs: {reported}. One table is of one program.",
             hint="replay the cases with one commit, or give the folders of one.",
         )
     return next(iter(counts))

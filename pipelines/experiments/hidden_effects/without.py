@@ -112,7 +112,7 @@ def _no_share_of_causes(stack: ExitStack) -> None:
 
 
 def _no_imitation(stack: ExitStack) -> None:
-    """A cause is named though the remainder beside it could do most of what it does."""
+    """A cause is named though the remainder next to it could do most of what it does."""
     stack.enter_context(patch.object(Trial, "imitated", lambda *given: 0.0))
 
 

@@ -256,7 +256,7 @@ class Case:
     ship: Ship
     laws: Laws
     causes: tuple[Cause, ...]
-    ordinary: Effects  # noise and unrest of both campaigns
+    ordinary: Effects  # noise and process noise of both campaigns
     effects: Effects  # the same, and what is hidden in the trial
     nominal: tuple[Leg, ...] = field(repr=False)
     trial: tuple[Leg, ...] = field(repr=False)
@@ -362,7 +362,7 @@ def write(case: Case, folder: str | Path, key: str | Path) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     key.parent.mkdir(parents=True, exist_ok=True)
-    key.unlink(missing_ok=True)  # an old key must not stand beside half-new logs
+    key.unlink(missing_ok=True)  # an old key must not stand next to half-new logs
     pulses = {}
     for leg in legs:
         sailed = voyage(case, leg)
