@@ -6,7 +6,7 @@ initial state and a slowly varying acceleration; around that path the simulation
 that follows: y ≈ y* + Z (z - z*) + J d.
 
 Of a model that training cut into several steps a second, so is the time between two nodes. A
-segment in which the model runs away all the same is left out and counted (`Linear.lost`).
+segment in which the model diverges all the same is left out and counted (`Linear.lost`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ jax.config.update("jax_enable_x64", True)
 SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
-RUN_AWAY = 10.0  # times what a path may be off its measurement, beyond which the model has run away
+RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
 
 
 class Smooth(Physical, Protocol):
@@ -138,7 +138,7 @@ class Linear:
     e   [S, B, 6]       measured less simulated, with the path's own z put back
     z   [S, B, 6, Z]    by initial state (6) and knots (3J)
     j   [S, B, 6, C]    by θ
-    lost [S]            bool: the model runs away there; rows of zeros, nothing of it is used
+    lost [S]            bool: the model diverges there; rows of zeros, nothing of it is used
     """
 
     cut: Cut
@@ -159,7 +159,7 @@ class Linear:
             return ""
         return (
             f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
-            "the model runs away there."
+            "the model diverges there."
         )
 
     def pick(self, keep: np.ndarray) -> Linear:
@@ -173,8 +173,8 @@ class Linear:
         return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
 
     def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
-        """Without what the numbers [S, C + W] of each segment do, SI: C of the columns of `j`, then
-        W that push [S, 3J, W] at the knots."""
+        """Residuals without the effect of the numbers [S, C + W] of each segment, SI: C of the
+        columns of `j`, then W of accelerations [S, 3J, W] at the nodes."""
         count = self.j.shape[-1]
         e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
         return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))
@@ -266,7 +266,7 @@ def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
 
 def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
     """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
-    that ran away stays where it was."""
+    that diverged stays where it was."""
     count, _, _, size = z.shape
     away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
     if away.any():
@@ -296,10 +296,10 @@ def linear(
 ) -> Linear:
     """Around a path, by all of θ, of which the last Q are causes' numbers.
 
-    moved   [S, K, D, Q]  how those change what drives, where a cause reads otherwise
-    shown   [S, B, 6, Q]  how they change what was measured
-    wide    how freely the path was pulled: what is FAR times that from its measurement has run
-            away; FAR times what the segments span where it is not given
+    moved   [S, K, D, Q]  derivatives of actuators and wind by the causes' numbers
+    shown   [S, B, 6, Q]  derivatives of the measurements by them
+    wide    standard deviation of the path about its measurement: a path FAR times that away has
+            diverged; where it is not given, the span of the segments
     """
     y, columns = _run(model, theta, segments, path, g, moved)
     lost = _lost(segments, y, columns, wide)
@@ -317,9 +317,9 @@ def linear(
 
 
 def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
-    """[S] bool: where path or columns are not finite, or the path is nowhere near its measurement.
+    """[S] bool: where path or columns are not finite, or the path is far from its measurement.
 
-    Only bins that were seen count, and channels of one kind (both of position, both of velocity)
+    Only measured bins count, and channels of one kind (both of position, both of velocity)
     have one width: that of `wide`, or the root mean square of what all segments span.
     """
     if wide is None:
@@ -371,7 +371,7 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
 
 def _run(model, theta, segments, path, g, moved=None):
     """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
-    model runs away."""
+    model diverges."""
     with np.errstate(all="ignore"):
         return _every(model, theta, segments, path, g, moved)
 

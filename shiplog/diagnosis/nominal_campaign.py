@@ -1,9 +1,8 @@
-"""The nominal campaign: what is usual for a ship, and how far its own voyages are from each other.
+"""The nominal campaign: its coefficients and errors, and the differences between its voyages.
 
-Coefficients, the causes' usual numbers and the weights of the model's discrepancy are learned
-together. How far the parts of the campaign disagree in each of them (`voyage_effects`) is how far a
-trial may differ without any change: once as a campaign, and once more in each of its parts.
-"""
+Coefficients, the causes' nominal numbers and the weights of the model's discrepancy are estimated
+together. The variance between the parts of the campaign (`voyage_effects`) is the variance of a
+trial without any change: once as a campaign, and once more in each of its parts."""
 
 from __future__ import annotations
 
@@ -132,7 +131,7 @@ def prior(
 class Characteristics:
     """What the nominal campaign alone says of model and ship; it can be kept for later trials.
 
-    unrest      sizes and correlation times of instrument and process noise
+    unrest     sizes and correlation times of instrument and process noise
     deviation   group of columns → standard deviation of one part's numbers, in their units
     size        family of the discrepancy → prior size of its weights
     share       how much of itself a trial counts
@@ -181,7 +180,7 @@ def _pass(model: Extended, setting: Setting, start: Start, record: Record, at: S
 def characteristics(
     model: Extended, setting: Setting, start: Start, record: Record, at: Settled
 ) -> Characteristics:
-    """Learned from the nominal voyages, linearised `at` where their coefficients converged."""
+    """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = _pass(model, setting, start, record, at)
     columns, held, known = made.columns, made.held, made.columns.known
     unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)
@@ -220,7 +219,7 @@ def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray:
     """χ² [S] of the segments with these numbers [C + W], SI: of the pass's own columns, then of
-    those that push at the nodes."""
+    those of accelerations at the nodes."""
     r = np.concatenate(([1.0], -numbers))
     left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
     pushed = modes.pushed @ more
@@ -241,7 +240,7 @@ def _weights(modes: Modes, made: _Pass, effects: VoyageEffects) -> np.ndarray:
 def _noise_of_parts(
     made: _Pass, effects: VoyageEffects, unrest: Unrest, kept: np.ndarray
 ) -> Unrest:
-    """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
+    """Noise of the residuals of the `kept` [S] segments when every part has its own numbers."""
     assert effects.numbers is not None
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
@@ -280,7 +279,7 @@ def learn(
         model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
         pull, held, 1.0 / found.share, made.linear, modes,
         nominal_reference.freedom(len(made.rows)),
-        misfit=families,  # type: ignore[arg-type]  # it pushes as a network's Misfit does
+        misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
     return Campaign(
@@ -387,8 +386,8 @@ def assumed(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
     inputs: Network | None = None,
 ) -> Campaign:  # fmt: skip
-    """Where no nominal campaign shows what is usual: the voyages in question stand for it, and no
-    cause has a usual size.
+    """Without a nominal campaign: the trial's own voyages take its place, and no cause has a
+    nominal size.
 
     given    coefficients that nobody fitted, held near their values; else a fit to these voyages
     inputs   a network that was trained on these voyages

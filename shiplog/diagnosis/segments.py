@@ -96,7 +96,7 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 
 
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State [S, B, 6], averaged over bins, and whether it was seen there."""
+    """State [S, B, 6], averaged over bins, and whether it was measured there."""
     g = grid(record)
     per = round(g.bin / record.step)
     inside = rows[:, None] + np.arange(g.rows + 1)

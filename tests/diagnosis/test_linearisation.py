@@ -494,7 +494,7 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
     theta = np.array([7.0])
     found = linearisation.linear(Stiff(4), theta, cut, GRID, at, *nothing(cut), wide)
     assert found.lost.tolist() == [False, False, True, False]
-    assert found.said == "1 of 4 segments were left out: the model runs away there."
+    assert found.said == "1 of 4 segments were left out: the model diverges there."
     for values in (found.e, found.z, found.j):
         assert np.isfinite(values).all() and not values[2].any() and values[[0, 1, 3]].any()
     assert not found.cut.used[2].any() and found.cut.used[[0, 1, 3]].all()
