@@ -23,9 +23,9 @@ Accuracy = Annotated[float, Field(ge=0)]
 
 
 class Ship(Section):
-    """Particulars. What is left out is estimated where it is needed, and said."""
+    """Particulars. Missing values are estimated where they are needed, and reported."""
 
-    name: str = Field(description="told apart from other ships by it")
+    name: str = Field(description="identifies the ship")
     length_m: float = Field(gt=0, description="between perpendiculars, m")
     breadth_m: float | None = Field(default=None, gt=0, description="m")
     draught_m: float | None = Field(default=None, gt=0, description="m")
@@ -122,7 +122,7 @@ KINDS = {  # what each sensor may be, the first being meant where `kind` is left
     "yaw_rate": ("rate",),
     "wind": ("from_bow",),
 }
-NEEDED = {  # sensors without which nothing can be said, and what records them
+NEEDED = {  # sensors without which there is no table, and what records them
     "position": "a GNSS fix or a local position",
     "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
@@ -158,7 +158,7 @@ TABLE_CHANNELS = {
 }
 LABELS = {  # columns of a table that say whose row it is, and when
     "time": "the row's time",
-    "date": "stands beside a `time` that is a time of day",
+    "date": "belongs to a `time` that is a time of day",
     "voyage": "cuts the table into one log a value",
     "vessel": "tells the ships of a table apart",
 }
@@ -210,7 +210,7 @@ class Actuator(Source):
     )
     kind: Literal["rudder", "propeller", "azimuth", "thruster"] = Field(
         description="an azimuth is the angle of a unit that turns all the way round, its thruster "
-        "stands beside it at the same place"
+        "next to it at the same place"
     )
     limits: tuple[float, float] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked"
@@ -219,7 +219,8 @@ class Actuator(Source):
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
     )
     direction_deg: float = Field(
-        default=0.0, description="where a fixed thruster pushes, from ahead towards starboard, deg"
+        default=0.0,
+        description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
     diameter_m: float | None = Field(default=None, gt=0, description="of a screw, m")
     area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²; estimated")
@@ -415,7 +416,7 @@ def parse(text: str, source: str) -> Profile:
     try:
         profile = Profile.model_validate({**content, "source": source})
         for item in (*(s for _, s in profile.sensors.items()), *profile.actuators):
-            item.scale()  # a unit that is not known is said now, not in the middle of a log
+            item.scale()  # a unit that is not known is reported now, not in the middle of a log
         for column in profile.table.values():
             units.factor(column.unit or "1")
         return profile

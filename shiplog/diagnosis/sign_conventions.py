@@ -1,7 +1,7 @@
 """Signs in which a log and a profile may differ, tried one at a time.
 
-No coefficient corrects a rudder of the wrong sign. If a model does not simulate the ship at all, its
-sign conventions are tested first.
+No coefficient corrects a rudder of the wrong sign. If a model does not simulate the ship at all,
+its sign conventions are tested first.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     <run>/config.toml  provenance.json      every resolved value; versions, hashes, times, and what
                                             held-out voyages chose
     <run>/profile.json                      the ship the run is of
-    <run>/windows.parquet                     which windows it learned from
+    <run>/windows.parquet                     which windows it was trained on
     <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from
     <run>/scaling.safetensors               mean and std of inputs and accelerations (networks)
     <run>/seed<k>/model.safetensors  training.parquet   weights; epoch, losses; never redone
@@ -231,7 +231,7 @@ class Run:
         seed: int,
         record: Record | None = None,
     ) -> ExtendedSimulator:
-        """The run's model, with its extension if it has one, ready to take in causes.
+        """The run's model, with its extension if it has one, ready to absorb causes.
 
         record   the campaign in which further ones are found
         """
