@@ -46,8 +46,8 @@ NOMINAL = 8  # segments: fewer give no nominal campaign
 
 # seconds of the sample logs' second season
 STAGES = {
-    "nominal voyages": 20.0, "external forces": 5.0, "hypotheses": 20.0, "held-out voyages": 5.0,
-    "report": 5.0,
+    "nominal voyages": 60.0, "external forces": 5.0, "hypotheses": 30.0, "held-out voyages": 10.0,
+    "report": 10.0,
 }  # fmt: skip
 
 

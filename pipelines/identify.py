@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 
 # seconds of the sample logs' first two voyages
-STAGES = {"fit": 20.0, "held-out voyages": 10.0, "held-out days": 1.0, "saving": 2.0}
+STAGES = {"fit": 15.0, "held-out voyages": 20.0, "held-out days": 1.0, "saving": 2.0}
 
 
 @staged("identifying", STAGES)

@@ -26,8 +26,6 @@ from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.jit_cache import traced
 from shiplog.simulation.sensitivities import Physical, rate
 
-jax.config.update("jax_enable_x64", True)
-
 SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width

@@ -21,8 +21,6 @@ from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
 from shiplog.jit_cache import traced
 from shiplog.voyages.windows import Windows
 
-jax.config.update("jax_enable_x64", True)
-
 VELOCITY = np.array(VELOCITY_IN_STATE)
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 

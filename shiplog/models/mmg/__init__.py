@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import jax
-
+from shiplog import jit_cache  # noqa: F401  # JAX in double precision
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters, beside, estimated, load, meaning, neutral
-
-jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
 __all__ = [
     "MMG",
