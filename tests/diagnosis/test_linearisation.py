@@ -389,7 +389,7 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     assert delay == pytest.approx(late, abs=0.01)
 
 
-# --- ships that need finer steps, and segments in which a model runs away -------------------------
+# --- ships that need finer steps, and segments in which a model diverges -------------------------
 
 
 @jax.tree_util.register_static

@@ -249,7 +249,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
     assert left_out.noise == pytest.approx(alone.noise)
 
 
-# ---------------------------------------------------------------- what runs away
+# ---------------------------------------------------------------- what diverges
 
 
 @pytest.fixture(scope="module")
