@@ -9,7 +9,8 @@ Motion, controls and wind have the products of ship hydrodynamics (Abkowitz 1964
 Fedyaevsky & Sobolev 1964) together with smooth random features (Rahimi & Recht 2007). What depends
 on position, heading or time acts from outside the ship: first a force along the earth's axes that
 is steady or grows evenly, as a line's or a tug's does, then smooth features. An even force is
-expected to be larger than what varies in every other way."""
+expected to be larger than what varies in every other way.
+"""
 
 from __future__ import annotations
 

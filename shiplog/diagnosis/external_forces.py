@@ -2,7 +2,8 @@
 
 The residual acceleration times mass and added mass is compared with the largest force of the ship:
 screws at full power, rudders at every angle in their slipstream, wind, hull, and the model's
-nominal error. A larger force is external."""
+nominal error. A larger force is external.
+"""
 
 from __future__ import annotations
 

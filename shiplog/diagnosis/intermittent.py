@@ -1,7 +1,8 @@
 """An intermittent side force at one place, and its nominal part.
 
 Random forces on a ship often act at one place, and in bursts. In rougher weather the same forces
-are larger, and no device is at work."""
+are larger, and no device is at work.
+"""
 
 from __future__ import annotations
 

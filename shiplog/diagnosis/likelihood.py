@@ -6,7 +6,8 @@ The start is free. The acceleration is process noise: an Ornstein-Uhlenbeck proc
 deviation is estimated from the nominal campaign (Kennedy & O'Hagan 2001). Both are eliminated
 segment by segment, which leaves one small matrix over [e | J]. Instrument noise is correlated from
 one observation to the next. Treated as white, it would imitate causes and make intervals too
-narrow."""
+narrow.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 Coefficients, the causes' nominal numbers and the weights of the model's discrepancy are estimated
 together. The variance between the parts of the campaign (`voyage_effects`) is the variance of a
-trial without any change: once as a campaign, and once more in each of its parts."""
+trial without any change: once as a campaign, and once more in each of its parts.
+"""
 
 from __future__ import annotations
 

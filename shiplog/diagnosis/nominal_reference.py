@@ -3,7 +3,8 @@
 Coefficients and the numbers of every cause are estimated together, each with its plausible spread
 as prior. An error that the model has everywhere is then part of them; the diagnosis tests changes
 only. Coefficients fitted to one campaign are over-confident for the next. Their information matrix
-is divided by κ (a power prior, Ibrahim & Chen 2000)."""
+is divided by κ (a power prior, Ibrahim & Chen 2000).
+"""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ def covering(record: Record) -> np.ndarray:
 
     Residual accelerations at the ends of a segment are biased towards zero, and `segments.begins`
     leaves up to a segment unread at the end of a stretch. The evidence can spare these data; a
-    search for events cannot."""
+    search for events cannot.
+    """
     size = segments.grid(record).rows
     begins = segments.begins(record)
     between = begins + HALF_SEGMENT * round(record.timescale.knot / record.step)

@@ -255,7 +255,8 @@ class Search:
 
         The noise may be raised as well, since no family describes an unknown force exactly. The
         family counts only if it is more probable with nominal noise than raised noise alone;
-        otherwise its functions are a fit to noise."""
+        otherwise its functions are a fit to noise.
+        """
         usual, raised = [], []
         for level in levels:  # made under RAISED
             gained, size = self.trial.changed(point, level, included, family)

@@ -3,7 +3,8 @@
 A hypothesis is a set of causes and one kind of remainder. Its columns are added to those of the
 campaign: a cause's numbers as a change from nominal, a family of the discrepancy as a change of
 weights. Every part of the trial has deviations of its own (`voyage_effects`), which are integrated
-out."""
+out.
+"""
 
 from __future__ import annotations
 

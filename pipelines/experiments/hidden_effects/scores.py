@@ -85,7 +85,8 @@ def repair_utility(
     + 1) / (n + 1) is the expected number of tests, in random order, until the last of n among N is
     found. 1 where reported is true, 0 where all that is not true is reported. Kurtoglu et al. 2009;
     Feldman et al. 2010, "Empirical evaluation of diagnostic algorithm performance using a generic
-    framework", metric "system repair utility"."""
+    framework", metric "system repair utility".
+    """
     missed, false = len(set(true) - set(reported)), len(set(reported) - set(true))
     tests = _tests(missed, components - len(set(reported))) + _tests(false, len(set(reported)))
     return 1.0 - tests / components

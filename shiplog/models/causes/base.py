@@ -2,7 +2,8 @@
 
 A cause extends any dynamic model. It may correct the measurements of instruments and actuators
 (`read`), set the water in motion (`water`), change coefficients of the ship (`coefficients`), or
-add a force (`force`). With all numbers zero the model is exactly as before."""
+add a force (`force`). With all numbers zero the model is exactly as before.
+"""
 
 from __future__ import annotations
 
