@@ -214,7 +214,7 @@ def test_a_current_is_compared_as_a_vector_across_north():
 
 
 @pytest.mark.parametrize(
-    ("name", "truth", "said", "error"),
+    ("name", "truth", "reported", "error"),
     [
         ("heading_offset", {"angle": (-4.0, "deg")}, {"angle": (355.0, "deg")}, 0.25),
         ("wind_direction_offset", {"angle": (20.0, "deg")}, {"angle": (21.0, "deg")}, 0.05),
