@@ -29,7 +29,7 @@ Paths = str | Path | Iterable[str | Path]
 Names = str | Sequence[str]
 
 
-class _Shown:
+class _Printed:
     """Prints as the command's text; a notebook shows it as Markdown."""
 
     def _repr_markdown_(self) -> str:
@@ -37,7 +37,7 @@ class _Shown:
 
 
 @dataclass(frozen=True, repr=False)
-class Ingested(_Shown):
+class Ingested(_Printed):
     """What became of logs: `store` holds those in `reports`; `refused` says why of the others."""
 
     store: Store
@@ -51,7 +51,7 @@ class Ingested(_Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(_Shown):
+class Evaluation(_Printed):
     """Runs on measured voyages.
 
     errors     one row a run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et al.
@@ -72,7 +72,7 @@ class Evaluation(_Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(_Shown):
+class Comparison(_Printed):
     """`recording` is a Rerun file of measured and simulated voyages; `text` what it shows."""
 
     recording: Path
@@ -83,14 +83,14 @@ class Comparison(_Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(_Shown):
+class Diagnosis(_Printed):
     """What the simulation gets wrong, and why.
 
     verdict    named, none, undecided, unknown, coverage or external, with its sentence
     causes     one row a named cause: name, probability and sentence
     ranking    one row a hypothesis: name and probability
     report     the page, as Markdown; recording: its pictures, where there are any
-    extended   the run with the causes in it, where one was asked for and something is named
+    extended   the run with the causes in it, where `extend` was given and a cause is named
     """
 
     verdict: Verdict
@@ -204,9 +204,9 @@ def diagnose(
     done = diagnosing.diagnose_run(
         path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=files
     )
-    said = done.verdict.as_json()
-    named = [(c["name"], c.get("probability"), c.get("sentence")) for c in said["causes"]]
-    ranked = [(r["name"], r["probability"]) for r in said["ranking"]]
+    answer = done.verdict.as_json()
+    named = [(c["name"], c.get("probability"), c.get("sentence")) for c in answer["causes"]]
+    ranked = [(r["name"], r["probability"]) for r in answer["ranking"]]
     return Diagnosis(
         done.verdict,
         pl.DataFrame(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from pipelines.bars import drawable, tracked
 from shiplog.exceptions import ProfileError, ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.conversion import columns
@@ -39,9 +41,9 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     profile  says what a single table's columns are; NMEA, bags and folders do without
     """
     done = Converted()
-    for path in sources:
+    for path in tracked(sources, "converting"):
         try:
-            with saying(f"{path.name}: converting"):
+            with nullcontext() if drawable() else saying(f"{path.name}: converting"):
                 for target in _each(path, profile, out, done):
                     done.logs.append(target)
         except ShiplogError as error:

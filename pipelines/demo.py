@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 DATASETS = ("ref", "d-ref")  # the paper's two voyages, and four that met the test's wind
 SEEDS = (0, 1, 2)
 NEXT_SEASON = "season2_*"  # the ship half a year later, with something hidden in its logs
-RECIPE = Fast(iterations=200)  # a hundred fewer than usual: a demo is waited for
+RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits for a demo
 
 
 @dataclass(frozen=True)
@@ -80,12 +80,12 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     if extended.exists():
         both.append(extended)
         again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again").verdict
-        repeated, content["diagnosis_again"] = again.said, again.as_json()
+        repeated, content["diagnosis_again"] = again.sentence, again.as_json()
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
         f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship and another sea:\n\n"
-        f"{diagnosis.verdict.said}\n\nThe extended model, diagnosed again: {repeated}\n\n"
+        f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
         f"Look at it again: rerun {result.recording} {season.recording}\n"

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from pipelines.bars import reach, staged
 from shiplog import files
 from shiplog.diagnosis import (
     baseline_check,
@@ -37,9 +38,17 @@ from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
-NOMINAL = 8  # segments, fewer of which do not show what is usual
+NOMINAL = 8  # segments: fewer give no nominal campaign
 
 
+# seconds of the sample logs' second season
+STAGES = {
+    "nominal voyages": 60.0, "hypotheses": 30.0, "held-out voyages": 10.0, "external forces": 5.0,
+    "report": 10.0,
+}  # fmt: skip
+
+
+@staged("diagnosing", STAGES)
 @threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def diagnose_run(
     run_path: Path,
@@ -89,9 +98,9 @@ def diagnose_run(
 
 @dataclass(frozen=True)
 class Campaigns:
-    """A run and the voyages in question; `nominal` None where those it was made on are not there.
+    """A run and the trial voyages; `nominal` is None where its training voyages are not stored.
 
-    before_effect   whether the run was made on other voyages than these
+    before_effect   whether the run was trained on other voyages than these
     """
 
     run: Run
@@ -109,17 +118,18 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     notes = []
     if before_effect and nominal is None:
         notes.append(
-            f"The voyages {run.name} was made on are not in {store.path}: what is usual for "
-            "this ship is not known, and causes that another fit would absorb are not tested."
+            f"The training voyages of {run.name} are not in {store.path}. Without a nominal "
+            "campaign, causes that a new fit would absorb are not tested."
         )
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
-    decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking)
+    decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking, reach)
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
     untested = dict(decided.untested)
     notes += [lacking] if lacking else []
     whole = tried.covering(decided.point)
+    reach("external forces")
     pushed = error_location.pushed(tried, decided.point, whole)
     held, network, alone = judge, None, None
     if not run.judges_itself:
@@ -131,21 +141,22 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             decision, found = held.simulated_with(decision)
     lost = held.lost(found) if held else ""
     if lost:
-        dropped |= {n.cause.label: f"{lost}: nothing can be told" for n in decision.named}
+        dropped |= {n.cause.label: f"{lost}: no cause can be named" for n in decision.named}
         decision, found = decisions.untold(decision), None
-    seen = (tried, decision)
+    simulated = (tried, decision)
     if network is not None:
-        seen = network.beside(decision)
-        whole = seen[0].covering(seen[1].first)
+        simulated = network.beside(decision)
+        whole = simulated[0].covering(simulated[1].first)
     if held and decision.named and tried.reference.adapts:
         if run.judges_itself:
             notes.append(
-                f"{run.name} was made on these very voyages and may have learned of what is "
-                "wrong: numbers are then of what is left, and smaller than the cause's."
+                f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
+                "cause. The numbers are then those of the residual, and too small."
             )
         if decision.adapted:
             alone = held.adapted(decision).reduction
-            notes.append(f"{run.name} is fitted again beside what is named.")
+            notes.append(f"{run.name} is fitted again together with the named causes.")
+    reach("report")
     context = Context(
         run,
         before_effect and nominal is not None,
@@ -157,16 +168,16 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         tried.grid.seconds,
         error_location.uncovered(run, store, names, profile, held.cut) if held else (),
         error_location.by_channel(held) if held else (),
-        error_location.depends_on(*seen, whole),
+        error_location.depends_on(*simulated, whole),
         alone,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
-    return DiagnosedTrial(verdict, out, decision, tried, seen, whole, held, after)
+    return DiagnosedTrial(verdict, out, decision, tried, simulated, whole, held, after)
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
-    """The voyages that the run was made on; None where they are not there."""
+    """The training voyages of the run; None where the store does not have them."""
     there = store.there(run.made_on)
     if not there:
         return None
@@ -190,7 +201,7 @@ def _save(done: DiagnosedTrial, run: Run, store: Store, names: Sequence[str], be
 def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Path]) -> None:
     """The named causes as a run of its own; none, and nothing is written."""
     if done.after is None:
-        log.info("nothing was named that a model can take in: %s is not written", out)
+        log.info("no named cause can be part of a model: %s is not written", out)
         return
     extension_file.extend(run, out, done.after, cause_files)
     log.info("extended model in %s", out)

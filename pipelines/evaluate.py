@@ -1,4 +1,4 @@
-"""Trained runs against measured voyages: errors, floors, coverage, and the recording of both."""
+"""Trained runs against measured voyages: errors, baselines, coverage, and the recording of both."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 import torch
 
+from pipelines.bars import reach, staged
 from shiplog.channels import STATE
 from shiplog.exceptions import RunError, StoreError, listed
 from shiplog.models.causes import user
@@ -31,14 +32,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class EvaluatedRuns:
-    """Every run and both floors on the same test windows.
+    """Every run and both baselines on the same test windows.
 
     errors     run, seed, voyage, window, elapsed, wind_speed (mean apparent, m/s) and
                evaluate.ERRORS: one row a window and seed
     rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
     coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
-    floors     L of every window [N]: of holding the velocity and of quadratic least squares, on
-               the first run's data
+    baseline_losses  L of every window [N]: of holding the velocity, and of quadratic least
+               squares on the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as Comparison has them; or None
     """
@@ -50,7 +51,7 @@ class EvaluatedRuns:
     errors: pl.DataFrame
     rollouts: pl.DataFrame
     coverage: pl.DataFrame
-    floors: dict[str, np.ndarray]
+    baseline_losses: dict[str, np.ndarray]
     inside: pl.DataFrame
     forces: pl.DataFrame | None
 
@@ -59,26 +60,26 @@ class EvaluatedRuns:
         errors = self.errors.filter(pl.col("run") == run.name)
         answer = tables.evaluation_json(errors, self.means, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
-        said = self.judgement(run)
+        judged = self.judgement(run)
         return answer | {
-            "sentence": said.sentence,
-            "judgement": said.as_json(),
+            "sentence": judged.sentence,
+            "judgement": judged.as_json(),
             "band_90": dict(shares.iter_rows()),
             "winds": tables.winds(errors).drop("run").to_dicts(),
         }
 
     @property
     def means(self) -> dict[str, float]:
-        """Mean L of each floor."""
-        return {name: float(values.mean()) for name, values in self.floors.items()}
+        """Mean L of each baseline."""
+        return {name: float(values.mean()) for name, values in self.baseline_losses.items()}
 
     def judgement(self, run: Run) -> Judgement:
         errors = self.errors.filter(pl.col("run") == run.name)
         length = self.runs[0].profile.ship.length_m
-        return judge(run.name, errors, self.floors, length, self.runs[0].config.window)
+        return judge(run.name, errors, self.baseline_losses, length, self.runs[0].config.window)
 
     def text(self) -> str:
-        """Markdown: a sentence a run, models against floors, voyages, the worst windows of the
+        """Markdown: a sentence a run, models and baselines, voyages, the worst windows of the
         first run."""
         answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
         first = next(iter(answers.values()))
@@ -108,6 +109,7 @@ class EvaluatedRuns:
         return "\n".join(lines)
 
 
+@staged("evaluating", {"reading": 1.0, "simulating": 3.0, "coverage": 1.0, "forces": 1.0})
 def evaluate_runs(
     paths: Sequence[Path],
     store: Store,
@@ -137,12 +139,16 @@ def evaluate_runs(
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
     numbered = _numbered(cut)
+    reach("simulating")
     scored, bands = [], {}
     for run in opened:
         models = run.models()
         scores = {seed: scoring.score(model, cut) for seed, model in models.items()}
         scored += [(run, seed, one) for seed, one in scores.items()]
         bands[run.name] = _half_widths(run, models, scores, cut)
+    reach("coverage")
+    covered = _coverage(first, rows, numbered, size)
+    reach("forces")
     return EvaluatedRuns(
         runs=opened,
         voyages=tuple(names),
@@ -154,8 +160,8 @@ def evaluate_runs(
         rollouts=pl.concat(
             [_rollout(numbered, cut, run, seed, s, bands[run.name]) for run, seed, s in scored]
         ),
-        coverage=_coverage(first, rows, numbered, size),
-        floors=_floors(first, cut),
+        coverage=covered,
+        baseline_losses=_baseline_losses(first, cut),
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
     )
@@ -229,14 +235,14 @@ def compare_runs(
 
 
 def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
-    """The user's choice, else the run's own test voyages, else what it has not learned from."""
+    """The user's choice, else the run's own test voyages, else all that it was not trained on."""
     used = {*run.config.split.training, *run.config.split.validation}
     if voyages:
         names = store.select(list(voyages))
-        seen = parts.overlapping(names, used)
-        if seen:
+        overlap = parts.overlapping(names, used)
+        if overlap:
             log.warning(
-                "%s was trained or validated on: its errors there are no test", listed(seen)
+                "%s was trained or validated on: its errors there are no test", listed(overlap)
             )
         return names
     stored = store.select()
@@ -245,7 +251,7 @@ def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
     if not names:
         raise StoreError(
             f"Every voyage in {store.path} was used to train or validate {run.name}.",
-            hint="ingest voyages it has not seen, or name some with --voyages.",
+            hint="ingest voyages that it was not trained on, or name some with --voyages.",
         )
     return names
 
@@ -362,8 +368,8 @@ def _edges(states: np.ndarray, half: np.ndarray | None) -> dict[str, pl.Series]:
 
 
 def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -> pl.DataFrame:
-    seen = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
-    measured = seen.table(rows, numbered, size)
+    covered = covering.of(run.training(), run.profile.actuator_names, run.profile.has_wind)
+    measured = covered.table(rows, numbered, size)
     whole = numbered.hstack(measured)
     reasons = []
     for row in whole.to_dicts():
@@ -377,8 +383,8 @@ def _coverage(run: Run, rows: pl.DataFrame, numbered: pl.DataFrame, size: int) -
     )
 
 
-def _floors(run: Run, cut: Windows) -> dict[str, np.ndarray]:
-    """L of both floors on the same windows [N]; the fitted one learns what the run learned."""
+def _baseline_losses(run: Run, cut: Windows) -> dict[str, np.ndarray]:
+    """L of both baselines on the same windows [N]; one is fitted to the run's training data."""
     size = run.config.window
     names = (run.profile.actuator_names, run.profile.wind_names)
     learnt = windows.cut(run.training(), plan(run.training(), "ref", size), size, *names)

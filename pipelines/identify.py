@@ -13,6 +13,7 @@ import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
+from pipelines.bars import reach, staged
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models import MODELS
@@ -35,6 +36,11 @@ from shiplog.voyages.store import Store
 log = logging.getLogger(__name__)
 
 
+# seconds of the sample logs' first two voyages
+STAGES = {"fit": 15.0, "held-out voyages": 20.0, "held-out days": 1.0, "saving": 2.0}
+
+
+@staged("identifying", STAGES)
 @threadpool_limits.wrap(limits=1, user_api="blas")  # of matrices too small to share out
 def identify_run(
     config: Config, store: Store, out: Path, parameters: Path | None = None
@@ -47,12 +53,12 @@ def identify_run(
     run, ready = _begin(config, store, out, parameters)
     chosen: dict = {}
     if not config.physics.fit:
-        said = _keep(run, ready)
+        notes = _keep(run, ready)
     else:
-        said, choices = _identify(run, ready)
+        notes, choices = _identify(run, ready)
         chosen = {"chosen": choices}
     done = run.finish(provenance(store, config.split, began) | chosen)
-    return load_model.of_folder(done), said
+    return load_model.of_folder(done), notes
 
 
 def _begin(
@@ -93,7 +99,7 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
     """Every seed identified and saved, with its band. Returns what there is to say, and what
     held-out voyages chose."""
     settings = run.config.physics
-    chosen, found, said = choose_ridge(ready, settings)
+    chosen, found, notes = choose_ridge(ready, settings)
     kept = {ready.data.weight.tobytes(): found}
 
     def refit(part: WindowSeries) -> Identified:
@@ -104,11 +110,12 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
         return kept[key]
 
     held_out = _hold_out(ready, refit, settings.folds)
-    said += held_out.sentences(ready, found, settings.folds)
-    said += identifiability.note(
+    notes += held_out.sentences(ready, found, settings.folds)
+    notes += identifiability.note(
         found, ready.start.names, ready.start.spread, (ready.start.low, ready.start.high),
         lambda name: ready.start.entry(name).meaning,
     )  # fmt: skip
+    reach("saving")
     choices: dict = {"ridge": chosen.as_json()}
     validated = held_out.by_voyage
     for seed in run.config.seeds:
@@ -118,13 +125,13 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
             )
             save(run, seed, ready, simulator, done)
             choices |= {f"network of seed {seed}": network.as_json()}
-            said.append(sentence)
+            notes.append(sentence)
         else:
             save(run, seed, ready, _simulator(ready.model, found), found)
     if held_out.by_voyage is not None:
         run.save_cross_validation(held_out.table())
     _band(run, ready, validated)
-    return said, choices
+    return notes, choices
 
 
 class HeldOut(NamedTuple):
@@ -146,15 +153,15 @@ class HeldOut(NamedTuple):
     def sentences(self, ready: Prepared, found: Identified, folds: int) -> list[str]:
         """The gain on the training windows and on held-out ones."""
         after = losses(ready.model, found.values, ready.data)
-        said = [_sentence("training windows", self.before, after)]
-        said += [
+        notes = [_sentence("training windows", self.before, after)]
+        notes += [
             _sentence(f"windows of held-out {name}", self.before, one.loss)
             for name, one in self.parts
         ]
         if self.by_voyage is None:
-            why = "One voyage only" if folds > 1 else "No folds were asked for"
-            said.append(f"{why}: nothing was held out, so the gain is not tested.")
-        return said
+            why = "One voyage only" if folds > 1 else "--folds is below two"
+            notes.append(f"{why}: nothing was held out, so the gain is not tested.")
+        return notes
 
     def table(self) -> pl.DataFrame:
         """A row a window: held_out (voyages or days), group, window, start, loss."""
@@ -177,7 +184,9 @@ def _hold_out(ready: Prepared, refit: Callable[[WindowSeries], Identified], fold
         return _simulator(ready.model, refit(part))
 
     before = losses(ready.model, ready.start.values, ready.data)
+    reach("held-out voyages")
     by_voyage = cross_validate(fit, ready.data, ready.voyages, folds)
+    reach("held-out days")
     by_day = None
     if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
         by_day = cross_validate(fit, ready.data, ready.days, folds)
@@ -222,7 +231,7 @@ def _apart(days: list[str], voyages: list[str]) -> bool:
 
 
 def _keep(run: RunFolder, ready: Prepared) -> list[str]:
-    """A run of the starting values as they are; their errors here no fit has seen."""
+    """A run of the starting values as they are; no fit has used these errors."""
     nothing = np.zeros((len(ready.start.values),) * 2)
     simulator = Simulator(ready.model, ready.start.values, nothing)
     for seed in run.config.seeds:
@@ -276,9 +285,9 @@ def identify_command(store_path: Path, out: Path, options: TrainOptions) -> Answ
         store, options.voyages, options.validation, options.data, options.window
     )
     say(split)
-    run, said = identify_run(options.config(split), store, out, options.parameters)
+    run, notes = identify_run(options.config(split), store, out, options.parameters)
     identified = run.identified()
-    lines = [f"{run.label} in {run.path}.", *said, ""]
+    lines = [f"{run.label} in {run.path}.", *notes, ""]
     if options.fit:
         lines += [tables.parameters_table(identified), ""]
     lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
@@ -287,7 +296,7 @@ def identify_command(store_path: Path, out: Path, options: TrainOptions) -> Answ
         "run": str(run.path),
         "label": run.label,
         "windows": run.windows().height,
-        "notes": said,
+        "notes": notes,
         "parameters": identified.to_dicts(),
         "split": split.model_dump(mode="json"),
     }

@@ -32,7 +32,7 @@ from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
-FLOORS = {"hold": "holds the velocity", "least_squares": "quadratic least squares"}
+BASELINES = {"hold": "holds the velocity", "least_squares": "quadratic least squares"}
 HALF = 0.5  # of the training seconds that the reference set has at most, d-ref having all
 
 
@@ -103,9 +103,10 @@ def paper_command(
     }
     finished, failures = train_sets(configs, store, out / "runs", jobs, ray)
     if not finished:
-        said = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        reasons = "; ".join(f"{name}: {why}" for name, why in failures.items())
         raise RunError(
-            f"No set could be trained: {said}.", hint="mend that and give the same command again."
+            f"No set could be trained: {reasons}.",
+            hint="mend that and give the same command again.",
         )
     results = collect(finished, failures, store)
     text = write(results, chosen, store, out)
@@ -261,8 +262,8 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
         frames["wind"] = sets.wind(rows)
         figures.wind(frames["wind"], path("wind"))
     figures.validation(results.histories, path("validation loss"))
-    floors = {FLOORS.get(name, name): loss for name, loss in results.evaluation.means.items()}
-    figures.test(results.losses, floors, path("test loss"))
+    baselines = {BASELINES.get(name, name): loss for name, loss in results.evaluation.means.items()}
+    figures.test(results.losses, baselines, path("test loss"))
     voyage = results.evaluation.errors["voyage"][0]
     measured = results.evaluation.rows.filter(pl.col("voyage") == voyage)
     figures.inputs(measured, _units(profile), path("inputs"))
@@ -286,8 +287,8 @@ def _angles(profile: Profile) -> frozenset[str]:
 
 def _units(profile: Profile) -> dict[str, str]:
     """Of actuators and wind as figures show them."""
-    shown = {"rad": "deg", "rev/s": "rev/s", "1": "1"}
-    units = {a.name: shown.get(a.si_unit, a.si_unit) for a in profile.actuators}
+    names = {"rad": "deg", "rev/s": "rev/s", "1": "1"}
+    units = {a.name: names.get(a.si_unit, a.si_unit) for a in profile.actuators}
     return units | ({"wind_speed": "m/s", "wind_angle": "deg"} if profile.has_wind else {})
 
 
@@ -306,13 +307,13 @@ def _summary(results: Results) -> pl.DataFrame:
 def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
     """Markdown: sets, losses, what the paper states and what these data say."""
     run = next(iter(results.runs.values()))
-    floors = results.evaluation.means
+    baselines = results.evaluation.means
     count = results.evaluation.errors.filter(
         pl.col("run") == run.name, pl.col("seed") == run.config.seeds[0]
     ).height
-    shown = ("validation", "mean", "least", "most")
+    figures_of = ("validation", "mean", "least", "most")
     losses = [
-        (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in shown))
+        (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in figures_of))
         for row in _summary(results).iter_rows(named=True)
     ]
     lines = [
@@ -324,8 +325,8 @@ def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
         tables.table(tuple(sizes.columns), [tuple(row) for row in sizes.iter_rows()]),
         "",
         "L of the test windows; a baseline that holds the velocity has "
-        f"{floors['hold']:.0f}, quadratic least squares on the reference set "
-        f"{floors['least_squares']:.0f}.",
+        f"{baselines['hold']:.0f}, quadratic least squares on the reference set "
+        f"{baselines['least_squares']:.0f}.",
         "",
         tables.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
                      losses),

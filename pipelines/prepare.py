@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipelines.bars import tracked
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError, ShiplogError, listed
 from shiplog.logs.check import check
@@ -50,14 +51,14 @@ def ingest_logs(
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
-    said: set[str] = set()
+    reported: set[str] = set()
     store.mend()  # or what a killed ingest left out of the catalogue stayed so, being "unchanged"
-    for path in paths:
+    for path in tracked(paths, "ingesting"):
         try:
             found = contents(path)
             profile_of = chosen or fitting_profile(found)
-            if profile_of.source not in said:
-                said.add(profile_of.source)
+            if profile_of.source not in reported:
+                reported.add(profile_of.source)
                 for line in tables.estimated(profile_of):
                     log.info(line)
             if store.holds(path.stem, found.sha256, profile_of, correct):
@@ -116,7 +117,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
-    for path in expand(paths):
+    for path in tracked(expand(paths), "checking"):
         try:
             health = check(path)
         except ShiplogError as error:

@@ -46,9 +46,9 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
     tasks = tasks_of(begun.run)
     failures = do(tasks)
     if failures:
-        said = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        line = "; ".join(f"{name}: {why}" for name, why in failures.items())
         raise RunError(
-            f"{len(failures)} of {len(tasks)} trainings did not end: {said}.",
+            f"{len(failures)} of {len(tasks)} trainings did not end: {line}.",
             hint="give the same command again: finished seeds and checkpoints are kept.",
         )
     return finish(begun)
@@ -122,8 +122,8 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
                 log.warning("%s: %s", event.task.name, event.failure)
             else:
                 best, epochs, took = event.result
-                said = (event.task.name, best, epochs, took)
-                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *said)
+                line = (event.task.name, best, epochs, took)
+                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *line)
     return failures
 
 
@@ -171,7 +171,7 @@ def _cut(run: RunFolder, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
 
 
 def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
-    """`shiplog train`: choices checked, split chosen and said, every seed trained."""
+    """`shiplog train`: choices checked, split chosen and reported, every seed trained."""
     options.check()
     refuse_taken(out)
     return FLOWS[MODELS[options.model].family.name](store_path, out, options)
@@ -184,9 +184,9 @@ def _network(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     config = options.config(split)
     run = train_run(config, store, out)
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
-    said = ", ".join(f"{loss:.0f}" for loss in best.values())
+    line = ", ".join(f"{loss:.0f}" for loss in best.values())
     text = (
-        f"{run.label} in {run.path}: best validation L {said} (seeds 0 to {options.seeds - 1}).\n"
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {options.seeds - 1}).\n"
         f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
     content = {

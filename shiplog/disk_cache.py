@@ -1,13 +1,21 @@
-"""Where in the user's cache shiplog keeps what it can work out again."""
+"""The folder in the user's cache for results that shiplog can compute again, and its limit."""
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import sys
 from functools import lru_cache
 from pathlib import Path
 
 LIMIT = 400_000_000  # bytes: some forty ships' compiled equations and campaigns
+KINDS = {  # folder: what is kept in it
+    "jax": "machine code of compiled functions",
+    "traced": "traced equations of ships",
+    "settled": "posteriors of nominal campaigns",
+    "faults": "traces of unexpected faults",
+}
 
 
 def folder() -> Path:
@@ -16,15 +24,20 @@ def folder() -> Path:
 
 
 def keep_compiled() -> None:
-    """What JAX compiles for one ship serves every later process, where a user has not said
-    otherwise: some ten seconds each. To be called before JAX is imported."""
+    """Let JAX keep on disk what it compiles, unless the user has set another folder: later
+    processes save some ten seconds a ship. A process that used JAX trims the cache when it ends.
+
+    To be called before JAX is imported.
+    """
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder() / "jax"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    atexit.unregister(_trim_after_jax)  # once, however often this is called
+    atexit.register(_trim_after_jax)
 
 
 def files() -> list[tuple[float, int, Path]]:
-    """Time of last change, bytes and path of all that is kept, oldest first. Another process may
-    remove a file at any time: what is gone is passed over."""
+    """Time of last change, bytes and path of every file, oldest first. Another process may remove
+    a file at any time: such a file is left out."""
     found = []
     for path in folder().rglob("*"):
         try:
@@ -36,8 +49,18 @@ def files() -> list[tuple[float, int, Path]]:
     return sorted(found)
 
 
+def sizes() -> dict[str, tuple[int, int]]:
+    """Folder → number of files and bytes in it; every folder of KINDS, and others that exist."""
+    found: dict[str, tuple[int, int]] = {kind: (0, 0) for kind in KINDS}
+    for _, bytes_, path in files():
+        kind = path.relative_to(folder()).parts[0]
+        count, total = found.get(kind, (0, 0))
+        found[kind] = (count + 1, total + bytes_)
+    return found
+
+
 def size() -> int:
-    """Bytes that are kept."""
+    """Bytes of all files."""
     return sum(bytes_ for _, bytes_, _ in files())
 
 
@@ -58,9 +81,15 @@ def trim(limit: int = LIMIT) -> int:
 
 @lru_cache
 def source() -> bytes:
-    """Digest of this package's modules: what they worked out is stale where they have changed."""
+    """Digest of this package's modules: results of another version are not used."""
     digest = hashlib.sha256()
     root = Path(__file__).parent
     for path in sorted(root.rglob("*.py")):
         digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
     return digest.digest()
+
+
+def _trim_after_jax() -> None:
+    """Only a process that used JAX has added files; for the others a look is not worth its time."""
+    if "jax" in sys.modules:
+        trim()

@@ -39,7 +39,7 @@ class ChannelMissing(ShiplogError):
 
 
 class StoreError(ShiplogError):
-    """The store cannot take or give what was asked of it."""
+    """The store cannot be read or written as requested."""
 
 
 class WindowError(ShiplogError):
@@ -65,5 +65,5 @@ def listed(names: Iterable[str], most: int = 12) -> str:
     names = sorted(names)
     if not names:
         return "none"
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown}, and {len(names) - most} more"
+    text = ", ".join(names[:most])
+    return text if len(names) <= most else f"{text}, and {len(names) - most} more"

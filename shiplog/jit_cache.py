@@ -1,4 +1,4 @@
-"""Compiled functions that are traced once for a ship and not once for a process.
+"""JAX in double precision, and functions that are traced once for a ship, not once for a process.
 
 JAX needs seconds to trace a ship's equations with their derivatives, and milliseconds to load
 what it has traced before. All that a trace depends on is in its key, this program's source with
@@ -19,6 +19,8 @@ from jax import export
 from jax.core import Tracer
 
 from shiplog import disk_cache, files
+
+jax.config.update("jax_enable_x64", True)  # float32 sensitivities do not distinguish causes
 
 log = logging.getLogger(__name__)
 

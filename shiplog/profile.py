@@ -19,9 +19,9 @@ Accuracy = Annotated[float, Field(ge=0)]
 
 
 class Ship(Section):
-    """Particulars. What is left out is estimated where it is needed, and said."""
+    """Particulars. Missing values are estimated where they are needed, and reported."""
 
-    name: str = Field(description="told apart from other ships by it")
+    name: str = Field(description="identifies the ship")
     length_m: float = Field(gt=0, description="between perpendiculars, m")
     breadth_m: float | None = Field(default=None, gt=0, description="m")
     draught_m: float | None = Field(default=None, gt=0, description="m")
@@ -118,7 +118,7 @@ KINDS = {  # what each sensor may be, the first being meant where `kind` is left
     "yaw_rate": ("rate",),
     "wind": ("from_bow",),
 }
-NEEDED = {  # sensors without which nothing can be said, and what records them
+NEEDED = {  # sensors without which there is no table, and what records them
     "position": "a GNSS fix or a local position",
     "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
@@ -154,7 +154,7 @@ TABLE_CHANNELS = {
 }
 LABELS = {  # columns of a table that say whose row it is, and when
     "time": "the row's time",
-    "date": "stands beside a `time` that is a time of day",
+    "date": "belongs to a `time` that is a time of day",
     "voyage": "cuts the table into one log a value",
     "vessel": "tells the ships of a table apart",
 }
@@ -206,7 +206,7 @@ class Actuator(Source):
     )
     kind: Literal["rudder", "propeller", "azimuth", "thruster"] = Field(
         description="an azimuth is the angle of a unit that turns all the way round, its thruster "
-        "stands beside it at the same place"
+        "next to it at the same place"
     )
     limits: tuple[float, float] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked"
@@ -215,7 +215,8 @@ class Actuator(Source):
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
     )
     direction_deg: float = Field(
-        default=0.0, description="where a fixed thruster pushes, from ahead towards starboard, deg"
+        default=0.0,
+        description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
     diameter_m: float | None = Field(default=None, gt=0, description="of a screw, m")
     area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²; estimated")

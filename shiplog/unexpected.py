@@ -1,14 +1,9 @@
-"""Exceptions that nobody foresaw: one sentence for the user, the trace into a file for us."""
+"""Exceptions that nobody foresaw: one sentence for the user, the trace in a file for developers."""
 
 from __future__ import annotations
 
-import datetime
 import os
-import platform
 import sys
-import tempfile
-import traceback
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from shiplog import disk_cache
@@ -18,28 +13,35 @@ QUOTED_LETTERS = 300  # letters of an exception's own words; some libraries quot
 
 
 class Unexpected(ShiplogError):
-    """A fault of the program: it says of which kind it is and where its trace was written."""
+    """A fault of the program. The message names its kind and the file that holds its trace."""
 
 
 def unexpected(error: BaseException, doing: str = "") -> Unexpected:
     """Write the trace of an exception and say where it is.
 
-    doing   what the program was at, such as the name of a log; the command's name otherwise
+    doing   what the program was doing, such as the name of a log; empty for the command itself
     """
+    import traceback  # as below: seldom needed, and every command would wait for it
+
     words = " ".join(str(error).split())
     words = words if len(words) <= QUOTED_LETTERS else words[:QUOTED_LETTERS] + "..."
     kind = type(error).__name__
     where = _write("".join(traceback.format_exception(error)))
     kept = f"its trace is in {where}" if where else "its trace could not be written"
     return Unexpected(
-        f"{doing + ': ' if doing else ''}an unexpected fault of the program ended this: {kind}"
+        f"{doing + ': ' if doing else ''}an unexpected fault of the program: {kind}"
         f"{': ' + words if words else ''}; {kept}.",
         hint="please report it with that file; if the input is damaged, check it as well.",
     )
 
 
 def _write(trace: str) -> Path | None:
-    """Into the cache, which is trimmed, or the temporary folder where that cannot be written."""
+    """Into the cache, whose size is limited, or into the temporary folder where that fails."""
+    import datetime
+    import platform
+    import tempfile
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         release = version("shiplog")
     except PackageNotFoundError:

@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """`../shared/data` beside the repository; it is not shipped."""
+    """`../shared/data` next to the repository; it is not shipped."""
     folder = Path(__file__).parents[2] / "shared" / "data"
     if not folder.is_dir():
         if os.environ.get("SHIPLOG_REQUIRE_SHARED"):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-# A package and what it is. `words` are the modules beside the packages; all may use them.
+# A package and what it is. `words` are the modules next to the packages; all may use them.
 ROWS = {
     "words": "exceptions, channels, units, frames, files, profile",
     "logs": "MCAP in and out; health of a log",
@@ -112,3 +112,17 @@ def test_commands_that_need_no_network_do_not_load_torch():
         "sys.exit(any(name in sys.modules for name in ('torch', 'rerun', 'jax')))"
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
+def test_double_precision_is_switched_on_in_one_place():
+    """Of modules that compute with JAX, every one loads it."""
+    switch = "jax_enable_x64"
+    assert [p.name for p in SOURCES if switch in p.read_text(encoding="utf-8")] == ["jit_cache.py"]
+    program = (
+        "import importlib, sys, jax; importlib.import_module(sys.argv[1]); "
+        "sys.exit(not jax.config.jax_enable_x64)"
+    )
+    for module in ("shiplog.models.extended", "shiplog.models.mmg.hull", "shiplog.diagnosis.trial",
+                   "shiplog.simulation.force_breakdown"):  # fmt: skip
+        done = subprocess.run([sys.executable, "-c", program, module], cwd=ROOT, check=False)
+        assert done.returncode == 0, module

@@ -72,7 +72,7 @@ def trials(folder: Path, out: Path, seeds: int, network: bool = True) -> str:
         "Equal data (two random voyages): other random voyages, and manoeuvres never seen:", "",
         by_manoeuvre(runs, store, (*EQUAL.test, *unseen)),
     ]  # fmt: skip
-    seen = [*runs[1:], runs[0]]  # the picture's histograms are of what the first run learned from
+    seen = [*runs[1:], runs[0]]  # the picture's histograms are of the first run's training data
     picture = comparison(evaluate_runs(seen, store, PICTURE), "Manoeuvres never seen in training")
     viewer.save(picture, out / "extrapolation.rrd")
     return "\n".join(lines)

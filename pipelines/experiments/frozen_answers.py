@@ -5,7 +5,8 @@
 
 `write` runs the commands of the program in --source (this one unless given) on the sample logs, on
 `other_ship` and three trials of the Esso Osaka in DATA, and on eight blind cases that a suite kept
-in DIR. `compare` prints how many numbers each answer holds, and the largest difference.
+in DIR. `compare` prints how many values each answer holds, how many differ, and the largest
+difference. Sentences are counted by themselves: their words may change, not their numbers.
 """
 
 from __future__ import annotations
@@ -88,19 +89,28 @@ def _run(source: Path, *command: object) -> None:
 
 
 def compare(before: Path, after: Path) -> str:
-    """A row an answer: numbers, how many differ, the largest difference."""
+    """A row an answer: values, how many differ, sentences that differ, the largest difference."""
     rows = []
     for path in sorted(before.glob("*.json")):
         other = after / path.name
         if not other.exists():
-            rows.append((path.stem, "-", "-", "not there"))
+            rows.append((path.stem, "-", "-", "-", "not there"))
             continue
         old, new = dict(_leaves(_read(path))), dict(_leaves(_read(other)))
         off = {at: _difference(old.get(at), new.get(at)) for at in old.keys() | new.keys()}
-        differ = [at for at, by in off.items() if by > EQUAL]
-        worst = max(off, key=off.__getitem__, default="")
-        rows.append((path.stem, len(old), len(differ), f"{off.get(worst, 0.0):.1e} {worst}"))
-    return tables.table(("answer", "values", "differ", "largest difference"), rows)
+        differ = {at for at, by in off.items() if by > EQUAL}
+        sentences = {at for at in differ if _is_sentence(old.get(at)) and _is_sentence(new.get(at))}
+        values = {at: by for at, by in off.items() if at not in sentences}
+        worst = max(values, key=values.__getitem__, default="")
+        rows.append((path.stem, len(old), len(differ - sentences), len(sentences),
+                     f"{values.get(worst, 0.0):.1e} {worst}"))  # fmt: skip
+    head = ("answer", "values", "differ", "sentences", "largest difference")
+    return tables.table(head, rows)
+
+
+def _is_sentence(value: object) -> bool:
+    """Text of several words; a name or an enumeration value has one."""
+    return isinstance(value, str) and " " in value
 
 
 def _read(path: Path) -> object:

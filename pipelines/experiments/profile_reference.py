@@ -82,7 +82,7 @@ def text() -> str:
         (
             HEAD,
             "## [ship]\n",
-            "What is left out is estimated where it is needed, and said.\n",
+            "Missing values are estimated where they are needed, and reported.\n",
             _keys(profile.Ship),
             "\n## [sensors.*] and [[actuators]]\n",
             "These keys say where the values stand in a log. `field` or `fields` is needed.\n",

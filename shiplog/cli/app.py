@@ -46,7 +46,7 @@ app = typer.Typer(
 
 
 def _version(asked: bool) -> None:
-    """What runs: versions, and what computes the gradient of a training."""
+    """Versions of the program, of Rerun and of torch, and the engine that trains networks."""
     if not asked:
         return
     from importlib.metadata import version
@@ -54,8 +54,11 @@ def _version(asked: bool) -> None:
     from shiplog.training import kernel
 
     level = kernel.level()
-    what = f"compiled kernel, {level}" if level else "torch (no compiled kernel)"
-    typer.echo(f"shiplog {version('shiplog')}, torch {version('torch')}, training by: {what}")
+    engine = f"compiled kernel, {level}" if level else "torch (no compiled kernel)"
+    typer.echo(
+        f"shiplog {version('shiplog')}, engine: {engine}, Rerun {version('rerun-sdk')}, "
+        f"torch {version('torch')}"
+    )
     raise typer.Exit
 
 
@@ -63,7 +66,12 @@ def _version(asked: bool) -> None:
 def _every(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Versions, and exit."),
+        typer.Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="Versions and engine.",
+        ),
     ] = False,
 ) -> None:
     """Learn a ship's dynamic model from its logs, and see where it fails."""

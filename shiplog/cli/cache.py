@@ -12,18 +12,36 @@ from shiplog.cli.output import answer
 
 
 def cache(
-    clear: Annotated[bool, typer.Option("--clear", help="Remove all that is kept.")] = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Remove every file of the cache.")] = False,
     json_to: JsonOption = None,
 ) -> None:
-    """What shiplog keeps to be faster the next time: where, how much, and a way to remove it.
+    """Show what shiplog keeps on disk to run faster the next time, or remove it.
 
     Example: shiplog cache --clear
     """
-    removed = disk_cache.trim(0) if clear else disk_cache.trim()
-    kept = disk_cache.size()
-    most = disk_cache.LIMIT / 1e6
-    text = f"{disk_cache.folder()} holds {kept / 1e6:.1f} MB (at most {most:.0f} MB)."
+    from shiplog.report.text_table import table
+
+    removed = disk_cache.trim(0 if clear else disk_cache.LIMIT)
+    sizes = disk_cache.sizes()
+    kept = sum(total for _, total in sizes.values())
+    rows = [
+        (kind, disk_cache.KINDS.get(kind, "-"), count, total / 1e6)
+        for kind, (count, total) in sizes.items()
+    ]
+    text = (
+        f"{table(('folder', 'what', 'files', 'MB'), rows)}\n\n"
+        f"{disk_cache.folder()} holds {kept / 1e6:.1f} MB (at most "
+        f"{disk_cache.LIMIT / 1e6:.0f} MB; the oldest files are removed first)."
+    )
     if removed:
         text += f" {removed / 1e6:.1f} MB were removed."
-    content = {"folder": str(disk_cache.folder()), "bytes": kept, "removed": removed}
-    answer(text, content | {"limit": disk_cache.LIMIT}, json_to)
+    content = {
+        "folder": str(disk_cache.folder()),
+        "bytes": kept,
+        "removed": removed,
+        "limit": disk_cache.LIMIT,
+        "folders": {
+            kind: {"files": count, "bytes": total} for kind, (count, total) in sizes.items()
+        },
+    }
+    answer(text, content, json_to)

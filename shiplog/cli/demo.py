@@ -37,4 +37,4 @@ def demo(
         try:
             show(result.recording, web=False)
         except ShiplogError as error:  # the job is done; only the window is missing
-            typer.echo(f"not shown: {error.message}", err=True)
+            typer.echo(f"The viewer was not opened: {error.message}", err=True)

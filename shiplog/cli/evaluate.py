@@ -19,7 +19,7 @@ def evaluate(
     cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
-    """L, RMSE per channel, end errors, coverage, against two floors.
+    """L, RMSE per channel, end errors and coverage, compared with two baselines.
 
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """

@@ -1,26 +1,35 @@
-"""What a command leaves: text, JSON, an exit code, a window."""
+"""What a command prints: text with its tables, JSON, an exit code, a window."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from shiplog.exceptions import ShiplogError
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
 LOST = 3  # exit code: done, but something was lost or refused
 
 
 def answer(text: str, content: dict, json_to: str | None) -> None:
-    """Text on stdout, JSON where it was asked for; `--json -` moves the text to stderr."""
-    from shiplog import files  # it loads polars
+    """Text on stdout, JSON where --json asks for it; `--json -` moves the text to stderr.
+
+    Raises ShiplogError where the JSON cannot be written.
+    """
+    from shiplog import files
 
     if json_to == "-":
         typer.echo(text, err=True)
         typer.echo(files.json_text(content))
         return
     if text:
-        typer.echo(text)
+        _print(text)
     if json_to:
         try:
             files.write_text(Path(json_to), files.json_text(content))
@@ -29,6 +38,44 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
                 f"{json_to} cannot be written: {error.strerror}.",
                 hint="give --json a path in a folder that exists.",
             ) from error
+
+
+def _print(text: str) -> None:
+    """Text on stdout. In a terminal its Markdown tables are drawn; in a file they stay Markdown."""
+    if not sys.stdout.isatty():
+        typer.echo(text)
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console()
+    lines = text.splitlines()
+    while lines:
+        size = next((i for i, line in enumerate(lines) if not line.startswith("|")), len(lines))
+        if size > 2:
+            console.print(_drawn(lines[:size]))
+        else:
+            size = max(size, 1)
+            console.print(Text("\n".join(lines[:size])), soft_wrap=True)
+        lines = lines[size:]
+
+
+def _drawn(lines: Sequence[str]) -> Table:
+    """A Markdown table: its head, its rule, its rows."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    head, rule, *rows = (
+        [cell.strip() for cell in line.removeprefix("| ").removesuffix(" |").split(" | ")]
+        for line in lines
+    )
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title, dashes in zip(head, rule, strict=True):
+        table.add_column(Text(title), justify="right" if dashes.endswith(":") else "left")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    return table
 
 
 def leave(done, json_to: str | None) -> None:

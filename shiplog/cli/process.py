@@ -1,4 +1,4 @@
-"""The process of a command: its streams, signals, exit code, and what is said of an exception.
+"""The process of a command: its streams, signals, exit code, and the message for an exception.
 
 Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fault, 2 wrong usage,
 3 done but something was lost or refused.
@@ -20,7 +20,6 @@ import typer
 from shiplog import disk_cache
 from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
-from shiplog.unexpected import unexpected
 
 STOPPED = 130  # by Ctrl-C, as shells have it
 STOPPED_SENTENCE = "stopped; what was finished is kept"
@@ -30,10 +29,17 @@ MENDABLE = (  # what the system says of a path that the user can mend
 )  # fmt: skip
 
 
+class _Lines(logging.Handler):
+    """Log lines to whatever stderr is now: while a bar is drawn, they appear above it."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(self.format(record), file=sys.stderr, flush=True)
+
+
 def main() -> None:
     """Entry point: settings of this process, then `run`."""
     disk_cache.keep_compiled()
-    logging.basicConfig(format="%(message)s", stream=sys.stderr, level=logging.WARNING)
+    logging.basicConfig(format="%(message)s", handlers=[_Lines()], level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
     logging.getLogger("pipelines").setLevel(logging.INFO)
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
@@ -52,11 +58,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        disk_cache.trim()
         app(arguments)
     except SystemExit as ended:  # as every command ends
         code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
-        if code == STOPPED:  # as typer has it; SIGTERM has said so itself
+        if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message
             typer.echo(STOPPED_SENTENCE, err=True)
         return code
     except Exception as error:
@@ -75,6 +80,8 @@ def _fault(error: Exception) -> ShiplogError:
             f"{os.fsdecode(error.filename)}: {error.strerror}.",
             hint="look whether that path is what you meant, may be used, and has room on its disk.",
         )
+    from shiplog.unexpected import unexpected
+
     return unexpected(error)
 
 

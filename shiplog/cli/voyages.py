@@ -33,14 +33,18 @@ def voyages(
         answer(found.text, found.content, json_to)
         return
 
-    from shiplog.report import tables
-    from shiplog.voyages.store import Store
+    from shiplog.report import text_table
+    from shiplog.voyages import catalogue
 
     if not store.exists():
         raise ShiplogError(
             f"There is no store {store}.",
             hint="ingest logs first: shiplog ingest LOG... --store DIR.",
         )
-    entries = Store(store).entries()
+    if catalogue.interrupted(store):
+        from shiplog.voyages.store import Store  # it loads polars, which takes 0.3 s
+
+        Store(store).mend()
+    entries = catalogue.entries(store)
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
-    answer(tables.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
+    answer(text_table.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)

@@ -19,10 +19,10 @@ WORDS = ("surge", "sway", "yaw")
 
 
 def lacking(run: Run, store: Store, profile: Profile) -> str:
-    """Why the run's physics cannot tell causes that change forces; empty where it can.
+    """Why the run's model cannot identify causes that change forces; empty where it can.
 
     Quadratic least squares is fitted to all nominal voyages but one in turn, and rolled out on
-    that one, while the physics have seen all of them: the comparison favours the physics.
+    that one. The physical model was fitted to all of them, so the comparison favours it.
     """
     if run.lacks or not run.judges_itself:
         return run.lacks

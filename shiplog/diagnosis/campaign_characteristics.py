@@ -97,7 +97,7 @@ def characteristics(
     model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Characteristics:  # fmt: skip
-    """Learned from the nominal voyages, linearised `at` where their coefficients converged."""
+    """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers)
     columns, held, known = made.columns, made.held, made.columns.known
     unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)

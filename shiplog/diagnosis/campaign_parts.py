@@ -58,7 +58,7 @@ def robust_weights(square: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray:
     """χ² [S] of the segments with these numbers [C + W], SI: of the pass's own columns, then of
-    those that push at the nodes."""
+    those of accelerations at the nodes."""
     r = np.concatenate(([1.0], -numbers))
     left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
     pushed = modes.pushed @ more

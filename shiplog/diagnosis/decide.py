@@ -23,7 +23,7 @@ EVERYWHERE = ("surge", "sway", "yaw_rate")
 def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[Decision, Posterior]:
     """The verdict, some names refuted by held-out data (with the reason)."""
     refuted, trial = dict(refuted or {}), search.trial
-    trial.unrest = trial.reference.unrest  # the verdict before may have left its pulses there
+    trial.unrest = trial.reference.unrest  # without an earlier intermittent force
     found = posteriors.posterior(search, tuple(refuted))
     names = found.stated
     kind = found.remainder
@@ -48,7 +48,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
         traces = _named(search, found, best, rest)
     shown = best if verdict in ("named", "unknown") else search.nothing
     trial.remainder = shown.remainder
-    if pulses is not None:  # its force and times are asked of this trial later
+    if pulses is not None:  # its force and times are taken from this trial later
         trial.unrest = _with_pulses(search, best)
     return Decision(
         verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
@@ -58,7 +58,7 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
 
 
 def _imitated(search: Search, best: Hypothesis, names: Sequence[str]) -> bool:
-    """Whether the remainder could do most of what one of the named causes does: beside an unknown
+    """Whether the remainder could reproduce most of a named cause's effect: with an unknown
     force of the controls, an offset of the rudder may be a part of that force."""
     shares = [
         search.trial.imitated(search.point(best), best.found, label, best.remainder)

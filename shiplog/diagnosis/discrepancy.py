@@ -6,10 +6,10 @@ fixed features with unknown weights (Kennedy & O'Hagan 2001). The nominal campai
 weights of what a model sees; an unknown structure of the trial is a change of one family's weights.
 
 Motion, controls and wind have the products of ship hydrodynamics (Abkowitz 1964; moduli after
-Fedyaevsky & Sobolev 1964) beside smooth random features (Rahimi & Recht 2007). What depends on
-position, heading or time acts from outside the ship: first a force along the earth's axes that is
-steady or grows evenly, as a line's or a tug's does, then smooth features. An even force is expected
-to be larger than what varies in every other way.
+Fedyaevsky & Sobolev 1964) together with smooth random features (Rahimi & Recht 2007). What depends
+on position, heading or time acts from outside the ship: first a force along the earth's axes that
+is steady or grows evenly, as a line's or a tug's does, then smooth features. An even force is
+expected to be larger than what varies in every other way.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def of(
             continue
         parts = [features(name, profile, waves, knots) for knots in campaigns]
         both = np.concatenate([values.reshape(-1, values.shape[-1]) for values in parts])
-        # a push that is always there depends on nothing
+        # a constant force depends on nothing
         level = both.mean(0) if name in UNSEEN else np.zeros(both.shape[-1])
         level[: EVEN.get(name, 0)] = 0.0  # but along the earth's axes it depends on the heading
         scale = np.sqrt(((both - level) ** 2).mean(0))

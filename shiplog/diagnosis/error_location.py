@@ -34,7 +34,7 @@ from shiplog.voyages.windows import Windows
 
 UNCOVERED = 0.5  # share of a window's seconds outside the training data
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
-PULSE_APART = 2.5  # knots that one pulse may pause for
+PULSE_APART = 2.5  # nodes that an intermittent force may pause for
 
 
 def pushed(trial: TrialEvidence, point: Point, whole: Linear) -> list[Interval]:

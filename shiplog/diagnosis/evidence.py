@@ -21,7 +21,17 @@ from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.models.causes import Cause
 from shiplog.voyages.recording import Record
 
-LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ: how much more unrest than usual
+LOUDER = (
+    1.0,
+    1.4,
+    2.0,
+    2.8,
+    4.0,
+    5.6,
+    8.0,
+    11.0,
+    16.0,
+)  # λ, factors of the process noise
 QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
@@ -31,10 +41,10 @@ Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `reading.read`
 
 
 class TrialEvidence:
-    """Voyages under question, against a reference. `unrest` grows a pulse when one is found.
+    """The trial against its nominal reference. `unrest` includes the intermittent force, if any.
 
     first    where it was linearised first
-    rested   labels and pulse → numbers, path and λ at which a fit of these causes rested
+    rested   labels and force → numbers, path and λ at which a fit of these causes converged
     """
 
     def __init__(self, reference: Reference, record: Record, fixed: Sequence[str] = ()) -> None:
@@ -52,7 +62,7 @@ class TrialEvidence:
 
     @property
     def pulse(self) -> bytes:
-        """Tells one unrest of this trial from another."""
+        """Identifies a process noise of this trial."""
         return b"" if self.unrest.pulse is None else self.unrest.pulse.tobytes()
 
     # --- linearisation ---
@@ -90,9 +100,10 @@ class TrialEvidence:
 
     def _read(self, numbers: Mapping[str, np.ndarray]) -> Read:
         """As `reading.read`. How a cause changes what is read depends on what is put right
-        before: beside a clock that is late by a second an antenna's columns are a second old, and
-        two clocks would seem to disagree. Nor do columns from a little beside serve: those of
-        several clocks then differ by their noise, and a sum of them explains that of the data."""
+        before: together with a clock that is late by a second an antenna's columns are a second
+        old, and two clocks would seem to disagree. Nor do columns from a little together with
+        serve: those of several clocks then differ by their noise, and a sum of them explains that
+        of the data."""
         ref = self.reference
         reading = {
             c.label: np.asarray(numbers[c.label])
@@ -116,14 +127,15 @@ class TrialEvidence:
 
     def begin(self, numbers: Mapping[str, np.ndarray]) -> Point:
         """The model as it stands, with weights of the segments and a path held as firmly as the
-        unrest then found allows."""
+        process noise then found allows."""
         point = self.at(numbers)
         self.robust(point)
         base, _ = self.scan(point, (), self.fixed)
         return self.at(numbers, point, base.louder)
 
     def covering(self, point: Point) -> Linear:
-        """The point's segments and those between them: what is left, known as well everywhere."""
+        """The point's segments and those between them: residuals of the same accuracy
+        everywhere."""
         ref = self.reference
         rows = np.setdiff1d(residual_acceleration.covering(self.record), self.rows)
         numbers = dict(point.numbers)
@@ -150,8 +162,8 @@ class TrialEvidence:
     # --- algebra ---
 
     def modes(self, point: Point, louder: float) -> tuple[Modes, float]:
-        """The point's, and how much louder they are wanted: one pass serves every λ, but that of a
-        pulse beside the unrest, whose axes turn with it."""
+        """Products of the point, and the wanted factors λ: one pass serves every λ, but that of a
+        pulse together with the process noise, whose axes turn with it."""
         if self.unrest.pulse is not None:
             found = likelihood.modes(point.weighed, self.unrest.louder(louder))
             return self._misfitting(found, point), 1.0
@@ -186,8 +198,8 @@ class TrialEvidence:
 
     def volume(self, louder: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
-        model lets unrest be felt is no evidence of a cause, and where the unrest is a model's
-        own misfit it would count as such."""
+        model lets process noise be felt is no evidence of a cause, and where the process noise is a
+        model's own misfit it would count as such."""
         assert self.first is not None
         key = (louder, self.pulse)
         if key not in self._volumes:
@@ -196,7 +208,7 @@ class TrialEvidence:
         return self._volumes[key]
 
     def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
-        """The base hypothesis at one λ: what is usual, and the included causes free."""
+        """The base hypothesis at one λ: nominal numbers, and the included causes free."""
         ref = self.reference
         by = np.concatenate(([1.0], ref.columns.unit))
         modes, louder_by = self.modes(point, louder)
@@ -216,8 +228,8 @@ class TrialEvidence:
         pull: np.ndarray,
     ) -> Level:
         """The base hypothesis of a trial's products `total` [1 + C, 1 + C] in units; `information`
-        [P, P] and `pull` [P] of the first P numbers are what is usual, the included ones join. The
-        trial counts for as much of itself as the reference says."""
+        [P, P] and `pull` [P] of the first P numbers are nominal; the included ones are added. The
+        reference gives the weight of the trial's likelihood."""
         columns = self.reference.columns
         total, logdet = self.reference.counts * total, self.reference.counts * logdet
         extra = np.concatenate([columns.of[name] for name in included] or [np.zeros(0, int)])
@@ -267,8 +279,9 @@ class TrialEvidence:
     def levels(
         self, point: Point, included: Sequence[str] = (), near: float | None = None
     ) -> list[Level]:
-        """From the usual unrest upwards, until it is too much; below it, if that is better; and
-        finely about the best, since thousands of knots make λ sharp. `near`: about there only."""
+        """From the nominal process noise upwards, until it is too much; below it, if that is
+        better; and finely about the best, since thousands of knots make λ sharp. `near`: about
+        there only."""
         found: list[Level] = []
         if near is not None:
             found.append(self.level(point, near, included))
@@ -298,10 +311,10 @@ class TrialEvidence:
         included: Sequence[str] = (),
         near: float | None = None,
     ) -> tuple[Found, list[Found]]:
-        """The base hypothesis, and each candidate besides it, each at its own best λ."""
+        """The base hypothesis, and each candidate in addition to it, each at its own best λ."""
         levels = self.levels(point, included, near)
         best = max(levels, key=lambda level: level.value)
-        found = []  # a cause that explains makes the unrest fall: each λ is tried
+        found = []  # a cause that explains makes the process noise fall: each λ is tried
         for cause in candidates:
             tried = [self._with(level, cause.label) for level in levels]
             found.append(max(tried, key=lambda f: f.evidence))
@@ -318,7 +331,7 @@ class TrialEvidence:
         return Found("nothing", level.value, louder, *self.numbers_of(level, point, included))
 
     def _with(self, level: Level, label: str) -> Found:
-        """One cause more, its change from the usual with a prior of its size."""
+        """One cause more, its change from the nominal with a prior of its size."""
         columns = self.reference.columns.of[label]
         joined = level.gram[1:, 1:][:, columns]
         pull = level.gram[1:, 0][columns] - joined.T @ level.solution
@@ -355,8 +368,8 @@ class TrialEvidence:
     def without(
         self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Numbers of the included causes, and the coefficients [P] beside them, from the other
-        segments alone; `left_out` [S] bool."""
+        """Numbers of the included causes, and the coefficients [P] together with them, from the
+        other segments alone; `left_out` [S] bool."""
         kept = self.weight
         self.weight = np.where(left_out, 0.0, kept)
         try:
@@ -366,7 +379,8 @@ class TrialEvidence:
         return self.numbers_of(level, point, included)[0], self._coefficients(level)
 
     def coefficients(self, point: Point, base: Found) -> np.ndarray:
-        """[P] of the base, beside a hypothesis of that point; of a network its bends [F, 3]."""
+        """[P] of the base, together with a hypothesis of that point; of a network its bends [F,
+        3]."""
         return self._coefficients(self.level(point, base.louder, tuple(base.numbers)))
 
     def _coefficients(self, level: Level) -> np.ndarray:
@@ -378,8 +392,8 @@ class TrialEvidence:
         return ref.theta + level.solution[:count] * ref.columns.unit[:count]
 
     def solved(self, point: Point, base: Found) -> np.ndarray:
-        """[C] numbers around the point, under a hypothesis of that point: what is usual of the
-        coefficients on these voyages, and what its causes add."""
+        """[C] numbers about the point under a hypothesis of that point: nominal coefficients on
+        these voyages, and the change by its causes."""
         ref = self.reference
         level = self.level(point, base.louder, tuple(base.numbers))
         d = level.solution[: len(ref.columns.unit)] * ref.columns.unit

@@ -1,8 +1,8 @@
-"""Stretches that no force of the ship can explain: pushed, caught, towed or held by hand.
+"""Intervals that no force of the ship can explain: it was pushed, caught, towed or held.
 
-A balance of forces. What is left unexplained, times mass with added mass, against all that the
-ship could do: its screws at full power with the rudders turned through their slipstream, and what
-wind, hull and the model's usual misfit could add to that. A force beyond has come from outside.
+The residual acceleration times mass and added mass is compared with the largest force of the ship:
+screws at full power, rudders at every angle in their slipstream, wind, hull, and the model's
+nominal error. A larger force is external.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ def _compiled(physics, values, state, actuator, wind):
 
 
 def _ranges(record: Record) -> list[np.ndarray]:
-    """Settings to try of each actuator: its stops, or the farthest it was seen."""
+    """Settings to try of each actuator: its stops, or its measured extremes."""
     found = []
     for i, actuator in enumerate(record.profile.actuators):
         offset, factor = actuator.scale()[0]

@@ -15,11 +15,11 @@ from shiplog.diagnosis.linear_segments import Linear, Path
 class Found:
     """One hypothesis.
 
-    evidence   log marginal likelihood [nats]: of a candidate and of a structure, above the base
-               hypothesis it stands beside; of a base hypothesis itself, as it is
-    louder     λ at which it is best
-    numbers    of each cause in it, as a change from what is usual, with their covariance
-    told       of a candidate: how much these data tell of it, were it there
+    evidence   of a base hypothesis its log marginal likelihood [nats]; of a candidate or a
+               structure its log Bayes factor over the base hypothesis
+    louder     λ, the most probable factor of the process noise
+    numbers    of each cause, as a change from nominal, with their covariance
+    told       of a candidate: the information of these data about it
     """
 
     name: str
@@ -32,14 +32,14 @@ class Found:
 
 @dataclass(frozen=True)
 class Told:
-    """What evidence a cause may be expected to bring: ½ Σ each s² - cost, for numbers s in units of
-    their realistic size."""
+    """Expected log Bayes factor of a cause: ½ Σ each s² - cost, for numbers s in units of their
+    realistic size."""
 
     each: np.ndarray
     cost: float
 
     def least(self, nats: float) -> np.ndarray:
-        """Of each number alone, the size that would bring so much [realistic sizes]."""
+        """Of each number alone, the size with this expected log Bayes factor [realistic sizes]."""
         return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
 
     def together(self, nats: float) -> float:
@@ -61,7 +61,7 @@ class Point:
 class Level:
     """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
 
-    The base holds the causes named already, free, beside all that is usual.
+    The base hypothesis holds the named causes, free, and all nominal numbers.
     """
 
     louder: float

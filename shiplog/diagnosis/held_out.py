@@ -103,8 +103,8 @@ class HeldOut(Rollouts):
         return (self.trial, decision) if self.own is None else self.own.beside(decision)
 
     def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
-        """The same with the model's own coefficients fitted again beside what is named, where that
-        makes the error less."""
+        """The same with the model's own coefficients fitted again together with what is named,
+        where that makes the error less."""
         beside = replace(decision, adapted=True)
         again = self.gain(beside)
         return (beside, again) if again.after < found.after else (decision, found)
@@ -118,7 +118,7 @@ class HeldOut(Rollouts):
         return self.better(plain, found) if self.trial.reference.adapts else (plain, found)
 
     def worth(self, rest: Decision, decision: Decision) -> Gain:
-        """What a decision takes off beside one with a cause less."""
+        """Gain of a decision over the same decision without one cause."""
         return gain(
             self.parts(self.states_after(rest)), self.parts(self.states_after(decision)),
             self.voyages,
@@ -146,7 +146,7 @@ class HeldOut(Rollouts):
 
     @property
     def left_out(self) -> str:
-        """What of each window the numbers have not seen."""
+        """The part of the data without which each window's numbers were fitted."""
         return "its half of the voyage" if self._halved else "its voyage"
 
     @property
@@ -172,8 +172,8 @@ class HeldOut(Rollouts):
     def without(
         self, decision: Decision, voyage: str, half: Half
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-        """Numbers of the named causes from all else alone, and the coefficients beside them where
-        the model adapts."""
+        """Numbers of the named causes from all else alone, and the coefficients together with them
+        where the model adapts."""
         recorded, segment = self.trial.record, decision.point.linear.cut
         index = recorded.names.index(voyage) if voyage in recorded.names else -1
         out = segment.voyage == index

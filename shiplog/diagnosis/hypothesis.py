@@ -32,10 +32,10 @@ class Hypothesis:
 
     evidence   log marginal likelihood [nats], the trial counting for its share
     score      log evidence + log prior - placebo: log posterior up to a constant
-    point      the trial linearised where the causes' numbers stand; only the place of one that is
-               far behind
+    point      the trial linearised at the causes' numbers; of a hypothesis far behind, the point
+               without relinearisation
     found      their numbers and covariance there
-    pulses     of an intermittent remainder
+    pulses     the intermittent side force, of an intermittent remainder
     """
 
     causes: tuple[str, ...]
@@ -80,9 +80,9 @@ class Priors:
 
 
 def form_error(alone: Mapping[str, float], labels: Sequence[str]) -> float:
-    """Nats that further causes bring by imitating what the strongest one's form leaves over.
+    """Allowance, in nats, for further causes that imitate the form error of the strongest one.
 
-    alone   log Bayes factor of each cause by itself, against nothing
+    alone   log Bayes factor of each cause by itself, over no cause
     """
     if len(labels) < 2:
         return 0.0

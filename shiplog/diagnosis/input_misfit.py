@@ -1,8 +1,8 @@
 """What a ship's MMG gets wrong of a network's inputs: a smooth function of them, the same on all
 voyages.
 
-It lasts as long as the ship does the same, so that no unrest of seconds stands for it: left out, a
-few hundred nats of it go to the cause that looks most like it. It stands beside every hypothesis
+It lasts as long as a manoeuvre, so that process noise of seconds cannot represent it. Without it, a
+cause that resembles it gains a few hundred nats. It is part of every hypothesis
 (Kennedy & O'Hagan 2001: the discrepancy as a function of the inputs); what depends on heading,
 place or time it cannot explain. And it is what the network is bent by where it is fitted again.
 """
@@ -20,7 +20,7 @@ from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.compiled_network import Network
 
-SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary unrest
+SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary process noise
 SUMS = 200  # of the features in a channel, of which others hardly differ where ships go
 FELT = 1.0  # least that voyages say of a weight, in units of what was known of it
 
@@ -53,8 +53,8 @@ def of(
     network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
     unit: np.ndarray, push: np.ndarray,
 ) -> Misfit:  # fmt: skip
-    """Of the size that is likeliest beside numbers [C] in `unit`s [C], of which so much is `known`
-    before any data.
+    """With the most probable size, conditional on numbers [C] in `unit`s [C] with the prior
+    information `known`.
 
     cut    of the voyages that `modes` are of
     push   [3] unit of size
@@ -82,8 +82,8 @@ def _features(network: Network, knots: Knots) -> np.ndarray:
 
 
 def _likelihood(total: np.ndarray, known: np.ndarray, size: float) -> float:
-    """Log marginal likelihood of a campaign's products beside weights of one size, up to what no
-    size changes."""
+    """Log marginal likelihood of a campaign's products together with weights of one size, up to
+    what no size changes."""
     count = len(total) - 1 - len(known)
     by = np.concatenate((np.ones(1 + len(known)), np.full(count, size)))
     scaled = total * np.outer(by, by)

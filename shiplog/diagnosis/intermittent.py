@@ -1,7 +1,7 @@
-"""A side force that comes and goes at one place, and what of it is usual for the ship.
+"""An intermittent side force at one place, and its nominal part.
 
-What pushes a ship at random often pushes it at one place, and in bursts. In a trial of rougher
-weather the same pushes are stronger, and no device is at work.
+Random forces on a ship often act at one place, and in bursts. In rougher weather the same forces
+are larger, and no device is at work.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from shiplog.diagnosis.segments import SegmentGrid
 
 
 def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
-    """Acceleration [3], root mean square, of the nominal process noise at one place, where it is
-    likelier to push at one place than in each channel by itself; None where it is not.
+    """Acceleration [3], root mean square, of nominal process noise that acts at one place; None
+    where independent noise in each channel is more probable.
 
     Each part's numbers are predicted by the other voyages and itself, as a trial's are.
     """

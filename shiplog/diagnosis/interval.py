@@ -1,4 +1,4 @@
-"""A stretch of a voyage of which something is to be said."""
+"""An interval of a voyage that the verdict reports."""
 
 from __future__ import annotations
 

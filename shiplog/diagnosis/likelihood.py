@@ -1,12 +1,12 @@
-"""What the segments say of every hypothesis at once: algebra on one pass of sensitivities.
+"""Likelihood of every hypothesis from one pass of sensitivities over the segments.
 
-    e_s = Z_s z_s + J_s d + ε,  ε ~ N(0, R),  z = (start, acceleration at the knots)
+    e_s = Z_s z_s + J_s d + ε,  ε ~ N(0, R),  z = (start, acceleration at the nodes)
 
-The start is free, the acceleration is what no model of this ship explains: an Ornstein-Uhlenbeck
-process whose size is learned where the model was made (Kennedy & O'Hagan 2001). Both are
-eliminated segment by segment; what is left of all data is one small matrix over [e | J]. An
-instrument's noise lasts from one observation to the next: taken for white, it would make causes
-that it looks like, and intervals that are too narrow.
+The start is free. The acceleration is process noise: an Ornstein-Uhlenbeck process whose standard
+deviation is estimated from the nominal campaign (Kennedy & O'Hagan 2001). Both are eliminated
+segment by segment, which leaves one small matrix over [e | J]. Instrument noise is correlated from
+one observation to the next. Treated as white, it would imitate causes and make intervals too
+narrow.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m,
 
 @dataclass(frozen=True)
 class Unrest:
-    """Sizes of what is random.
+    """Standard deviations and correlation times of instrument noise and process noise.
 
     noise   [6]  of one observation (a mean over `bin` s), channels.STATE; of its variance a share
                  `coloured` [6] lasts, and fades within `fade` [6] s
-    push    [3]  of the acceleration that no model explains [m/s², m/s², rad/s²]
-    time         s over which that stays
-    start   [6]  how free the initial state is
-    pulse   [3]  acceleration of one force that nobody records, and `pulse_time` [s]
-    bin, knot    s of one observation, and between the knots of the acceleration
+    push    [3]  of the process noise [m/s², m/s², rad/s²]
+    time         its correlation time, s
+    start   [6]  of the initial state, before any data
+    pulse   [3]  acceleration of an intermittent force, with its correlation time `pulse_time` [s]
+    bin, knot    s of one observation, and between the nodes of the acceleration
     """
 
     noise: np.ndarray
@@ -85,7 +85,7 @@ class _Whitening:
     """Observations in units in which their noise is white and of unit size."""
 
     def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
-        """used   [S, B, 6] bool: what was not seen is nothing"""
+        """used   [S, B, 6] bool: rows without a measurement do not count"""
         bins = used.shape[1]
         at = unrest.bin * np.arange(bins)
         self.by: list[np.ndarray] = []  # [S, B, B] of each channel
@@ -109,7 +109,7 @@ class _Whitening:
 
 @dataclass(frozen=True)
 class Weighed:
-    """Products of one pass under one noise R; what depends on the push alone comes after.
+    """Products of one pass under one instrument noise R, before the process noise is included.
 
     dd      [S, 1 + C, 1 + C]  of [e | J]
     zd      [S, Z, 1 + C]
@@ -149,16 +149,15 @@ class Gram:
 
 @dataclass(frozen=True)
 class Modes:
-    """A pass without its starts, in axes in which the acceleration at the knots is independent by
-    what was known of it and by what the data say: of any size λ of it, the rest is a division.
+    """A pass without its starts, in axes that diagonalise prior and data information of the
+    acceleration at the nodes. Any factor λ of the process noise is then a division.
 
     dd      [S, 1 + C, 1 + C]  of [e | J], the start eliminated
     md      [S, 3J, 1 + C]     of the modes with [e | J]
-    felt    [S, 3J]            what the data say of each mode, in units of what was known
-    axes    [S, 3J, 3J]        from accelerations at the knots to modes
+    felt    [S, 3J]            data information of each mode over its prior information
+    axes    [S, 3J, 3J]        from accelerations at the nodes to modes
     logdet  of noise and start
-    pushed  [S, 3J, W]         modes of columns more, each of which bends the observations as an
-                               acceleration at the knots does
+    pushed  [S, 3J, W]         modes of further columns that act as accelerations at the nodes
     """
 
     dd: np.ndarray
@@ -180,7 +179,7 @@ class Modes:
         total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
         if not self.pushed.shape[-1]:
             return total
-        # what such a column bends, less what the unrest explains of it
+        # the effect of such a column, less the part that process noise explains
         more = (self.pushed * part).reshape(-1, self.pushed.shape[-1])
         across = louder**-2.0 * (more.T @ flat)
         more *= np.sqrt(self.felt).reshape(-1, 1) / louder
@@ -233,9 +232,9 @@ class Startless:
 
 
 def startless(weighed: Weighed, unrest: Unrest) -> Startless:
-    """Start eliminated. Raises np.linalg.LinAlgError where the path ran away."""
+    """Start eliminated. Raises np.linalg.LinAlgError where the path diverged."""
     if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
-        raise np.linalg.LinAlgError("a path that ran away has no products")
+        raise np.linalg.LinAlgError("the path diverged: it has no products")
     known = np.diag(unrest.start**-2.0)
     start = weighed.zz[:, :6, :6] + known
     # in units of each number of the start, or its columns are too unlike to invert
@@ -255,7 +254,7 @@ def startless(weighed: Weighed, unrest: Unrest) -> Startless:
 
 def modes(weighed: Weighed, unrest: Unrest) -> Modes:
     """Start eliminated, acceleration along its principal axes (Woodbury). Raises
-    np.linalg.LinAlgError where the path ran away."""
+    np.linalg.LinAlgError where the path diverged."""
     left = startless(weighed, unrest)
     root = np.linalg.cholesky(unrest.kernel(weighed.knots))
     felt, axes = np.linalg.eigh(root.T @ left.kk @ root)
@@ -275,9 +274,9 @@ def _of_start(weighed: Weighed, known: np.ndarray) -> float:
 
 
 def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Unrest:
-    """Noise and push that fit what d leaves: expectation-maximisation (Dempster et al. 1977), each
-    round three steps of it of which the first two say how far the third may leap (SQUAREM,
-    Varadhan & Roland 2008). How the noise is coloured is asked once, at the end.
+    """Instrument and process noise that fit the residuals of d, by expectation-maximisation
+    (Dempster et al. 1977). Of three steps a round, the first two give the length of the third
+    (SQUAREM, Varadhan & Roland 2008). The colour of the noise is estimated once, at the end.
 
     d   [C] the numbers of the columns
     """
@@ -292,7 +291,7 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
         return replace(unrest, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
 
     def step(sizes: np.ndarray) -> np.ndarray:
-        """Logarithms of noise and push [9] after one step."""
+        """Logarithms of instrument and process noise [9] after one step."""
         now = at(sizes)
         whole = np.tensordot(now.noise**-2.0, products, 1)
         covariance = np.linalg.inv(whole[:, 1:, 1:] + now.precision(knots))
@@ -333,8 +332,8 @@ def _posterior(z: np.ndarray, left: np.ndarray, unrest: Unrest) -> tuple[np.ndar
 
 
 def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
-    """With the colour that is likeliest for each channel's noise, of its second moments where all
-    was seen; its size goes with that."""
+    """With the most probable colour of each channel's noise, from the second moments of complete
+    stretches; its standard deviation follows."""
     used = linear.cut.used
     whole = used.all((1, 2))
     if whole.sum() < ENOUGH_SEGMENTS:

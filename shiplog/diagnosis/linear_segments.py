@@ -33,7 +33,7 @@ class Linear:
     e   [S, B, 6]       measured less simulated, with the path's own z put back
     z   [S, B, 6, Z]    by initial state (6) and knots (3J)
     j   [S, B, 6, C]    by θ
-    lost [S]            bool: the model runs away there; rows of zeros, nothing of it is used
+    lost [S]            bool: the model diverges there; rows of zeros, nothing of it is used
     """
 
     cut: Cut
@@ -54,7 +54,7 @@ class Linear:
             return ""
         return (
             f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
-            "the model runs away there."
+            "the model diverges there."
         )
 
     def pick(self, keep: np.ndarray) -> Linear:
@@ -68,8 +68,8 @@ class Linear:
         return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
 
     def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
-        """Without what the numbers [S, C + W] of each segment do, SI: C of the columns of `j`, then
-        W that push [S, 3J, W] at the knots."""
+        """Residuals without the effect of the numbers [S, C + W] of each segment, SI: C of the
+        columns of `j`, then W of accelerations [S, 3J, W] at the nodes."""
         count = self.j.shape[-1]
         e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
         return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))

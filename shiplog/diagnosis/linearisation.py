@@ -6,7 +6,7 @@ initial state and a slowly varying acceleration; around that path the simulation
 that follows: y ≈ y* + Z (z - z*) + J d.
 
 Of a model that training cut into several steps a second, so is the time between two nodes. A
-segment in which the model runs away all the same is left out and counted (`Linear.lost`).
+segment in which the model diverges all the same is left out and counted (`Linear.lost`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,10 @@ from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.jit_cache import traced
 from shiplog.simulation.sensitivities import Physical, rate
 
-jax.config.update("jax_enable_x64", True)
-
 SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
-RUN_AWAY = 10.0  # times what a path may be off its measurement, beyond which the model has run away
+RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
 
 
 class Smooth(Physical, Protocol):
@@ -181,7 +179,7 @@ def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
 
 def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
     """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
-    that ran away stays where it was."""
+    that diverged stays where it was."""
     count, _, _, size = z.shape
     away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
     if away.any():
@@ -211,10 +209,10 @@ def linear(
 ) -> Linear:
     """Around a path, by all of θ, of which the last Q are causes' numbers.
 
-    moved   [S, K, D, Q]  how those change what drives, where a cause reads otherwise
-    shown   [S, B, 6, Q]  how they change what was measured
-    wide    how freely the path was pulled: what is FAR times that from its measurement has run
-            away; FAR times what the segments span where it is not given
+    moved   [S, K, D, Q]  derivatives of actuators and wind by the causes' numbers
+    shown   [S, B, 6, Q]  derivatives of the measurements by them
+    wide    standard deviation of the path about its measurement: a path FAR times that away has
+            diverged; where it is not given, the span of the segments
     """
     y, columns = simulated(model, theta, segments, path, g, moved)
     lost = _lost(segments, y, columns, wide)
@@ -232,9 +230,9 @@ def linear(
 
 
 def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) -> np.ndarray:
-    """[S] bool: where path or columns are not finite, or the path is nowhere near its measurement.
+    """[S] bool: where path or columns are not finite, or the path is far from its measurement.
 
-    Only bins that were seen count, and channels of one kind (both of position, both of velocity)
+    Only measured bins count, and channels of one kind (both of position, both of velocity)
     have one width: that of `wide`, or the root mean square of what all segments span.
     """
     if wide is None:
@@ -286,7 +284,7 @@ def _along(model, theta, states, driven, step, *, coefficients) -> list[np.ndarr
 
 def simulated(model, theta, segments, path, g, moved=None):
     """y [S, B, 6] and its columns [S, B, 6, 6 + 3J (+ P)]: start, knots, θ. Not finite where the
-    model runs away."""
+    model diverges."""
     with np.errstate(all="ignore"):
         return _every(model, theta, segments, path, g, moved)
 

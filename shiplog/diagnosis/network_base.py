@@ -1,4 +1,4 @@
-"""A network beside the causes that the ship's MMG, fitted to the same voyages, was asked about."""
+"""A network, extended by causes that were tested on the ship's MMG, fitted to the same voyages."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""The manoeuvre that would tell two causes apart, and what it would say: simulated before it is
-sailed.
+"""The manoeuvre that would separate two causes, and its expected evidence, simulated in advance.
 
-Evidence to come is the information of a manoeuvre's simulation, coefficients and what is usual
-eliminated: of a cause's numbers as they were found, what another cause could not imitate.
+The expected evidence is the information of the simulated manoeuvre about a cause's numbers, without
+the part that coefficients, nominal numbers or the other cause could imitate.
 """
 
 from __future__ import annotations
@@ -126,7 +125,7 @@ def apart(trial: TrialEvidence, gram: np.ndarray, one: Named, other: str) -> flo
 
 
 def sailed(trial: TrialEvidence, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
-    """[1 + C, 1 + C] of each manoeuvre, in units; None where the model runs away in it."""
+    """[1 + C, 1 + C] of each manoeuvre, in units; None where the model diverges in it."""
     ref = trial.reference
     numbers = dict(fixed)
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
@@ -196,7 +195,7 @@ def simulated(trial: TrialEvidence, theta: np.ndarray) -> tuple[Record, np.ndarr
 
 
 def driven(record: Record, manoeuvre: Manoeuvre, time: np.ndarray) -> np.ndarray:
-    """[n, A] SI: shares of what each actuator was seen to do, nineteen times of twenty."""
+    """[n, A] SI: shares of the range of each actuator, nineteen times of twenty."""
     thrust, steering = manoeuvre.drive(time)
     usual = np.quantile(np.abs(record.actuator[record.seen]), 0.95, axis=0)
     columns = []

@@ -1,6 +1,6 @@
-"""Where the campaign that a model was made on settles: worked out once, kept in the user's cache.
+"""Disk cache of the nominal campaign: its converged fit, computed once for a model.
 
-All that it depends on is in its key, this program's source with it: nothing here is ever stale.
+The key holds all that the fit depends on, the program's source included: no entry is ever stale.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ log = logging.getLogger(__name__)
 
 
 def settled(model: Extended, setting: Setting, start: Start, record: Record) -> Settled:
-    """`reference.settled`, worked out once for a model and a campaign."""
+    """`nominal_reference.settled`, computed once for a model and a campaign."""
     kept = disk_cache.folder() / "settled" / f"{_key(model, setting, start, record)}.npz"
     known = _read(kept)
     if known is not None:
         return _settled(known)
-    log.info("where the nominal voyages settle: worked out once for a model and kept")
+    log.info("the nominal voyages are fitted once for a model, and kept")
     found = nominal_reference.settled(model, setting, start, record)
     _keep(kept, {"theta": found.theta, "start": found.path.start, "push": found.path.push}
           | _unrest(found.unrest))  # fmt: skip
@@ -72,7 +72,7 @@ def characteristics(
 
 
 def _read(kept: File) -> dict | None:
-    """Arrays of a file; None where it is not there, or broken: then all is worked out again."""
+    """Arrays of a file; None where it is missing or damaged, and has to be computed again."""
     try:
         with np.load(kept, allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}

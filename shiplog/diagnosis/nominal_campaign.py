@@ -1,8 +1,8 @@
-"""The nominal campaign: what is usual for a ship, and how far its own voyages are from each other.
+"""The nominal campaign: its coefficients and errors, and the differences between its voyages.
 
-Coefficients, the causes' usual numbers and the weights of the model's discrepancy are learned
-together. How far the voyages of the campaign and their parts disagree in each of them
-(`voyage_effects`, `campaign_prior`) is how far those of a trial may without any change.
+Coefficients, the causes' nominal numbers and the weights of the model's discrepancy are estimated
+together. The variance between its voyages and between their parts (`voyage_effects`,
+`campaign_prior`) is the variance of a trial without any change.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def learn(
         model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
         pull, held, 1.0 / found.share, made.linear, modes,
         nominal_reference.freedom(len(made.rows)),
-        misfit=families,  # type: ignore[arg-type]  # it pushes as a network's Misfit does
+        misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
     return Campaign(
@@ -160,8 +160,8 @@ def assumed(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
     inputs: Network | None = None, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
-    """Where no nominal campaign shows what is usual: the voyages in question stand for it, and no
-    cause has a usual size.
+    """Without a nominal campaign: the trial's own voyages take its place, and no cause has a
+    nominal size.
 
     given    coefficients that nobody fitted, held near their values; else a fit to these voyages
     inputs   a network that was trained on these voyages

@@ -1,9 +1,9 @@
-"""The campaign that the model was made on, as the diagnosis sees it: what is usual for this ship.
+"""The nominal reference: the posterior of coefficients and causes after the training voyages.
 
-Coefficients and the numbers of every cause are learned here together, each held to its plausible
-spread. What the model gets wrong everywhere then stands in them already; a diagnosis asks only
-for what changed. One campaign makes the next one's coefficients look surer than they are, so what
-it says counts for 1/κ of itself (a power prior, Ibrahim & Chen 2000).
+Coefficients and the numbers of every cause are estimated together, each with its plausible spread
+as prior. An error that the model has everywhere is then part of them; the diagnosis tests changes
+only. Coefficients fitted to one campaign are over-confident for the next. Their information matrix
+is divided by κ (a power prior, Ibrahim & Chen 2000).
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from shiplog.voyages.recording import Record
 ROUNDS = 6  # of moving the coefficients to where they are linearised
 LONGEST_MOVE = 0.7  # plausible spreads that a coefficient moves in one round
 NEAR = 5.0  # nats, for which they are not moved on
-ON_THE_WAY, AT_REST = 2, 3  # rounds in which the sizes of noise and unrest are learnt
-FREE = 2.0  # times the unrest that a path's knots may be pulled by
+ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are estimated
+FREE = 2.0  # times the process noise: the allowed acceleration at a path's nodes
 KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
-VOYAGES = 2.0  # and between voyages, beside what a network gets wrong of all
+VOYAGES = 2.0  # and between voyages, together with the error of a network on all of them
 CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s, of a three-metre ship
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
@@ -45,10 +45,10 @@ class Reference:
 
     information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
                  latter is the run's own coefficients'
-    nominal      that campaign, and its `modes` under the usual unrest; None where the model was
-                 made on the very data that are diagnosed
+    nominal      that campaign, and its `modes` under the nominal process noise; None where the
+                 model was trained on the very data that are diagnosed
     freedom      degrees of it with which κ is known: the sizes of covariances hang on it
-    adapts       whether it has learned of what is wrong there, so that a cause takes another fit
+    adapts       whether the model has absorbed causes there, and is fitted again with them
     learned      whether it stands for a network that has, and that no voyage is held out to
     misfit       what is wrong of such a network's inputs
     counts       for how much of itself a trial counts: what is wrong there each voyage has its own
@@ -75,7 +75,7 @@ class Reference:
 
     @cached_property
     def mean(self) -> np.ndarray:
-        """[C] what is usual, in units."""
+        """[C] nominal numbers, in units."""
         return np.linalg.solve(self.information, self.pull)
 
     @cached_property
@@ -85,8 +85,8 @@ class Reference:
         return self.theta + self.mean[:base] * self.columns.unit[:base]
 
     def held(self, louder: float, pulse: np.ndarray | None = None) -> Wide:
-        """How far a path may be pulled where the unrest is so much louder than usual, and by a
-        force that comes and goes."""
+        """Allowed distance of a path where the process noise has this factor, and with an
+        intermittent force."""
         push = louder * self.unrest.push
         if pulse is not None:
             push = np.hypot(push, pulse)
@@ -121,7 +121,7 @@ def wide_of(setting: Setting) -> Wide:
 class Settled:
     """Where a campaign is linearised, and how unrestful it is there.
 
-    theta  [P] coefficients; path of each segment; unrest
+    theta  [P] coefficients; path of each segment; unrest: the process noise
     """
 
     theta: np.ndarray
@@ -132,8 +132,8 @@ class Settled:
 def settled(
     model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS
 ) -> Settled:
-    """Coefficients moved to where they are linearised, all causes' numbers beside them; without
-    rounds they stay where they are."""
+    """Coefficients moved to where they are linearised, all causes' numbers together with them;
+    without rounds they stay where they are."""
     columns = columns_of(model, setting, start)
     wide, g = wide_of(setting), segments.grid(record)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
@@ -183,8 +183,8 @@ def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
 def solved(
     linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """[C] numbers, in units, that the campaign itself and what was known of them ask for; nats
-    that it brings to move the base's there, were all linear (half a Newton decrement)."""
+    """[C] most probable numbers of the campaign, in units; and the log Bayes factor, in nats, of
+    moving the base's there in the linear model (half a Newton decrement)."""
     base, by = columns.base, np.concatenate(([1.0], columns.unit))
     modes = likelihood.modes(likelihood.weighed(linear, unrest), unrest)
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
@@ -203,9 +203,9 @@ def learn(
     least: float = CAMPAIGN,
     inputs: Network | None = None,
 ) -> Reference:
-    """From the nominal campaign, linearised `at` where it settles. κ is chosen on its own voyages
-    unless given, and not below `least`. `inputs`: a network, of whose inputs the model gets
-    something wrong."""
+    """From the nominal campaign, linearised at its converged fit `at`. κ is estimated from its own
+    voyages unless given, and not below `least`. `inputs`: a network whose inputs the discrepancy is
+    a function of."""
     at = at or settled(model, setting, start, record)
     columns = columns_of(model, setting, start)
     cut, moved, shown = read(model, setting, record, segments.begins(record))
@@ -243,7 +243,7 @@ def usual(
     total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
-    beside what is `known` and `held` without them."""
+    together with what is `known` and `held` without them."""
     return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
 
 
@@ -286,11 +286,11 @@ def assume(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
     inputs: Network | None = None,
 ) -> Reference:  # fmt: skip
-    """Where no campaign shows what is usual: the unrest is as large as it is on these voyages.
+    """Without a nominal campaign: the process noise is estimated from these voyages.
 
-    given    coefficients as somebody gave them, held to a tenth of their plausible spread; else a
-             fit to these voyages made them, and they are as free as they plausibly are
-    inputs   a network that learned from these voyages
+    given    published coefficients, with a tenth of their plausible spread; else coefficients of a
+             fit to these voyages, with their plausible spread
+    inputs   a network that trained on these voyages
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
@@ -300,7 +300,7 @@ def assume(
     columns = whole.columns
     information = np.diag(columns.known.copy())
     causes = slice(columns.base, columns.linearised)
-    # no cause has a usual size where nothing was usual
+    # without a nominal campaign no cause has a nominal size
     information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD_INFORMATION
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,

@@ -1,8 +1,8 @@
-"""Does what is left unexplained depend on something that the model cannot see?
+"""Dependence of the residual on inputs that the model does not have.
 
-A model sees velocities, actuators and apparent wind. Heading, place, time and what the controls
-just did are not among its inputs: where they predict its residual in voyages that the prediction
-was not fitted to, something is missing that no refitting of the model will give.
+The inputs of a model are velocities, actuators and apparent wind. Heading, place, time and recent
+changes of the controls are not. If they predict the residual on held-out voyages, a term is missing
+that a new fit of the model cannot provide.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ CHANNELS = tuple(c.name for c in channels.VELOCITY)
 LEAST_R2 = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
 BEYOND = 4.0  # standard deviations of what chance reaches
 SHIFTS = 20
-APART = 30  # knots, the least shift: what pushes a ship at random is forgotten by then
+APART = 30  # nodes, the least shift: random forces are no longer correlated by then
 EXCHANGED_S = 300.0  # s, exchanged to make time mean nothing
 VOYAGE_FOLDS = 8  # more voyages are left out in groups
 PLACES = 12
-OUTLIER = 6.0  # robust standard deviations; a ship that is pushed by hand must not decide this
+OUTLIER = 6.0  # robust standard deviations; a ship that was pushed by hand must not decide
 PENALTIES = 10.0 ** np.arange(-4.0, 2.0)  # of the mean square of a feature
 
 
@@ -56,7 +56,7 @@ class _Knots:
     """What the regressions share, K knots in order of voyage and time.
 
     y        [K, 3]  accelerations, outliers cut
-    visible  [K, G]  a rough model's features of all that the model sees
+    visible  [K, G]  a rough model's features of all inputs of the model
     carried  [K, H]  what a missing effect may be proportional to
     runs     [K]     voyage
     folds    [K]     what is left out together
@@ -246,7 +246,7 @@ def _gains(shared: _Knots, known: np.ndarray, designs: list[np.ndarray]) -> np.n
     whole = np.zeros((len(shared.y), 0))
     total, before = (_left_out(shared, x) for x in (whole, known))
     after = np.stack([_left_out(shared, np.concatenate((known, x), 1)) for x in designs])
-    # against whichever is the better guess without it: a share of what is left to predict
+    # relative to the better guess without it: a share of the remaining variance
     base = np.minimum(before, total)
     return (base - after) / np.maximum(base, 1e-300)
 

@@ -45,8 +45,8 @@ class Columns:
 
     @cached_property
     def known(self) -> np.ndarray:
-        """[C] how surely each is as it stands, before any data, in units: a cause that
-        coefficients or another one stand for has no usual size of its own."""
+        """[C] prior information of each number, in units. A cause that is an alias of coefficients
+        or of another cause has no nominal size of its own."""
         whole = np.ones(len(self.unit))
         for cause in self.causes:
             if not cause.usual:

@@ -15,7 +15,7 @@ from shiplog.diagnosis.trial import SIZES
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
-    """Label or family → nats that it gains at most on one nominal voyage, 0 at least."""
+    """Label or family → its largest log Bayes factor on one nominal voyage, at least 0, in nats."""
     columns, share = campaign.reference.columns, campaign.reference.counts
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
     tested = {label: (at, (1.0,)) for label, at in columns.of.items()}

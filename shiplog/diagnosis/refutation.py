@@ -1,7 +1,7 @@
-"""Held-out voyages may refute a name: one rule, for every cause alike.
+"""Held-out voyages may refute a cause: one rule for all causes.
 
-The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted where the
-held-out error with it is surely greater than without it; then the search goes on without it, and
+The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
+interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it.
 """
 
@@ -48,7 +48,7 @@ def judged(
             rests = [decisions.without(search.trial, decision, one) for one in decision.named]
             worths = [held.worth(rest, decision) for rest in rests]
         asked = list(zip(decision.named, worths, strict=True))
-        worse = [pair for pair in asked if pair[1].high < 0.0]  # surely
+        worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
         if not worse:
             order = sorted(asked, key=lambda pair: -pair[1].reduction)
             ordered = replace(decision, named=tuple(one for one, _ in order))

@@ -15,8 +15,8 @@ from shiplog.diagnosis.linear_segments import Path
 
 RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
-STEP_NATS = 100.0  # nats that no step costs a fit that holds: without effect it has lost a few
-SHORTER = 3  # times that a step is halved where the fit runs away
+STEP_NATS = 100.0  # nats: no step of a converging fit loses as much
+SHORTER = 3  # times that a step is halved where the fit diverges
 AT_REST = 0.02  # of a number's size: it rests
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
 HOPE = 4.0  # times what the last round of linearising brought may still come
@@ -47,14 +47,14 @@ def settle(
         try:
             point = trial.at(numbers, near, louder)
             if np.abs(point.linear.e).max() > AWAY:
-                raise np.linalg.LinAlgError("a path that ran away")
+                raise np.linalg.LinAlgError("the path diverged")
             if steady and lately is not None:
                 base = trial.fit(point, included, lately)
             else:
                 base, _ = trial.scan(point, (), included, lately)
             if base.evidence < lowest:
                 raise np.linalg.LinAlgError("a step too far")
-        except np.linalg.LinAlgError:  # the fit ran away, and its path with it
+        except np.linalg.LinAlgError:  # the fit diverged, and its path with it
             if shorter == SHORTER:
                 assert trial.first is not None
                 return trial.first, Found("+".join(included), -np.inf, louder, numbers)
@@ -71,7 +71,7 @@ def settle(
         steady = lately is not None and abs(math.log(base.louder / lately)) < STEADY
         louder = lately = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
-            base = replace(base, evidence=-np.inf)  # the fit ran away
+            base = replace(base, evidence=-np.inf)  # the fit diverged
             break
         moved = _within_bounds(trial, base.numbers, base.covariance)
         far = trial.apart(moved, numbers)

@@ -1,7 +1,7 @@
 """The acceleration that a model leaves unexplained along what was measured, and what went with it.
 
 z | e ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P)⁻¹: the posterior of a linear Gaussian model
-(Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `evidence.Unrest`.
+(Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `likelihood.Unrest`.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class Unexplained:
 def covering(record: Record) -> np.ndarray:
     """Rows at which segments begin so that each stretch is covered twice and to its end.
 
-    A segment knows little of its own ends, where what is left is drawn towards nothing, and
-    `segments.begins` leaves up to a segment at the end of a stretch unread. Evidence can spare
-    that; whoever looks for an event cannot.
+    Residual accelerations at the ends of a segment are biased towards zero, and `segments.begins`
+    leaves up to a segment unread at the end of a stretch. The evidence can spare these data; a
+    search for events cannot.
     """
     size = segments.grid(record).rows
     begins = segments.begins(record)
@@ -56,7 +56,7 @@ def covering(record: Record) -> np.ndarray:
 
 
 def posterior(linear: Linear, d: np.ndarray, unrest: Unrest, record: Record) -> Unexplained:
-    """What is left at the knots where the columns' numbers are d [C].
+    """Residual acceleration at the nodes, for numbers d [C] of the columns.
 
     record   the one that `linear.cut` was cut from
     """
@@ -98,7 +98,7 @@ def once(found: Unexplained) -> np.ndarray:
 
 
 def table(found: Unexplained, record: Record) -> pl.DataFrame:
-    """One row a knot: what is left, and what went with it; SI, in order of voyage and time.
+    """One row a node: residual acceleration and conditions; SI, in order of voyage and time.
 
     voyage, time_s, ACCELERATIONS, the same with _sd, x0, y0, heading in (-π, π], surge, sway,
     yaw_rate, the actuators, wind_ahead, wind_starboard (apparent, where it comes from), share (of

@@ -20,10 +20,10 @@ SHOWS_NATS = 5.0  # nats from which on a cause would show in these data
 
 @dataclass(frozen=True)
 class Named:
-    """One cause of the verdict. `numbers` and `covariance` are a change from what is usual.
+    """One cause of the verdict. `numbers` and `covariance` are of the change from nominal.
 
-    alike    those that it explains hardly more than
-    beaten   label → nats by which it explains more than that one instead of it
+    alike    labels of causes that these data cannot distinguish from it
+    beaten   label → log Bayes factor over that cause in its place, in nats
     freedom  degrees of it with which the covariance's size is known
     """
 
@@ -43,7 +43,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Structure:
-    """What is left and has no name."""
+    """The remainder of the verdict: a dependence without a named cause."""
 
     family: str
     evidence: float
@@ -52,19 +52,19 @@ class Structure:
 
 @dataclass(frozen=True)
 class Decision:
-    """What the trial says, before anything was held out.
+    """The decision from the posterior, before the held-out test.
 
     verdict    named, none or unknown
     named      in the order they were found
     pulses     the unrecorded thruster, where it is one of the causes
     rejected   label → why not
-    traces     there, but too small to matter
+    traces     causes below their practical size
     ranking    label or family → probability, of the first step
-    louder     λ that is left
+    louder     λ, factor of the process noise, of the remainder
     point, base      the trial linearised with what is named, and that hypothesis
-    first, nothing   the same with nothing named
-    told       label → what these data would tell of each cause, were it there
-    adapted    whether the model's own coefficients are fitted again beside what is named
+    first, nothing   the same without any cause
+    told       label → information of these data about each cause
+    adapted    whether the model's coefficients are fitted again together with the named causes
     """
 
     verdict: str
@@ -90,7 +90,7 @@ def without(trial: TrialEvidence, decision: Decision, one: Named) -> Decision:
     if labels:
         numbers = {n: decision.base.numbers[n] for n in labels}
         point, base = settle(trial, labels, numbers, decision.point.path)
-        if base.covariance is None:  # the fit ran away: nothing is left of them
+        if base.covariance is None:  # the fit diverged: it has no numbers
             labels, named = (), ()
     if not labels:
         point, base = decision.first, decision.nothing

@@ -21,13 +21,13 @@ from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder, Trial
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
-MOST_SETS = 16  # that are linearised; what is left then is far behind
-KEPT_LINEARISATIONS = 6  # another one is made again where it is asked for
+MOST_SETS = 16  # that are linearised; the others are far behind
+KEPT_LINEARISATIONS = 6  # the others are computed again when needed
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 LIKELY = 0.3  # share of the best one's evidence: before it is linearised a cause may lack more
 CONTENDERS = 3  # causes that are tried from one hypothesis
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
-RAISED_FROM = 1.2  # times the usual process noise, from which an intermittent force is asked for
+RAISED_FROM = 1.2  # times the nominal process noise, from which an intermittent force is tested
 
 
 log = logging.getLogger(__name__)
@@ -45,9 +45,9 @@ class Change:
 class Search:
     """All hypotheses weighed so far.
 
-    placebo label or remainder → nats that it gains on nominal voyages
-    alone   label → log Bayes factor of that cause by itself against nothing
-    told    label → what these data would show of it, were it there
+    placebo label or remainder → its log Bayes factor on nominal voyages, in nats
+    alone   label → log Bayes factor of that cause by itself, over no cause
+    told    label → information of these data about it
     scanned label → score of that cause by itself, where it was found first
     """
 
@@ -71,8 +71,8 @@ class Search:
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
 
     def run(self) -> None:
-        """Weigh hypotheses until none is worth it. Scores are then renewed: what a cause brings by
-        itself, on which the allowance for form errors rests, is known at the end only."""
+        """Evaluate hypotheses until no further one is promising. Scores are then renewed, since the
+        allowance for form errors needs every cause's own log Bayes factor."""
         self._run()
         self.found = {
             key: replace(h, score=self._score(h.evidence, h.causes, h.kind))
@@ -82,7 +82,7 @@ class Search:
     def without(self, name: str) -> None:
         """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
         self.banned.add(name)
-        self.trial.unrest = self.trial.reference.unrest  # a verdict may have left its pulses there
+        self.trial.unrest = self.trial.reference.unrest  # without an earlier force
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
         self.run()
@@ -176,16 +176,17 @@ class Search:
         return said[:CONTENDERS]
 
     def _say_what_would_not_show(self) -> None:
-        """What the model's misfit and these voyages cost, before anything is looked for."""
+        """Log the causes that these voyages cannot reveal, before any is searched for."""
         shares = {name: told.together(SHOWS_NATS) for name, told in self.told.items()}
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
-            log.info("of what is realistic would not show: %s", ", ".join(dict.fromkeys(blind)))
+            log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
 
     # --- one set of causes ---
 
     def _included(self, labels: tuple[str, ...]) -> tuple[str, ...]:
-        """What a fit of these causes includes: what the model has already stays as it is."""
+        """Labels that a fit of these causes includes; causes of the model itself keep their
+        numbers."""
         return (*self.fixed, *labels)
 
     def weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
@@ -203,10 +204,10 @@ class Search:
             near = base.louder
         included = self._included(labels)
         levels = trial.levels(point, included, near)
-        if near is not None and near > RAISED_FROM:  # a remainder may bring the usual noise back
+        if near is not None and near > RAISED_FROM:  # the noise may be nominal again
             levels.append(trial.level(point, 1.0, included))
         usual = self._best(levels, NOMINAL).louder
-        if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # it is drawn towards the usual noise
+        if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # its prior favours the nominal noise
             levels += self.levels_of(point, included, usual)
         for kind in (NOMINAL, RAISED):
             self._keep(point, labels, Remainder(kind), self._best(levels, kind))
@@ -249,11 +250,13 @@ class Search:
     def changed(
         self, point: Point, included: Sequence[str], levels: Sequence[Level], family: str
     ) -> Change:
-        """A change of one family's weights beside included causes, at its best size and noise.
+        """A change of one family's weights together with included causes, at its best size and
+        noise.
 
-        The noise may be raised beside it, since no family describes to the last what no cause
-        describes. But the family explains more than the noise does only where it is likelier with
-        the usual noise than raised noise is alone; else its functions are fitted to noise."""
+        The noise may be raised as well, since no family describes an unknown force exactly. The
+        family counts only if it is more probable with nominal noise than raised noise alone;
+        otherwise its functions are a fit to noise.
+        """
         usual, raised = [], []
         for level in levels:  # made under RAISED
             gained, size = self.trial.changed(point, level, included, family)
@@ -267,7 +270,7 @@ class Search:
     def _change(
         self, point: Point, labels: tuple[str, ...], one: Change, plain: Hypothesis, leads: bool
     ) -> None:
-        """The set with a change of one family beside it; linearised again where that leads."""
+        """The set together with a change of one family; linearised again if that is promising."""
         trial, included = self.trial, self._included(labels)
         remainder, value, noise = one.remainder, one.value, one.noise
         if not leads:  # far behind: its numbers are never asked for
@@ -284,8 +287,8 @@ class Search:
         self._put(labels, remainder, max(value, base.evidence), point, base)
 
     def _pulses(self, point: Point, labels: tuple[str, ...]) -> None:
-        """An intermittent side force instead of raised process noise: a force that gains nothing
-        over it is that noise and nothing else, and is not counted twice."""
+        """An intermittent side force instead of raised process noise. A force without a gain over
+        raised noise is that noise, and is not counted twice."""
         raised = self.found[labels, RAISED]
         self.trial.remainder = Remainder(INTERMITTENT)  # not the family that was tried last
         tried = self.trial.intermittent(point, raised.found)

@@ -1,4 +1,4 @@
-"""What went on at the knots of segments, and what pushes there, channel by channel."""
+"""Motion, controls and accelerations at the nodes of segments, channel by channel."""
 
 from __future__ import annotations
 

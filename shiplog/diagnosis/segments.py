@@ -96,7 +96,7 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 
 
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State [S, B, 6], averaged over bins, and whether most of a bin was seen."""
+    """State [S, B, 6], averaged over bins, and whether most of a bin was measured."""
     g = grid(record)
     whole, ends, per = _in_bins(record.seen[:, None].astype(float), rows, g)
     seen = whole + ends[:, 1:] > 0.5 * (per + 1)

@@ -28,11 +28,11 @@ def trial_of(
     run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
     lacking: str = "", numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Setup:  # fmt: skip
-    """Of a network the ship's MMG is asked, fitted to the voyages that the network was trained on.
+    """For a network, the ship's MMG is tested, fitted to the network's training voyages.
 
     own       causes of the user's
-    nominal   the voyages that the run was made on, before these; None where there are none
-    lacking   why the model cannot tell causes that change forces; empty where it can
+    nominal   the voyages that the run was trained on, before these; None where there are none
+    lacking   why the model cannot identify causes that change forces; empty where it can
     numbers   of causes found in these voyages, where no nominal campaign shows the discrepancy
     """
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)

@@ -1,7 +1,7 @@
 """Signs in which a log and a profile may differ, tried one at a time.
 
-A rudder that turns the other way is no force of the ship, and no coefficient mends it: where a
-model simulates nothing, this is what to ask first.
+No coefficient corrects a rudder of the wrong sign. If a model does not simulate the ship at all,
+its sign conventions are tested first.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from shiplog.voyages.windows import Windows
 
 
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """The convention that makes the mean L of these windows least when it is turned round, in
-    words, and that L."""
+    """The change of convention with the smallest mean L on these windows, in words, and that L."""
     tried = [
         (said, float(np.minimum(simulator.losses(turned), RUNAWAY).mean()))
         for said, turned in other(simulator.profile, cut)
@@ -31,7 +30,7 @@ def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
 
 def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
     """Each convention turned round: signs of actuators of a kind, twins exchanged, the wind blowing
-    towards where it is said to come from."""
+    towards where it is reported to come from."""
     actuators = profile.actuators
     for kind in dict.fromkeys(a.kind for a in actuators):
         columns = [i for i, a in enumerate(actuators) if a.kind == kind]
@@ -44,4 +43,7 @@ def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
             yield f"the two {kind}s exchanged", replace(cut, actuator=swapped)
     if cut.wind.shape[-1]:
         ahead = cut.wind + torch.tensor([0.0, math.pi], dtype=cut.wind.dtype)
-        yield "the wind blowing towards where it is said to come from", replace(cut, wind=ahead)
+        yield (
+            "the wind direction as the one that it blows towards",
+            replace(cut, wind=ahead),
+        )

@@ -19,11 +19,12 @@ ANOTHER_CAUSE = 0.1
 REMAINDER = 0.15
 
 # Share of a force or of a reading. A cause's equations are right to about this share, and what they
-# leave over imitates further causes. Nats go with the square: each further cause has to bring more
-# than this squared of what the strongest one brings.
+# leave over imitates further causes. The evidence goes with the square: the log Bayes factor of
+# each
+# further cause has to exceed this squared times that of the strongest one.
 FORM_ERROR = 0.02
 
-# Share of what a hypothesis explains. Beside a remainder, a cause is a name for the trial only
+# Share of what a hypothesis explains. With a remainder, a cause is named only
 # where it explains more than the remainder does, and where the remainder could do no more than this
 # share of what the cause does.
 MOST = 0.5

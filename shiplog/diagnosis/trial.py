@@ -1,7 +1,7 @@
 """A trial: its segments, and the log evidence of every hypothesis about them.
 
 A hypothesis is a set of causes and one kind of remainder. Its columns join those of the campaign: a
-cause's numbers as a change from usual, or a family of the discrepancy as a change of its weights.
+cause's numbers as a change from nominal, or a family of the discrepancy as a change of its weights.
 Every voyage of the trial and every part of it has deviations of its own (`voyage_effects`,
 `campaign_prior`), which are integrated out.
 """
@@ -35,7 +35,7 @@ from shiplog.diagnosis.voyage_effects import reduced
 from shiplog.voyages.recording import Record
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
-NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the usual
+NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the nominal
 FINER = 1.08  # step about the best of them
 SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
 LEAST_SPREAD = 0.05  # of the logarithm of the process noise: two campaigns are never alike
@@ -44,8 +44,8 @@ RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What remains beside the causes: a kind, the size of a family's change, and whether process
-    noise is raised beside that change."""
+    """What remains together with the causes: a kind, the size of a family's change, and whether
+    process noise is raised together with that change."""
 
     kind: str = NOMINAL
     size: float = 1.0
@@ -73,7 +73,7 @@ class Trial(evidence.TrialEvidence):
         self.parts = parts_of(record.voyage[self.rows])
         self.voyage = record.voyage[self.rows[[part[0] for part in self.parts]]]  # of each part
         self.remainder = Remainder()  # that `scan` includes
-        self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model runs away
+        self.lost = np.zeros(len(self.rows), dtype=bool)  # segments on which the model diverges
         self.begun = False
         self._totals: list[tuple[weakref.ref[Weighed], tuple, np.ndarray, float]] = []
 
@@ -85,13 +85,13 @@ class Trial(evidence.TrialEvidence):
     # --- linearisation ---
 
     def at(self, numbers, near=None, louder=None) -> Point:
-        """Segments on which the model runs away carry no information. Where only a hypothesis makes
-        it run away it is that hypothesis that fails: raises np.linalg.LinAlgError."""
+        """Segments on which the model diverges carry no information. Where only a hypothesis makes
+        it diverge it is that hypothesis that fails: raises np.linalg.LinAlgError."""
         point = super().at(numbers, near, louder)
         lost = point.linear.lost
         if lost is not None and (lost & (self.weight > 0.0)).any():
             if point is not self.first and self.begun:
-                raise np.linalg.LinAlgError("the model runs away with these numbers")
+                raise np.linalg.LinAlgError("the model diverges with these numbers")
             self.weight = np.where(lost, 0.0, self.weight)
             self.lost = lost
         return point
@@ -160,14 +160,14 @@ class Trial(evidence.TrialEvidence):
         return max(self.campaign.noise, LEAST_SPREAD)
 
     def expected(self, noise: float, beside: Remainder) -> float:
-        """Log prior density of a level of process noise beside a remainder, less the greatest one
-        beside `nominal`."""
+        """Log prior density of a level of process noise together with a remainder, less the
+        greatest one together with `nominal`."""
         usual = self.usual_spread
         spread = RAISED_SPREAD if beside.raises else usual
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 
     def solve(self, total, logdet, louder, point, included, information, pull) -> Level:
-        """The base hypothesis of a trial's products [1 + C, 1 + C]: what is usual, the included
+        """The base hypothesis of a trial's products [1 + C, 1 + C]: nominal numbers, the included
         causes, and the remainder's change of weights."""
         columns, share = self.reference.columns, self.reference.counts
         total, logdet = share * total, share * logdet
@@ -211,7 +211,7 @@ class Trial(evidence.TrialEvidence):
         return self._information_volume + float(np.log(np.concatenate([*held, np.ones(0)])).sum())
 
     def levels(self, point, included=(), near=None) -> list[Level]:
-        """From the usual process noise outwards while it gets likelier; finely about the best."""
+        """From the nominal process noise outwards while it gets likelier; finely about the best."""
         tried: dict[float, Level] = {}
 
         def at(noise: float) -> float:
@@ -291,8 +291,8 @@ class Trial(evidence.TrialEvidence):
     # --- remainders ---
 
     def changed(self, point: Point, level: Level, included: Sequence[str], family: str):
-        """Nats that a change of one family's weights brings at a level without one, at its best
-        size, and that size."""
+        """Log Bayes factor, in nats, of a change of one family's weights over a level without it,
+        at its most probable size; and that size."""
         columns, share = self.families[family], self.reference.counts
         total, _ = self.total(point, level.louder)
         more = [self.reference.columns.of[n] for n in included]
@@ -327,8 +327,8 @@ class Trial(evidence.TrialEvidence):
         return float(across @ np.linalg.solve(free, across) / own) if own > 0.0 else 1.0
 
     def intermittent(self, point: Point, base: Found) -> unrecorded_thruster.Pulses:
-        """A force that comes and goes at one place along the ship; its gain over raised noise, of
-        which what is usual pushes at one place too."""
+        """An intermittent force at one place along the ship, and its log Bayes factor over raised
+        noise, whose nominal part acts at one place too."""
         return unrecorded_thruster.pulses(self, point, base, self.usual_push)
 
     @cached_property
@@ -337,7 +337,7 @@ class Trial(evidence.TrialEvidence):
         return intermittent.usual_push(self.campaign, self.grid)
 
     def acts_on(self, point: Point, base: Found, family: str) -> tuple[str, ...]:
-        """Channels in which a change of a family pushes by more than a third of its most."""
+        """Channels in which the acceleration of a family exceeds a third of its largest."""
         kept, self.remainder = self.remainder, Remainder(family, SIZES[1])
         try:
             level = self.level(point, base.louder, tuple(base.numbers))

@@ -8,7 +8,7 @@ explain, until the same causes are named.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,13 +52,13 @@ class Decided:
 
 def decided(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
-    causes: Sequence[Cause], lacking: str,
+    causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
 ) -> Decided:  # fmt: skip
-    """As `setup.trial_of`; `cut` are the voyages' windows."""
+    """As `setup.trial_of`; `cut` are the voyages' windows, and `reach` is told each stage."""
 
     def once(numbers: Mapping[str, np.ndarray] | None = None) -> Decided:
         made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers)
-        return _once(run, made, cut)
+        return _once(run, made, cut, reach)
 
     done = once()
     for _ in range(MOST_ROUNDS if nominal is None and run.given else 0):
@@ -75,7 +75,9 @@ def _names(done: Decided) -> list[str]:
     return [one.cause.label for one in done.decision.named]
 
 
-def _once(run: Run, made: setup.Setup, cut: Windows | None) -> Decided:
+def _once(
+    run: Run, made: setup.Setup, cut: Windows | None, reach: Callable[[str], None]
+) -> Decided:
     trial = made.trial
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
@@ -84,7 +86,9 @@ def _once(run: Run, made: setup.Setup, cut: Windows | None) -> Decided:
     )  # fmt: skip
     point = trial.begin(run.extension_numbers())
     judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
+    reach("hypotheses")
     search = Search(trial, point, placebo.placebos(trial.campaign))
     search.run()
+    reach("held-out voyages")
     decision, _, gain, refuted = refutation.judged(search, judge)
     return Decided(trial, made.untested, point, judge, decision, gain, refuted)

@@ -1,4 +1,4 @@
-"""Store and run to a trial: what is usual for the ship, the voyages in question, the windows."""
+"""Store and run to a trial: nominal voyages, trial voyages, windows."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slow
 
 
 def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
-    """Those that are asked for, or all that the run has not seen: of a voyage of which it has seen
-    a part, the test part. Raises StoreError for none."""
+    """The chosen voyages, or all that the run was not trained on; of a voyage that it was trained
+    on in part, the test part. Raises StoreError for none."""
     if wanted:
         return store.select(list(wanted))
     stored = store.select()
@@ -38,7 +38,7 @@ def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
     if not names:
         raise StoreError(
             f"Every voyage in {store.path} was used to make {run.name}.",
-            hint="name some with --voyages, or ingest voyages it has not seen.",
+            hint="name some with --voyages, or ingest voyages that it was not trained on.",
         )
     return names
 
@@ -50,9 +50,10 @@ def record_of(store: Store, names: Sequence[str], profile: Profile) -> Record:
 def in_ship_time(
     run: Run, nominal: Record | None, recorded: Record
 ) -> tuple[Record | None, Record]:
-    """Both campaigns with the time scale of this ship at the working speed of its usual voyages."""
+    """Both campaigns with the time scale of this ship at the working speed of its nominal
+    voyages."""
     usual = recorded if nominal is None else nominal
-    if not len(usual) or not len(recorded):  # too little for a verdict, which is said later
+    if not len(usual) or not len(recorded):  # too little for a verdict, which is reported later
         return nominal, recorded
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     shorter = min(one.seconds for one in (usual, recorded))

@@ -39,10 +39,10 @@ class Pulses:
 def pulses(
     trial: TrialEvidence, point: Point, base: Found, usual: np.ndarray | None = None
 ) -> Pulses:
-    """A force to the side that comes and goes at one place along the ship, unrecorded: its
-    accelerations go together as those of no other unrest do. Judged on what is left.
+    """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
+    as no other process noise does. Estimated from the residual.
 
-    usual    acceleration [3] that the nominal process noise has at one place; none where None
+    usual    acceleration [3] of nominal process noise at one place; None without any
     """
     left, d = trial.left(point.linear, trial.solved(point, base))
     return pulses_of(left, d, trial.reference, trial.unrest, trial.weight, usual)
@@ -70,7 +70,7 @@ def pulses_of(
         return value(replace(plain, push=plain.push * np.exp(factors), pulse=pulse))
 
     # from day to day one channel's noise is raised by more than another's, with no device at work,
-    # and what usually pushes at one place pushes there more
+    # and the nominal noise at one place is raised there
     first = np.full(3, math.log(max(LOUDER, key=lambda v: value(plain.louder(v)))))
     about = {"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1}
     by_channel = -float(minimize(lambda at: -raised(at), first, method="Nelder-Mead",
@@ -83,11 +83,11 @@ def pulses_of(
         return value(replace(plain, pulse=unit * force))
 
     levers = np.linspace(-0.45, 0.45, 7)
-    # in newtons that matter: from the usual unrest upwards
+    # in newtons that matter: from the nominal process noise upwards
     ordinary = plain.push[1] / abs(across[1])
     sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
     lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
-    finer = minimize(  # beside the place itself a part of the force would be another cause's
+    finer = minimize(  # together with the place itself a part of the force would be another cause's
         lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
         bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None)),
         options={"xatol": 0.005, "fatol": 0.1},

@@ -1,7 +1,7 @@
 """How far the numbers that fit one part of a campaign are from those that fit the others.
 
 A model whose equations are not the ship's has other best coefficients on every voyage. Each part of
-a campaign therefore has numbers θ + b of its own, b ~ N(0, D), and D is learned from the nominal
+a campaign therefore has numbers θ + b of its own, b ~ N(0, D), and D is estimated from the nominal
 campaign (random effects: Laird & Ware 1982). What all parts agree on stays known; what they
 disagree on is loosened. A diagonal D has one variance a group of numbers.
 

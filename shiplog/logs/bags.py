@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags to MCAP: the same messages in CDR, with their definitions beside them.
+"""ROS 1 and ROS 2 bags to MCAP: the same messages in CDR, together with their definitions.
 
 An MCAP file that ROS 2 recorded is a log already, and needs none of this.
 """
@@ -21,7 +21,7 @@ BAG = ".bag"
 SQLITE = ".db3"
 HEADER = "std_msgs/msg/Header"
 # Bags of ROS 2 before Iron hold no definitions; those of its own messages have hardly changed.
-USUAL_TYPES = "ROS2_HUMBLE"
+DEFAULT_TYPES = "ROS2_HUMBLE"
 
 
 def is_bag(path: Path) -> bool:
@@ -46,7 +46,7 @@ def bag_to_log(path: Path, target: Path, ship: str) -> dict[str, str]:
     try:
         with (
             files.whole(target) as partial,
-            AnyReader([source], default_typestore=get_typestore(Stores[USUAL_TYPES])) as reader,
+            AnyReader([source], default_typestore=get_typestore(Stores[DEFAULT_TYPES])) as reader,
             partial.open("wb") as stream,
         ):
             left_out = _write(reader, stream, ship, path.name)

@@ -58,7 +58,7 @@ def late(topic: str, frame: pl.DataFrame) -> list[Finding]:
 
 
 def dropouts(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
-    """Silences of a topic: longer than a second and than five of its usual periods."""
+    """Silences of a topic: longer than a second and than five of its median periods."""
     times_are_stamps = frame["stamp"].null_count() == 0
     times = frame["stamp" if times_are_stamps else "log_time"].sort()
     steps = times.diff()
@@ -68,7 +68,7 @@ def dropouts(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
     if not ends or period <= 0:
         return []
     offset = int((frame["log_time"] - frame["stamp"]).median() or 0)  # type: ignore[arg-type]
-    offset = offset if times_are_stamps else 0  # told on the log's own time line
+    offset = offset if times_are_stamps else 0  # reported on the log's own time line
     findings = []
     for end in ends[:MOST_GAPS]:
         start_s, end_s = ((int(times[i]) + offset - first) / faults.SECOND for i in (end - 1, end))

@@ -59,7 +59,7 @@ def _made(dtype) -> pl.DataType:
 
 
 def value(leaf: str, rest: Steps, dtype: pl.DataType) -> pl.Expr:
-    """The column at the end of `rest`; text taken out of JSON stays text until `settled`."""
+    """The column at the end of `rest`; text taken out of JSON stays text until `parsed`."""
     column = pl.col(leaf)
     for taken, step in enumerate(rest):
         if isinstance(dtype, (pl.String, pl.Binary)):
@@ -76,7 +76,7 @@ def value(leaf: str, rest: Steps, dtype: pl.DataType) -> pl.Expr:
 
 
 def is_text(leaf: str, rest: Steps, layout: Mapping[str, pl.DataType]) -> bool:
-    """Whether `value` reaches into JSON, so that its column needs `settled`."""
+    """Whether `value` reaches into JSON, so that its column needs `parsed`."""
     dtype = layout[leaf]
     for step in rest:
         if isinstance(dtype, (pl.String, pl.Binary)):
@@ -88,7 +88,7 @@ def is_text(leaf: str, rest: Steps, layout: Mapping[str, pl.DataType]) -> bool:
     return False
 
 
-def settled(column: pl.Series) -> pl.Series:
+def parsed(column: pl.Series) -> pl.Series:
     """Texts out of JSON as the numbers or truths they all are, else as texts."""
     present = column.drop_nulls()
     if present.is_empty():

@@ -58,7 +58,7 @@ class VoyageReport:
     """The contract's answer of `check` and `ingest` for one log.
 
     usable_s    seconds that can be averaged to 1 Hz; None where the log was not ingested
-    windows     of `table.WINDOW` such seconds in a row; None likewise
+    windows     of `channels.WINDOW` such seconds in a row; None likewise
     """
 
     name: str

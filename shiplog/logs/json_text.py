@@ -78,7 +78,7 @@ def _column(name: str, values: list[Any]) -> pl.Series:
         values = [float(v) if type(v) is int else v for v in values]
     try:
         return pl.Series(name, values, strict=True)
-    except Exception:  # mixed types: keep what was said, as text
+    except Exception:  # mixed types: keep the values, as text
         text = [v if v is None or isinstance(v, str) else json.dumps(v) for v in values]
         return pl.Series(name, text, pl.String)
 

@@ -33,10 +33,10 @@ def check_magic(path: Path, start: bytes, size: int) -> None:
             f"{path} is a table, not an MCAP log.",
             hint="turn it into a log first: shiplog convert TABLE --profile P --out DIR.",
         )
-    shown = start.hex(" ").upper()
+    found = start.hex(" ").upper()
     if start[:6] == MAGIC[:6]:
         raise LogUnreadable(
-            f"{path} begins with {shown} instead of {MAGIC.hex(' ').upper()}: a line-ending "
+            f"{path} begins with {found} instead of {MAGIC.hex(' ').upper()}: a line-ending "
             "conversion has stripped its CR bytes, as a git checkout or an FTP transfer in text "
             "mode does. Every such byte in the data is gone too, so the file cannot be mended.",
             hint="copy the original again in binary mode (git: mark *.mcap as binary).",
@@ -44,6 +44,6 @@ def check_magic(path: Path, start: bytes, size: int) -> None:
     if MAGIC.startswith(start):
         raise LogUnreadable(f"{path} is cut off after {size} bytes.", hint="copy it again.")
     raise LogUnreadable(
-        f"{path} is no MCAP log: it begins with {shown}, expected {MAGIC.hex(' ').upper()}.",
+        f"{path} is no MCAP log: it begins with {found}, expected {MAGIC.hex(' ').upper()}.",
         hint="give an .mcap file; for a CSV or Parquet table use shiplog convert.",
     )

@@ -170,7 +170,7 @@ class Worker:
                 patience.start()
                 process.stdin.write(json.dumps(request) + "\n")
                 process.stdin.flush()
-                said = json.loads(process.stdout.readline())
+                reply = json.loads(process.stdout.readline())
             except (OSError, ValueError):
                 self._stop()
                 return {}
@@ -180,9 +180,9 @@ class Worker:
             finally:
                 if patience is not None:
                     patience.cancel()
-        if "error" in said:
-            log.info("Rerun: %s", said["error"])
-        return said
+        if "error" in reply:
+            log.info("Rerun: %s", reply["error"])
+        return reply
 
     def stop(self) -> None:
         with self._lock:

@@ -77,11 +77,11 @@ def main() -> None:
         asked = json.loads(line)
         faulthandler.dump_traceback_later(asked["seconds"], exit=True)  # also when nobody waits
         try:
-            said = {"rows": extract(asked["log"], Path(asked["folder"]), asked["topics"])}
+            reply = {"rows": extract(asked["log"], Path(asked["folder"]), asked["topics"])}
         except Exception as error:
-            said = {"error": f"{type(error).__name__}: {error}"}
+            reply = {"error": f"{type(error).__name__}: {error}"}
         faulthandler.cancel_dump_traceback_later()
-        answers.write(json.dumps(said) + "\n")
+        answers.write(json.dumps(reply) + "\n")
         answers.flush()
 
 

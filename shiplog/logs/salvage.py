@@ -84,7 +84,7 @@ def _decode(
 def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, list[int]]:
     """Log times of payloads that came before, among the messages with a suspect's log time [ns]."""
     found = container.survey(path)
-    seen: dict[str, set[int]] = {topic: set() for topic in suspects}
+    payloads: dict[str, set[int]] = {topic: set() for topic in suspects}
     again: dict[str, list[int]] = {topic: [] for topic in suspects}
     for chunk in messages(found):
         for message in chunk:
@@ -92,9 +92,9 @@ def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, l
             topic = channel.topic if channel else ""
             if message.log_time in suspects.get(topic, ()):
                 payload = hash(message.data)
-                if payload in seen[topic]:
+                if payload in payloads[topic]:
                     again[topic].append(message.log_time)
-                seen[topic].add(payload)
+                payloads[topic].add(payload)
     return again
 
 

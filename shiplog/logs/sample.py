@@ -35,11 +35,11 @@ def sample(found: Survey, topics: Iterable[str] | None) -> dict[str, dict[str, p
             into = fields.setdefault(channel.topic, {})
             into.update(reader.layout)
             if met.get(number):
-                into.update(_said(reader, met[number]))
+                into.update(_types_of(reader, met[number]))
     return fields
 
 
-def _said(reader: Decoder, payloads: list[bytes]) -> dict[str, pl.DataType]:
+def _types_of(reader: Decoder, payloads: list[bytes]) -> dict[str, pl.DataType]:
     """What only the messages know: the fields of JSON, alone or inside a text."""
     texts = [n for n, t in reader.layout.items() if t in (pl.String, pl.Binary)]
     if reader.layout and not texts:

@@ -1,4 +1,4 @@
-"""One table a topic, of the columns that were asked for, whichever route its rows came by."""
+"""One table a topic, of the requested columns, whichever reader its rows came from."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mcap.records import Channel
 
 from .container import Survey
 from .decoders import decoder
-from .fields import is_text, locate, settled, stamp_leaves, stamps, value
+from .fields import is_text, locate, parsed, stamp_leaves, stamps, value
 from .messages import Decoder, Undecodable
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ class Table:
         frame = parts[0] if len(parts) == 1 else _joined(parts)
         parts.clear()
         for name in self.texts & set(frame.columns):
-            frame = frame.with_columns(settled(frame[name]))
+            frame = frame.with_columns(parsed(frame[name]))
         times = frame["log_time"]
         return frame if times.is_sorted() else frame.sort("log_time", maintain_order=True)
 

@@ -1,4 +1,4 @@
-"""The paper's network compiled beside the physics, with what a diagnosis may bend it by.
+"""The paper's network compiled together with the physics, with what a diagnosis may bend it by.
 
 ν̇ = f_NN(ν, u, ω) + Σ w_k φ_k(ν, u, ω): smooth functions of the network's own inputs, random
 Fourier features (Rahimi & Recht 2007), stand for all that another training could have learned.
@@ -19,7 +19,7 @@ from shiplog.models.feedforward import FeedForward
 from shiplog.models.mmg.wind import apparent
 
 FEATURES = 300
-WIDE = 2.0  # of many inputs no voyage has seen all corners: as wide as data of few serve best
+WIDE = 2.0  # no voyage covers all combinations of many inputs: as wide as data of few serve best
 
 
 @partial(

@@ -20,7 +20,7 @@ class Shape:
 
     wind_input  "angle" is the paper's: U_A and γ_A in [0, 2π), which jumps at the bow;
                 "components" is U_A cos γ_A and U_A sin γ_A, which does not
-    input_tanh  the paper's table gives its input layer an activation; off is the usual reading
+    input_tanh  the paper's table gives its input layer an activation; off is the common reading
     """
 
     actuators: int
@@ -49,7 +49,7 @@ class Scaling:
 
 
 def exogenous(actuator: Tensor, wind: Tensor, wind_input: str) -> Tensor:
-    """What drives the network besides ν: [..., A + 0|2] from [..., A] and [..., 0|2]."""
+    """The network's inputs in addition to ν: [..., A + 0|2] from [..., A] and [..., 0|2]."""
     if wind.shape[-1] == 0:
         return actuator
     speed, angle = wind[..., :1], wind[..., 1:]

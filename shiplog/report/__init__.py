@@ -1,1 +1,1 @@
-"""What is written and shown: verdict, pages, tables, pictures."""
+"""Results for people: verdict, pages, tables, figures, viewer."""

@@ -1,4 +1,4 @@
-"""What was decided and what it rests on, as the verdict that is written down."""
+"""The result of a diagnosis as the verdict that is written: word, sentence, tables, notes."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from shiplog.voyages import timescale
 from shiplog.voyages.recording import Record
 
 MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
-# Families that a model is wrong in where it never was; its own error there looks like noise, too.
-SEEN = ("wind", "motion", "controls", "stochastic")
-LEAST_S = 240.0  # of unbroken record, below which nothing can be said
+# Families in which a model errs outside its training data; such an error resembles noise, too.
+INPUTS = ("wind", "motion", "controls", "stochastic")
+LEAST_S = 240.0  # of unbroken record, below which there is no verdict
 
 
 @dataclass(frozen=True)
 class DiagnosedTrial:
-    """The verdict and what it rests on.
+    """The verdict and the objects behind it.
 
-    seen    trial and decision of the model that is simulated: for a network, not those that judge
-    whole   as that stood, on overlapping segments
-    held    the windows; None where no stretch was long enough for one
-    after   the extended model; None where nothing was named
+    seen    trial and decision of the simulated model; of a network, not those of its MMG
+    whole   that trial, linearised on overlapping segments
+    held    the held-out windows; None where no interval is long enough for one
+    after   the extended model; None without a named cause
     """
 
     verdict: Verdict
@@ -48,21 +48,21 @@ class DiagnosedTrial:
 
     @property
     def recording(self) -> Path | None:
-        """Its pictures, where there is something to show."""
+        """Path of the Rerun recording; None where nothing was compared."""
         return None if self.decision is None else self.folder / "diagnosis.rrd"
 
 
 @dataclass(frozen=True)
 class Context:
-    """What a verdict says besides what was decided.
+    """What a verdict reports in addition to the decision.
 
-    before_effect   whether the model was made on voyages before these, and they are known
+    before_effect   whether the model was trained on earlier voyages that are in the store
     untested        label → why it could not be tested
     dropped         label → why held-out voyages refute it
-    lost            why no name would be believed; empty where one would
-    segment         s, how long the segments were
-    alone           what the model takes off fitted again with nothing named, where it is fitted
-                    again beside what is named
+    lost            why no cause can be named; empty where one can
+    segment         length of the segments, s
+    alone           share of the error that a second fit without any cause removes; None where the
+                    model is not fitted again together with the causes
     """
 
     run: Run
@@ -86,16 +86,14 @@ def verdict(
     held: HeldOut | None,
     context: Context,
 ) -> Verdict:
-    """What was decided, in the contract's words.
+    """The decision in the contract's words.
 
-    found   the gain of what is named; None where nothing is, or there are no windows
-    held    the windows it was measured on
+    found   gain of the named causes; None without causes or windows
+    held    the windows of that gain
     """
     rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
     if context.lost:
-        notes.insert(
-            0, f"{context.lost}. It does not simulate this ship, or its profile reads it wrongly."
-        )
+        notes.insert(0, f"{context.lost}. The model is not of this ship, or the profile is wrong.")
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
     unavailable = verdicts.rejected_json(context.untested)
@@ -105,18 +103,18 @@ def verdict(
         times = error_location.pulses(trial, decision, decision.pulses)
         sure = decision.ranking.get("unknown:intermittent", 0.0)
         causes.append(verdicts.pulses_json(decision, times, sure))
-    said = _word(decision, bool(causes), held, context)
+    word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
-    sentence = f"{context.lost}: no cause can be told."
+    sentence = f"{context.lost}: no cause can be named."
     if not context.lost:
         sentence = verdicts.sentence(
-            said, causes, structure, found, decision.louder, context.alone, ranking, context.wrong
+            word, causes, structure, found, decision.louder, context.alone, ranking, context.wrong
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
-        verdict=said,
-        said=sentence,
+        verdict=word,
+        sentence=sentence,
         run=context.run.name,
         before_effect=context.before_effect,
         made=_made(context.run, context.before_effect),
@@ -124,7 +122,7 @@ def verdict(
         ranking=ranking,
         rejected=verdicts.rejected_json(rejected),
         traces=tuple(verdicts.trace_json(n) for n in decision.traces),
-        structure=structure if said == "unknown" else None,
+        structure=structure if word == "unknown" else None,
         intervals=(*context.pushed, *context.uncovered),
         gain=found if causes else None,
         without="" if held is None else held.left_out,
@@ -137,30 +135,30 @@ def verdict(
 
 
 def of_physics(run: Run, trial: TrialEvidence, found: Gain | None) -> list[str]:
-    """Whom the causes of a network were asked of, and what they are worth there."""
-    where = "these voyages" if trial.reference.adapts else "the voyages that it was made on"
-    said = [
-        f"{run.name} is a network: the causes are those that the ship's MMG lacks, fitted to "
+    """Notes for a network: which MMG the causes were tested on, and their gain there."""
+    where = "these voyages" if trial.reference.adapts else "the network's training voyages"
+    notes = [
+        f"{run.name} is a network. The causes were tested on an MMG of the ship that was fitted to "
         f"{where}."
     ]
     if found is not None:
-        said.append(
+        notes.append(
             f"On the same windows that MMG has an error "
             f"{verdicts.less(found.reduction)} with them ({verdicts.less(found.low)} to "
             f"{verdicts.less(found.high)})."
         )
-    return said
+    return notes
 
 
 def _word(decision: Decision, named: bool, held: HeldOut | None, context: Context) -> str:
-    """named, none, unknown, coverage or external."""
+    """named, none, unknown, undecided, coverage or external."""
     if named:
         return "named"
     family = decision.structure.family if decision.structure else ""
     unseen = held is not None and len(context.uncovered) > MOSTLY * len(held.cut)
-    if decision.verdict == "unknown" and not context.lost and family in SEEN and unseen:
+    if decision.verdict == "unknown" and not context.lost and family in INPUTS and unseen:
         return "coverage"
-    # shorter than a segment altogether, such stretches are listed, and no answer for the trial
+    # less than a segment in all is listed, but is no answer for the trial
     pushed = sum(one.end_s - one.start_s for one in context.pushed)
     if decision.verdict == "none" and pushed >= context.segment:
         return "external"
@@ -169,32 +167,31 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
 
 def _made(run: Run, before_effect: bool) -> str:
     if run.given:
-        return "of coefficients that were not fitted to these voyages"
-    return "on voyages before these" if before_effect else "on these very voyages"
+        return "with coefficients that were not fitted to these voyages"
+    return "fitted to earlier voyages" if before_effect else "fitted to these very voyages"
 
 
 def enough(recorded: Record) -> bool:
-    """Whether anything can be said of it."""
+    """Whether the record is long enough for a verdict."""
     return recorded.seconds >= LEAST_S and len(segments.begins(recorded)) >= 4
 
 
 def runs_away(run: Run, before_effect: bool) -> Verdict:
-    """Where no path of the model can be computed: there is nothing to compare."""
-    said = (
-        "Nothing can be told: the model runs away on these voyages, or on those that it was made "
-        "on, so that its errors say nothing. Check signs, units and places in the profile, compare "
-        "the model with its baselines (`shiplog evaluate`), and identify it again from more "
-        "voyages."
+    """The verdict where the model diverges on every segment: there is nothing to compare."""
+    sentence = (
+        "No verdict: the model diverges on these voyages or on its training voyages. Check signs, "
+        "units and positions in the profile. Compare the model with its baselines (`shiplog "
+        "evaluate`), or identify it again from more voyages."
     )
-    return Verdict("undecided", said, run.name, before_effect)
+    return Verdict("undecided", sentence, run.name, before_effect)
 
 
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     short = max(LEAST_S - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
-    said = (
-        f"Too little for a verdict: {recorded.seconds:.0f} s can be used and {LEAST_S:.0f} s in "
-        f"unbroken stretches of {recorded.timescale.seconds:.0f} s are needed. "
+    sentence = (
+        f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {LEAST_S:.0f} s are "
+        f"needed in unbroken intervals of {recorded.timescale.seconds:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."
     )
-    return Verdict("coverage", said, run.name, before_effect)
+    return Verdict("coverage", sentence, run.name, before_effect)

@@ -32,7 +32,7 @@ class DrawnActuator:
 
 @dataclass(frozen=True)
 class ComparisonData:
-    """Measured voyages beside what every model and seed made of them.
+    """Measured voyages, and the simulations of every model and seed.
 
     measured    voyage, time [s from the voyage's start], the six states, one column per
                 actuator, wind_speed and wind_angle if `has_wind`
@@ -40,11 +40,11 @@ class ComparisonData:
                 that knows its doubt also each state with _low and _high, the 90 % band
     training    what a model was trained on: the channels of `measured`
     trained     which model that is, where there are several
-    summary     Markdown: errors, floors, coverage, findings
+    summary     Markdown: errors, baselines, coverage, findings
     banks       lines of (x0, y0) points a chart shows
     ship_outline  (ahead, starboard) of midship, m; a pointed box of length and breadth if empty
     forces      model, voyage, time, part (hull, propeller, ... total), surge [N], sway [N],
-                yaw [N m] about midship: who pushes when, along the measured voyage
+                yaw [N m] about midship: the force components along the measured voyage
     """
 
     title: str

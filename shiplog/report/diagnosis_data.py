@@ -24,13 +24,14 @@ ERRORS = {
 
 @dataclass(frozen=True)
 class Exhibit:
-    """What a model left unexplained, what was named for it, and what that is worth.
+    """The residual of a model, the named causes, and their gain.
 
     measured   voyage, time [s from the voyage's start], the six states
-    residual   voyage, time, channel (surge, sway, yaw_rate), force, sd, named [N, N, N m]: what
-               the model lacks, its standard deviation, and the force of what was named at the
-               same instant; null where nothing was named, or an instrument only
-    named      what the named force is of; and `extended` what the model after has in it
+    residual   voyage, time, channel (surge, sway, yaw_rate), force, sd, named [N, N, N m]: the
+               missing force, its standard deviation, and the force of the named causes at the
+               same instant; null without a named cause that exerts a force
+    named      names of the causes of that force
+    extended   names of all causes in the extended model
     tracks     model (BEFORE or AFTER), voyage, window, time, the six states: every held-out window
     errors     voyage, window, time (its start), seconds (its length), before, after: L (Eq. 8) of
                each held-out window; null after where nothing was named

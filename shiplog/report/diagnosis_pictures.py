@@ -72,8 +72,8 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     assert done.seen is not None and done.whole is not None
     (trial, decision), whole = done.seen, done.whole
     ref, record = trial.reference, trial.record
-    usual, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
-    found = residual_acceleration.posterior(*trial.left(whole, usual), unrest, record)
+    nominal, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
+    found = residual_acceleration.posterior(*trial.left(whole, nominal), unrest, record)
     keep = residual_acceleration.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]
@@ -104,11 +104,11 @@ def _caused(trial: TrialEvidence, decision: Decision, rows: np.ndarray) -> np.nd
     ref = trial.reference
     fixed = dict(decision.first.numbers)
     named = {n.cause.label: n.numbers for n in decision.named if n.cause.kind != "sensor"}
-    usual = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
-    usual += (ref.mean * ref.columns.unit)[: len(usual)]
+    nominal = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
+    nominal += (ref.mean * ref.columns.unit)[: len(nominal)]
 
     def acceleration(numbers: dict[str, np.ndarray]) -> np.ndarray:
-        theta = usual.copy()
+        theta = nominal.copy()
         theta[ref.columns.base :] += ref.columns.numbers(numbers)
         was = corrected(ref.model.causes, trial.record, numbers)
         driven = np.concatenate((was.actuator, was.share[:, None]), 1)

@@ -1,4 +1,4 @@
-"""What a model's errors say in a few words: against its baselines, and in lengths of the ship."""
+"""A model's errors in a few words: against its baselines, and in ship lengths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MEANING = (
 
 @dataclass(frozen=True)
 class Against:
-    """A model's mean L as a share of a baseline's, on the windows where neither ran away.
+    """A model's mean L as a share of a baseline's, on the windows where neither diverged.
 
     low, high   its 90 % interval; None where there are too few windows for one
     """
@@ -52,7 +52,7 @@ class Against:
 class Judgement:
     """One model on N windows of `seconds` s.
 
-    lost      windows that ran away
+    lost      windows that diverged
     lengths   median distance at the end of a window, in lengths of the ship
     degrees   median error of the heading there
     """
@@ -69,13 +69,13 @@ class Judgement:
     def sentence(self) -> str:
         found = f"{self.run}, on {self.windows} windows of {self.seconds} s"
         if self.lost == self.windows:
-            return f"{found}: every one of them ran away."
-        said = [one.sentence for one in self.against]
-        found = f"{found}: {'; '.join(said)}." if said else f"{found}."
+            return f"{found}: every one of them diverged."
+        parts = [one.sentence for one in self.against]
+        found = f"{found}: {'; '.join(parts)}." if parts else f"{found}."
         if self.windows - self.lost < FEWEST_WINDOWS:
             found += " Too few windows for an interval."
         if self.lost:
-            found += f" Windows that ran away, in none of these figures: {self.lost}."
+            found += f" Windows that diverged, in none of these figures: {self.lost}."
         return (
             f"{found} After {self.seconds} s it is {self.lengths:.2g} ship lengths and "
             f"{self.degrees:.2g} deg off (medians)."
@@ -139,5 +139,5 @@ def force_line(forces: pl.DataFrame, voyage: str) -> str:
     own = forces.filter(pl.col("voyage") == voyage, pl.col("part") != "total")
     size = (pl.col("surge").pow(2) + pl.col("sway").pow(2)).mean().sqrt()
     parts = own.group_by("part").agg(size=size).sort("size", descending=True)
-    said = [f"{part} {value:.2g} N" for part, value in parts.iter_rows()]
-    return f"Forces along {voyage}, root mean square: {', '.join(said)}."
+    sizes = [f"{part} {value:.2g} N" for part, value in parts.iter_rows()]
+    return f"Forces along {voyage}, root mean square: {', '.join(sizes)}."

@@ -7,9 +7,9 @@ from shiplog.report.verdict import HOPELESS, Verdict, less
 
 
 def markdown(verdict: Verdict) -> str:
-    """Markdown: what is named with its numbers and gain, what is not and why, where it is wrong."""
-    lines = ["# Diagnosis", "", f"**{verdict.said}**", ""]
-    lines += [f"Model: {verdict.run}, made {verdict.made}.", ""]
+    """Markdown: the causes with numbers and gain, what was rejected and why, where errors are."""
+    lines = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
+    lines += [f"Model: {verdict.run}, {verdict.made}.", ""]
     for cause in verdict.causes:
         lines += [
             f"## {cause['name']} (probability {cause['probability']:.2f})", "",
@@ -26,13 +26,13 @@ def markdown(verdict: Verdict) -> str:
                 )
         if cause["indistinguishable_from"]:
             lines += [
-                "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}; "
-                f"this would: {cause['next_test']}.",
+                "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}. "
+                f"A test that can: {cause['next_test']}.",
             ]  # fmt: skip
         if (expected := cause.get("next_test_expected")) is not None:
             lines += [
-                f"Simulated, {expected['manoeuvre']} would tell most: {expected['nats']:.3g} nats "
-                f"in {expected['seconds']:.0f} s.",
+                f"Of the simulated manoeuvres, {expected['manoeuvre']} separates them best: "
+                f"{expected['nats']:.3g} nats in {expected['seconds']:.0f} s.",
             ]  # fmt: skip
         lines.append("")
     if verdict.gain is not None:
@@ -57,10 +57,10 @@ def markdown(verdict: Verdict) -> str:
             lines.append("")
     if verdict.limits:
         lines += [
-            "## What these data would not show", "",
-            "Smaller than this, a cause may be there: of each number alone, and all its numbers "
-            "together as a share of what is realistic.", "",
-            "| cause | from | of realistic |", "| --- | --- | ---: |",
+            "## Smallest detectable sizes", "",
+            "A cause below this size may be present and not found: each number alone, and all "
+            "numbers together as a share of the realistic size.", "",
+            "| cause | detectable from | of realistic size |", "| --- | --- | ---: |",
         ]  # fmt: skip
         for one in verdict.limits:
             numbers = ", ".join(
@@ -68,11 +68,11 @@ def markdown(verdict: Verdict) -> str:
                 for k, v in one["parameters"].items()
             )
             label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
-            share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "never shows"
+            share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
             lines.append(f"| {label} | {numbers} | {share} |")
         lines.append("")
     if verdict.wrong:
-        lines += ["## Where it is wrong", ""]
+        lines += ["## Where the errors are", ""]
         lines += [
             f"- {w['channel'].replace('_', ' ')}: {w['share_of_error']:.0%} of the error; "
             f"{w['where']}"
@@ -81,11 +81,12 @@ def markdown(verdict: Verdict) -> str:
         lines.append("")
     if verdict.unseen:
         lines += [
-            "What the model cannot see, and the residual depends on (cross-validated R²):", "",
+            "Dependence of the residual on inputs that the model does not have (cross-validated "
+            "R²):", "",
             *[f"- {u['variable']}: {u['sentence']}" for u in verdict.unseen], "",
         ]  # fmt: skip
     if verdict.intervals:
-        lines += ["## Stretches left out or never trained on", ""]
+        lines += ["## Intervals left out, or outside the training data", ""]
         lines += [
             f"- {i.voyage}, {i.start_s:.0f} to {i.end_s:.0f} s ({i.kind}): {i.sentence}"
             for i in verdict.intervals

@@ -4,57 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import polars as pl
 
+from shiplog.channels import WINDOW
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
-from shiplog.voyages.one_hertz import WINDOW
-
-if TYPE_CHECKING:
-    from shiplog.voyages.store import CatalogueEntry
+from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
-MOST_ALIKE = 3  # findings of a kind and channel that are said one by one
+MOST_ALIKE = 3  # findings of a kind and channel that are listed one by one
 
-# Slower is said: a manoeuvring ship turns by degrees between two samples.
+# A lower rate is reported: a manoeuvring ship turns by degrees between two samples.
 SELDOM_HZ = 4.5
-# A coarser step is said: about three times what a good instrument is accurate to.
+# A coarser step is reported: about three times what a good instrument is accurate to.
 COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "wind": 0.3}
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table with aligned columns."""
-    text = [[_cell(value) for value in row] for row in rows]
-    widths = [
-        max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
-        for i, h in enumerate(head)
-    ]
-    numeric = [
-        bool(rows) and all(isinstance(r[i], (int, float)) for r in rows) for i in range(len(head))
-    ]
-
-    def line(cells: Sequence[str]) -> str:
-        padded = [
-            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)
-        ]
-        return f"| {' | '.join(padded)} |"
-
-    rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
-    return "\n".join([line(list(head)), line(rule), *map(line, text)])
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, float):
-        return str(value)
-    if not math.isfinite(value):
-        return "diverged" if value > 0 else "-"
-    if value != 0 and abs(value) < 0.001:
-        return f"{value:.1e}"
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def voyage_lines(report: VoyageReport) -> list[str]:
@@ -128,23 +94,6 @@ def voyages_json(reports: Sequence[VoyageReport], refused: Mapping[str, object])
     }
 
 
-def catalogue(entries: Sequence[CatalogueEntry]) -> str:
-    """What is in a store; figures that an older program did not write down stay open."""
-    rows = [
-        (
-            e.name, e.ship, e.start[:19], e.seconds,
-            *("-" if known is None else known for known in (e.rate_hz, e.usable_s, e.windows)),
-            e.findings,
-        )
-        for e in entries
-    ]  # fmt: skip
-    head = (
-        "voyage", "ship", "start", "seconds", "slowest, Hz", "usable, s", f"windows of {WINDOW} s",
-        "findings",
-    )  # fmt: skip
-    return table(head, rows)
-
-
 def estimated(profile: Profile) -> list[str]:
     """Which particulars the profile leaves out, and what stands in for them."""
     missing = [
@@ -201,7 +150,9 @@ def summary(errors: pl.DataFrame) -> dict:
     }
 
 
-def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl.DataFrame) -> dict:
+def evaluation_json(
+    errors: pl.DataFrame, baselines: dict[str, float], coverage: pl.DataFrame
+) -> dict:
     """The contract's answer of `evaluate`.
 
     coverage: one row per window, with voyage, window and coverage (0 to 1).
@@ -214,13 +165,13 @@ def evaluation_json(errors: pl.DataFrame, floors: dict[str, float], coverage: pl
         row["voyage"]: {key: row[key] for key in ("loss", "windows", "coverage")}
         for row in per_voyage.join(covered, on="voyage").sort("voyage").to_dicts()
     }
-    return {"contract": CONTRACT, **summary(errors), "floors": floors, "voyages": voyages}
+    return {"contract": CONTRACT, **summary(errors), "floors": baselines, "voyages": voyages}
 
 
-def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on: str) -> str:
-    """One line a model and a floor: what a reader looks at first.
+def models_table(summaries: dict[str, dict], baselines: dict[str, float], fitted_on: str) -> str:
+    """One row for each model and each baseline.
 
-    fitted_on: the run whose training data the fitted floor had.
+    fitted_on: the run whose training data the least-squares baseline was fitted to.
     """
     rows = []
     for label, s in summaries.items():
@@ -238,11 +189,11 @@ def models_table(summaries: dict[str, dict], floors: dict[str, float], fitted_on
             )
         )
     names = {
-        "hold": "floor: hold the velocity",
-        "least_squares": f"floor: quadratic least squares on the data of {fitted_on}",
+        "hold": "baseline: hold the velocity",
+        "least_squares": f"baseline: quadratic least squares on the data of {fitted_on}",
     }
     dash = "-"
-    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in floors.items()]
+    rows += [(names[k], v, dash, dash, dash, dash, dash, dash) for k, v in baselines.items()]
     head = (
         "model",
         "L",
@@ -270,7 +221,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
         )
         .rows()
     )
-    shown = [
+    cells = [
         (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
     ]
     return table(
@@ -283,7 +234,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
             "covered",
             "outside the training data",
         ),
-        shown,
+        cells,
     )
 
 
@@ -350,7 +301,7 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
 
 
 def voyages_table(answer: dict) -> str:
-    """L, windows and coverage of each voyage; of a few windows no share is said."""
+    """L, windows and coverage of each voyage; for a few windows no share is given."""
     rows = [
         (
             name,

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis: as the contract has it, with its sentences."""
+"""The answer of a diagnosis, in the contract's words, with its sentences."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
 from shiplog.simulation.error_reduction import Gain
 
-SHARE_SAID = 0.01  # of a ranking
-SURELY = 0.9  # probability from which on a sentence is said without it
-HOPELESS = 30.0  # realistic sizes: what only shows beyond never does
+LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
+SURELY = 0.9  # probability, below which it stands in the sentence
+HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What `shiplog diagnose` answers.
+    """The answer of `shiplog diagnose`.
 
-    verdict    named, none, unknown, coverage or external
-    causes     as the contract has them
-    said       one sentence
-    without    what of each held-out window the numbers have not seen
+    verdict    named, none, unknown, undecided, coverage or external
+    causes     in the contract's form
+    sentence   the answer in words
+    without    the data that the numbers of each held-out window were fitted without
     """
 
     verdict: str
-    said: str
+    sentence: str
     run: str
     before_effect: bool
-    made: str = "on voyages before these"
+    made: str = "fitted to earlier voyages"
     causes: tuple[dict, ...] = ()
     ranking: tuple[dict, ...] = ()
     rejected: tuple[dict, ...] = ()
@@ -55,7 +55,7 @@ class Verdict:
         found = {
             "contract": CONTRACT,
             "verdict": self.verdict,
-            "sentence": self.said,
+            "sentence": self.sentence,
             "causes": list(self.causes),
             "ranking": list(self.ranking),
             "rejected": list(self.rejected),
@@ -113,7 +113,7 @@ def cause_json(named: Named, advice: Advice | None = None) -> dict:
     return content
 
 
-WHICH = ("channel", "actuator")  # what a cause's label has behind its colon
+WHICH = ("channel", "actuator")  # the part of a cause's label after the colon
 
 
 def _which(named: Named) -> dict:
@@ -126,14 +126,14 @@ def _which(named: Named) -> dict:
 
 
 def equation(named: Named) -> str:
-    """With numbers; fields of the fit and of what is shown may both stand in it."""
+    """The equation with its numbers, of the fit and of the contract's parameters."""
     values = {p.name: float(v) for p, v in zip(named.cause.parameters, named.numbers, strict=False)}
     values |= {k: v.value for k, v in named.shown.items()}
     return named.cause.equation.format(**values)
 
 
 def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
-    """The thruster that nobody records. `times`: voyage, start_s, end_s, force_N, sd_N."""
+    """An unrecorded thruster. `times`: voyage, start_s, end_s, force_N, sd_N."""
     found = decision.pulses
     assert found is not None
     strongest = max(times, key=lambda t: abs(t["force_N"]), default=None)
@@ -149,8 +149,8 @@ def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -
         "parameters": {"force": size},
         "times": list(times),
         "sentence": (
-            f"A side force of up to {peak:.2g} N, {abs(found.lever):.2g} m {where} midship, comes "
-            "and goes without being recorded: a thruster, or something that pushes."
+            f"An intermittent side force of up to {peak:.2g} N acts {abs(found.lever):.2g} m "
+            f"{where} midship and is not recorded: a thruster, or an external force."
         ),
         "equation": "Y + F(t), N + x F(t)",
         "indistinguishable_from": [],
@@ -159,7 +159,7 @@ def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -
 
 
 def trace_json(named: Named) -> dict:
-    """There, but too small to matter."""
+    """A cause that is present, but too small to matter."""
     return {
         "name": named.cause.name,
         "parameters": {k: v.as_json() for k, v in named.shown.items()},
@@ -179,16 +179,16 @@ def structure_json(decision: Decision, actuators: Sequence[str]) -> dict | None:
 
 
 def probabilities_json(ranking: Mapping[str, float]) -> tuple[dict, ...]:
-    """Every answer that has a share worth stating, likeliest first."""
-    kept = [(n, p) for n, p in ranking.items() if p >= SHARE_SAID]
+    """Every answer with a probability of at least LEAST_SHARE, likeliest first."""
+    kept = [(n, p) for n, p in ranking.items() if p >= LEAST_SHARE]
     return tuple(
         {"name": n, "probability": min(p, 1.0)} for n, p in sorted(kept, key=lambda pair: -pair[1])
     )
 
 
 def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
-    """The smallest size of each cause that these data would show, best known first: of each number
-    alone, and as a share of the realistic size. Numbers that no size would show are left out."""
+    """The smallest size of each cause that these data would reveal, best determined first: of each
+    number alone, and as a share of the realistic size. Undetectable numbers are left out."""
     by = {c.label: c for c in causes}
     found = []
     for label, told in decision.told.items():
@@ -197,7 +197,7 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
             shown = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
-        else:  # as many as the ship has rudders, or the map places
+        else:  # a number for each rudder, or for each point of the map
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
         found.append(
@@ -219,16 +219,16 @@ def sentence(
     ranking: Sequence[dict] = (),
     wrong: Sequence[dict] = (),
 ) -> str:
-    """The verdict in a sentence or a few; what is named comes after the share that it explains.
+    """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
-    alone   share of the error that the model takes off when it is fitted again with nothing named;
-            None where it is not fitted again
-    wrong   share of the error in each channel, before anything is named
+    louder  factor of the process noise on its nominal standard deviation
+    alone   share of the error that a second fit without any cause removes; None without that fit
+    wrong   share of the error in each channel, before any cause is included
     """
     if verdict == "named":
-        said = " ".join(_likely(cause) for cause in causes)
+        text = " ".join(_likely(cause) for cause in causes)
         if gain is None:
-            return said
+            return text
         if gain.real:
             share = (
                 f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
@@ -239,40 +239,40 @@ def sentence(
                 f"No part of the error on {gain.windows} held-out windows is surely explained: it "
                 f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
             )
-        said = " ".join(part for part in (share, said, _left(gain, wrong)) if part)
+        text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
         if alone is None:
-            return said
-        return f"{said} Fitted again with nothing named, the model has an error {less(alone)}."
+            return text
+        return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
     if verdict == "undecided":
-        said = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
-        return f"Undecided: {' or '.join(said)}. No answer has a probability of {SURELY:.0%}."
+        text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
+        return f"Undecided: {' or '.join(text)}. No answer has a probability of {SURELY:.0%}."
     if verdict == "unknown":
         assert structure is not None
         if structure["family"] == "intermittent":
             return (
-                "Outside the catalogue: a force that comes and goes pushes the ship sideways, and "
-                "no device whose place and pattern are known does that."
+                "Outside the catalogue: an intermittent side force acts on the ship, and no device "
+                "of known place and pattern explains it."
             )
         if structure["family"] == "stochastic":
             return (
-                f"The ship is pushed about at random {louder:.1f} times as hard as when the model "
-                "was made; no cause of the catalogue does that."
+                f"Outside the catalogue: process noise is {louder:.1f} times its nominal standard "
+                "deviation, and no cause explains that."
             )
         return (
             f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
             f"{listed(structure['depends_on'])}."
         )
     if verdict == "coverage":
-        return "Not trained in these conditions: record data there first, then ask again."
+        return "Not trained in these conditions: record data there first, then diagnose again."
     if verdict == "external":
-        return "The ship was pushed, held or towed: no force of its own explains these stretches."
+        return "The ship was pushed, held or towed: no force of its own explains these intervals."
     return (
-        "No change found: the errors are those that the model already had in its nominal voyages."
+        "No change found: the errors are those that the model already has on its nominal voyages."
     )
 
 
 def _left(gain: Gain, wrong: Sequence[dict]) -> str:
-    """The largest part of the error that what is named does not explain; empty where none is."""
+    """The channel with the largest part of the error that the causes leave; empty without one."""
     left = {
         one["channel"]: one["share_of_error"] * (1.0 - gain.channels.get(one["channel"], 0.0))
         for one in wrong
@@ -295,19 +295,19 @@ def _answer(name: str) -> str:
 
 
 def unseen_json(row: Dependence) -> dict:
-    """One line of the table of what the model cannot see."""
+    """One row of the table of inputs that the model does not have."""
     r2 = dict(zip((c.name for c in VELOCITY), row.r2, strict=True))
-    said = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in r2.items())
+    text = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in r2.items())
     depends = f"acts on {listed(row.acts_on)}" if row.significant else "no dependence"
     return {
         "variable": row.variable, "r2": r2, "acts_on": list(row.acts_on),
         "significant": row.significant, "left_out": row.folds,
-        "sentence": f"R² {said} ({row.folds} left out): {depends}",
+        "sentence": f"R² {text} ({row.folds} left out): {depends}",
     }  # fmt: skip
 
 
 def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
-    """Label → why not. Of a cause with several channels, the reason says which."""
+    """Label → reason. Of a cause with several channels, the reason begins with the channel."""
     found = []
     for label, why in reasons.items():
         name, _, channel = label.partition(":")
@@ -316,7 +316,7 @@ def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
 
 
 def _likely(cause: dict) -> str:
-    """A cause's sentence, and how sure it is where it is not."""
+    """A cause's sentence, with its probability where that is below SURELY."""
     if cause["probability"] >= SURELY:
         return _or(cause)
     how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
@@ -324,7 +324,7 @@ def _likely(cause: dict) -> str:
 
 
 def _or(cause: dict) -> str:
-    """A cause's sentence, and what it may be instead."""
+    """A cause's sentence, with the causes that these data cannot tell from it."""
     others = cause["indistinguishable_from"]
     if not others:
         return cause["sentence"]
@@ -334,5 +334,5 @@ def _or(cause: dict) -> str:
 
 
 def less(share: float) -> str:
-    """A share of the error that is taken off, in words; negative where it grows."""
+    """A relative reduction of the error, in words; a negative one is an increase."""
     return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"

@@ -1,4 +1,4 @@
-"""Two honest floors: what anyone gets without a network. A model below them is not worth it."""
+"""Two baselines that any model should beat: no model at all, and quadratic least squares."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class LeastSquares:
     """
 
     scale: Tensor  # [terms] spread of each term over the training data
-    low: Tensor  # [3] range of ν, a tenth wider than seen
+    low: Tensor  # [3] range of ν, a tenth wider than in the training data
     high: Tensor
     coefficients: Tensor  # [terms, 3]
 

@@ -22,7 +22,7 @@ QUANTILE = 0.95  # of the distances that training seconds have from other voyage
 BLOCK_ROWS = 100  # rows; neighbours within one block are one manoeuvre, not independent data
 WIND_ANGLE_BIN = math.radians(ANGLE_BIN)
 BINS_PER_STD = 4.0
-NEVER_SEEN = 0.25  # share of a window outside the histogram above which a channel is named
+OUTSIDE = 0.25  # share of a window outside the histogram above which a channel is named
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ def of(training: pl.DataFrame, actuators: Sequence[str], has_wind: bool) -> Cove
         for j, name in enumerate(names)
         if name not in wind
     }
-    seen = set(zip(*_wind_bins(training), strict=True)) if has_wind else set()
+    visited = set(zip(*_wind_bins(training), strict=True)) if has_wind else set()
     return Coverage(
-        names, mean, std, KDTree(features), limit, bins, seen, tuple(actuators), has_wind
+        names, mean, std, KDTree(features), limit, bins, visited, tuple(actuators), has_wind
     )
 
 
@@ -114,7 +114,7 @@ def reason(row: dict, seconds: pl.DataFrame) -> str:
     row: one of `table`; seconds: the 1 Hz rows of that window.
     """
     parts = []
-    shares = {k: v for k, v in row.items() if k.startswith("outside_") and v >= NEVER_SEEN}
+    shares = {k: v for k, v in row.items() if k.startswith("outside_") and v >= OUTSIDE}
     for key, share in sorted(shares.items(), key=lambda item: -item[1]):
         name = key.removeprefix("outside_")
         if name == "wind":
@@ -124,7 +124,7 @@ def reason(row: dict, seconds: pl.DataFrame) -> str:
             parts.append(f"wind around {speed:.1f} m/s from {mean:.0f} deg ({share:.0%})")
         else:
             parts.append(f"{name.replace('_', ' ')} ({share:.0%})")
-    return "never seen: " + ", ".join(parts) if parts else ""
+    return "not in the training data: " + ", ".join(parts) if parts else ""
 
 
 def _features(seconds: pl.DataFrame, names: Sequence[str]) -> np.ndarray:

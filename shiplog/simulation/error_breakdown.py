@@ -17,11 +17,11 @@ from shiplog.simulation.sensitivities import VELOCITY, WindowSeries, apparent_wi
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 MINUTE = 60.0  # s
-RARE_SHARE = 0.03  # of the time: what is seen less often is an incident, not a regime
+RARE_SHARE = 0.03  # of the time: what is rarer is an incident, not a regime
 STANDS_OUT = 0.05  # nats of `_score`: 20 % of the error in 15 % of the time
 FINER = 1.2  # how much more a second or third condition must say
 CONDITIONS = 3
-RECENT = 2.0  # s, over which controls are said to move
+RECENT = 2.0  # s, over which a change of the controls counts as moving
 SIDES = ("ahead", "starboard", "astern", "port")
 COMPASS = ("north", "east", "south", "west")
 THIRDS = ("first", "middle", "last")
@@ -53,7 +53,7 @@ class Minute:
 
 @dataclass(frozen=True)
 class Wrong:
-    """`channels` in order of their share; `diverged`: windows that ran away, left out of all."""
+    """`channels` in order of their share; `diverged`: windows that diverged, left out of all."""
 
     channels: tuple[ChannelBreakdown, ...]
     worst: Minute | None
@@ -161,8 +161,8 @@ def _where(cost: np.ndarray, steps: np.ndarray, regimes: list[Regime]) -> tuple[
         return "everywhere alike", 1.0, 1.0
     within, occurs = (float(v[inside].sum() / v.sum()) for v in (cost, steps))
     order = [kind for kind, _, _ in regimes]
-    told = ", ".join(w for _, w in sorted(chosen, key=lambda c: order.index(c[0])))
-    return f"{told} ({within:.0%} of it in {occurs:.0%} of the time)", within, occurs
+    text = ", ".join(w for _, w in sorted(chosen, key=lambda c: order.index(c[0])))
+    return f"{text} ({within:.0%} of it in {occurs:.0%} of the time)", within, occurs
 
 
 def _score(cost: np.ndarray, steps: np.ndarray, inside: np.ndarray) -> float:
@@ -182,17 +182,17 @@ def _score(cost: np.ndarray, steps: np.ndarray, inside: np.ndarray) -> float:
 
 
 def _regimes(data: WindowSeries, windows: pl.DataFrame, profile: Profile) -> Iterator[Regime]:
-    """All that can be said of a sample, kind by kind, in the order in which it is said."""
+    """All conditions of a sample, kind by kind, in the order of a sentence."""
     _, u, _, v, _, r = np.moveaxis(data.measured, -1, 0)
-    usual = max(float(np.sqrt((u**2 + v**2).mean())), 1e-9)
-    moving = np.hypot(u, v) >= 0.2 * usual
+    typical = max(float(np.sqrt((u**2 + v**2).mean())), 1e-9)
+    moving = np.hypot(u, v) >= 0.2 * typical
     sideways = moving & (np.abs(v) > np.abs(u))
     along = moving & ~sideways
     yield "speed", "hardly moving", ~moving
     yield "speed", "moving sideways", sideways
     yield "speed", "astern", along & (u < 0.0)
-    yield "speed", "slow ahead", along & (u > 0.0) & (u < usual)
-    yield "speed", f"ahead at {usual:.2g} m/s and more", along & (u >= usual)
+    yield "speed", "slow ahead", along & (u > 0.0) & (u < typical)
+    yield "speed", f"ahead at {typical:.2g} m/s and more", along & (u >= typical)
     turn = 0.5 * float(np.sqrt((r**2).mean()))
     yield "turning", "on a steady course", np.abs(r) <= turn
     yield "turning", "turning to port", r < -turn

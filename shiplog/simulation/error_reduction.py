@@ -1,4 +1,4 @@
-"""What naming a cause is worth: errors before and after on voyages that no fit has seen."""
+"""The gain of a cause: errors before and after on voyages that no fit has used."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A model with named causes in it, as a run like any other simulates: windows in, states out.
 
 What the causes say of instruments and actuators is applied before the rollout; what the
-instruments would have shown is what comes out, so that it compares with what was measured.
+instruments would have measured is the output, so that it compares with what was measured.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class ExtendedSimulator:
     lengths: Mapping[str, float] = field(default_factory=dict)
 
     def simulate(self, windows: Windows) -> torch.Tensor:
-        """States [N, I, 6] as the instruments would have shown them."""
+        """States [N, I, 6] as the instruments would have measured them."""
         return torch.from_numpy(self.states(windows, self.theta).copy())
 
     def states(self, windows: Windows, theta: np.ndarray) -> np.ndarray:
@@ -67,11 +67,11 @@ class ExtendedSimulator:
             states = rollout(self.model, theta, data)
             if not any(cause.reads for cause in self.model.causes):
                 return states
-            shown = replace(was, state=states.reshape(-1, 6))
+            as_recorded = replace(was, state=states.reshape(-1, 6))
             for cause in reversed(self.model.causes):
                 if cause.reads:
-                    shown = cause.read(shown, cause.inverse(numbers[cause.label]))
-        return shown.state.reshape(shape)
+                    as_recorded = cause.read(as_recorded, cause.inverse(numbers[cause.label]))
+        return as_recorded.state.reshape(shape)
 
     def with_causes(
         self,
@@ -82,8 +82,8 @@ class ExtendedSimulator:
         coefficients: np.ndarray | None = None,
     ) -> ExtendedSimulator:
         """The same model with more causes in it, and its base's `coefficients` [P] as they were
-        fitted beside them; of a network its bends [F, 3]. Raises ValueError where they are not
-        of this base."""
+        fitted together with them; of a network its bends [F, 3]. Raises ValueError for
+        coefficients of another base."""
         base, own = self.model.base, coefficients
         if own is not None and self.model.bends:
             base, own = base.bend(own), None
@@ -129,7 +129,7 @@ class Extension:
 
     numbers, covariance   label → of each cause
     constants             what their forces need and nobody fits
-    coefficients          [P] of the base beside them; of a network its bends [F, 3]
+    coefficients          [P] of the base, fitted with them; of a network its bends [F, 3]
     """
 
     causes: tuple[Cause, ...]
@@ -145,7 +145,7 @@ class Extension:
         """JSON and arrays of a simulator whose base has so many coefficients."""
         causes = simulator.model.causes
         numbers = split(causes, simulator.theta[base:])
-        told = {
+        facts = {
             "causes": [
                 {"name": c.name, "label": c.label, "made": asdict(c),
                  "numbers": numbers[c.label].tolist()}
@@ -157,10 +157,12 @@ class Extension:
         arrays = {f"constant.{k}": np.atleast_1d(v) for k, v in simulator.model.constants.items()}
         arrays |= {"covariance": simulator.covariance[base:, base:]}
         bent = getattr(simulator.model.base, "bent", None)
-        return told, arrays | {"coefficients": simulator.theta[:base] if bent is None else bent}
+        return facts, arrays | {"coefficients": simulator.theta[:base] if bent is None else bent}
 
     @staticmethod
-    def of(told: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()) -> Extension:
+    def of(
+        facts: Mapping, arrays: Mapping[str, np.ndarray], own: Sequence[Cause] = ()
+    ) -> Extension:
         """Back again; `own`: causes of the user's own. Raises RunError for one nobody knows, and
         for an extension of an earlier program."""
         if "coefficients" not in arrays:
@@ -170,7 +172,7 @@ class Extension:
             )
         by = {c.label: c for c in (*CATALOGUE, *own)}
         causes, numbers, covariance, at = [], {}, {}, 0
-        for entry in told["causes"]:
+        for entry in facts["causes"]:
             # of one unit of the ship, the catalogue has the cause without the unit's name
             kind = by.get(entry["label"], by.get(entry["name"]))
             if kind is None:
@@ -190,7 +192,7 @@ class Extension:
         }
         return Extension(
             tuple(causes), numbers, covariance, constants,
-            {k: (v[0], v[1]) for k, v in told["shares"].items()}, dict(told["lengths"]),
+            {k: (v[0], v[1]) for k, v in facts["shares"].items()}, dict(facts["lengths"]),
             arrays["coefficients"],
         )  # fmt: skip
 

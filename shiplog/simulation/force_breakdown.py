@@ -1,4 +1,4 @@
-"""Who pushes when: the parts of the force along a measured voyage."""
+"""Force components along a measured voyage."""
 
 from __future__ import annotations
 

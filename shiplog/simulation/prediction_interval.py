@@ -1,7 +1,7 @@
 """How far off a simulation may be: a band that held-out errors have calibrated.
 
 What a model's own uncertainty (its parameters', or the spread of its seeds) says is too little:
-it knows nothing of the forces the model lacks. The errors on voyages that no fit had seen give
+it knows nothing of missing forces. The errors on voyages that no fit has used give
 the rest, second by second since the start, and one factor per channel makes nine in ten of them
 fall inside.
 """
@@ -41,8 +41,8 @@ def calibrate(
     """From errors [N, I, 6] of held-out rollouts and the model's own spread there.
 
     groups   voyages they are of. The quantile is that of a split conformal interval (Vovk et al.
-             2005) with each voyage one observation, since what one voyage brings (its wind, its
-             water) errs in all of its windows; with few voyages no further than MOST.
+             2005) with each voyage one observation, since the wind and water of a voyage
+             affect all of its windows; with few voyages no further than MOST.
 
     Rollouts that diverged are left out: no band would hold them.
     """

@@ -21,8 +21,6 @@ from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
 from shiplog.jit_cache import traced
 from shiplog.voyages.windows import Windows
 
-jax.config.update("jax_enable_x64", True)
-
 VELOCITY = np.array(VELOCITY_IN_STATE)
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
@@ -254,7 +252,7 @@ def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=N
     slope = slopes[:, :, VELOCITY] * scale[..., None]
     pull = jnp.einsum("nki,nkip->np", error, slope)
     loss = (error**2).sum((1, 2))
-    # A window of weight 0 may have run away, and 0 · inf is not 0.
+    # A window of weight 0 may have diverged, and 0 · inf is not 0.
     used = (weight > 0.0)[:, None, None, None]
     slope = jnp.where(used, slope * jnp.sqrt(weight)[:, None, None, None], 0.0)
     flat = slope.reshape(-1, slope.shape[-1])

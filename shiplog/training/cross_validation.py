@@ -1,4 +1,4 @@
-"""Errors on voyages that the fit has not seen: a gain that does not survive this is none."""
+"""Errors on voyages that the fit has not used: only a gain on these counts."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ def as_good(judged: dict[float, np.ndarray]) -> list[float]:
     """Which settings are not worse than the best by more than chance; none where fewer than two
     windows can be judged.
 
-    judged   setting → L of each window that it has not seen [N], infinite where that ran away
+    judged   setting → L of each held-out window [N], infinite where it diverged
 
-    One standard error (Breiman et al. 1984) of paired windows. A setting that lets more windows
-    run away than another is no choice; windows that every choice loses say nothing.
+    One standard error (Breiman et al. 1984) of paired windows. A setting with which more windows
+    diverge is not chosen; windows that diverge with every setting are left out.
     """
     lost = {one: int((~np.isfinite(loss)).sum()) for one, loss in judged.items()}
     able = [one for one in judged if lost[one] == min(lost.values())]

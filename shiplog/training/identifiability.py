@@ -1,4 +1,4 @@
-"""What the data could not tell apart, in words: the note beside every identified parameter."""
+"""Parameters that the data could not separate, as sentences of the report."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from shiplog.training.output_error import Identified
 
-SILENT = 0.9  # standard error over plausible spread above which the data said nothing
-TRADING = 0.75  # correlation of two estimates above which they are not told apart
+SILENT = 0.9  # standard error over plausible spread above which the data do not determine it
+TRADING = 0.75  # correlation of two estimates above which they are not separated
 MOST_PAIRS = 6
 
 
@@ -40,7 +40,7 @@ def note(
     bounds: tuple[np.ndarray, np.ndarray],
     meaning: Callable[[str], str],
 ) -> list[str]:
-    """Sentences for a report: what trades, what was not seen, what ran into its limit."""
+    """Sentences for a report: correlated, undetermined and limited parameters."""
     said = []
     for i, j, value in trades(found)[:MOST_PAIRS]:
         said.append(

@@ -69,7 +69,7 @@ class Training:
             )
         if not math.isfinite(progress.best):
             raise RunError(
-                f"Every rollout of seed {self.seed} ran away: no weights have a finite loss.",
+                f"Every rollout of seed {self.seed} diverged: no weights have a finite loss.",
                 hint="look at the voyages' velocities and actuators with `shiplog voyages`.",
             )
         return progress

@@ -63,7 +63,7 @@ class Run(RunFolder, ABC):
         return {seed: one(seed) for seed in self.config.seeds}
 
     def extended(self, seed: int, record: Record | None = None) -> ExtendedSimulator:
-        """The run's model, with its extension if it has one, ready to take in causes.
+        """The run's model, with its extension if it has one, ready to absorb causes.
 
         record   the campaign in which further ones are found
         """

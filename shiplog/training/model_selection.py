@@ -1,4 +1,4 @@
-"""What voyages that no fit has seen decide: how firm the ridge is, how much a network may say."""
+"""Choices by voyages that no fit has used: how firm the ridge is, how much a network may say."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def choose_network(
     by_voyage: CrossValidated | None,
     seed: int,
 ) -> tuple[Chosen, Simulator, Identified, str, CrossValidated | None]:
-    """Choose how much the network may say on voyages it has not seen, then fit it on all."""
+    """Choose how much the network may say on held-out voyages, then fit it to all."""
     found = refit(ready.data)
 
     def fitted(

@@ -74,7 +74,7 @@ def identify(
                     and so what an untouched parameter's standard error is, stays `spread`
     most, rounds    evaluations a round; rounds of weighing the ridge by the noise left over
 
-    Raises ModelError where the windows run away from the start, and from what shorter ones give.
+    Raises ModelError where the windows diverge from the start, and from the fit of shorter ones.
     """
     free = (np.ones(len(start), dtype=bool) if free is None else free) & (spread > 0.0)
     held = factor * spread
@@ -128,7 +128,7 @@ def _from_short_windows(
     free: np.ndarray,
     values: np.ndarray,
 ) -> np.ndarray:
-    """Values that hold whole windows, from ones that let some run away: first fitted to the
+    """Values that hold whole windows, from ones with which some diverge: first fitted to the
     windows' beginnings, then to longer and longer ones. Raises ModelError where that fails."""
     whole = data.measured.shape[1]
     for share in (16, 8, 4, 2):
@@ -147,7 +147,7 @@ def _from_short_windows(
     lost = ~np.isfinite(_used(losses(model, values, data), data.weight))
     if lost.any():
         raise ModelError(
-            f"The starting values let {int(lost.sum())} of {len(lost)} windows run away, and no "
+            f"The starting values let {int(lost.sum())} of {len(lost)} windows diverge, and no "
             "fit to shorter ones mends it.",
             hint="check the profile's signs and units, choose a shorter --window, or give better "
             "--parameters.",
@@ -236,7 +236,7 @@ class _Problem:
 
 
 def _used(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Zero where the weight is: a window left out may have run away, and 0 · inf is not 0."""
+    """Zero where the weight is: a window left out may have diverged, and 0 · inf is not 0."""
     return np.where(weight.reshape(-1, *[1] * (values.ndim - 1)) > 0, values, 0.0)
 
 

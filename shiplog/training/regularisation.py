@@ -1,4 +1,4 @@
-"""How firmly the ridge holds: chosen on voyages that no fit has seen, where there are any.
+"""How firmly the ridge holds: chosen on voyages that no fit has used, where there are any.
 
 A network learns until its error on the validation voyages rises. An identification has no epochs;
 what keeps it from learning its own voyages by heart is the ridge, and its firmness is chosen on

@@ -1,4 +1,4 @@
-"""What a training is: every value of it, frozen, saved beside its weights as TOML."""
+"""What a training is: every value of it, frozen, saved together with its weights as TOML."""
 
 from __future__ import annotations
 

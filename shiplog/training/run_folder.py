@@ -4,7 +4,7 @@ them stands in `load_model`.
     <run>/config.toml  provenance.json      every resolved value; versions, hashes, times, and what
                                             held-out voyages chose
     <run>/profile.json                      the ship the run is of
-    <run>/windows.parquet                     which windows it learned from
+    <run>/windows.parquet                     which windows it was trained on
     <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from
     <run>/scaling.safetensors               mean and std of inputs and accelerations (networks)
     <run>/seed<k>/                          see `seed_files`

@@ -1,4 +1,4 @@
-"""Faults of one log's channels: found, marked and said with their times; never repaired.
+"""Faults of one log's channels: found, marked and reported with their times; never repaired.
 
 Each threshold follows from the instrument's stated accuracy or from how the channel itself
 behaves, so that a coarse instrument is not called faulty for being coarse.
@@ -14,9 +14,9 @@ from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.voyages.resampling import STEP_NS
 
-LISTED = 20  # stretches of one kind on one channel that are said one by one; the rest is counted
+LISTED = 20  # stretches of one kind on one channel that are listed one by one; the rest is counted
 FROZEN_S = 3.0  # a value held longer than this is stale, not data
-SAID_HELD_S = 0.5
+REPORTED_HELD_S = 0.5
 SAME_SPAN = 1e-9  # of the span of a channel: values nearer than that are one value
 FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
@@ -40,9 +40,9 @@ def spikes(value: np.ndarray, sigma: float) -> np.ndarray:
     around = np.lib.stride_tricks.sliding_window_view(value, 5, axis=0)
     off = np.zeros(len(value))
     off[2:-2] = np.linalg.norm(value[2:-2] - np.median(around, axis=-1), axis=1)
-    usual = 1.4826 * float(np.median(off[2:-2]))
+    typical = 1.4826 * float(np.median(off[2:-2]))
     step = float(np.median(np.linalg.norm(np.diff(value, axis=0), axis=1)))  # of a free-run motion
-    return off > max(10.0 * usual, 10.0 * sigma, 5.0 * step, 1e-9)
+    return off > max(10.0 * typical, 10.0 * sigma, 5.0 * step, 1e-9)
 
 
 def repeats(value: np.ndarray) -> list[tuple[int, int]]:
@@ -90,7 +90,9 @@ def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]
     ]
 
 
-def said(kind: str, channel: str, intervals: list[tuple[float, float]], what: str) -> list[Finding]:
+def findings_of(
+    kind: str, channel: str, intervals: list[tuple[float, float]], what: str
+) -> list[Finding]:
     """One finding a stretch, longest first kept, in order of time; the rest as one count."""
     longest = sorted(intervals, key=lambda i: i[0] - i[1])[:LISTED]
     findings = [
@@ -137,7 +139,7 @@ def held_on_grid(
 
     times [m] ns; sampled [n] ns; travel [m]: how far the channel should have gone by each row,
     integrated from its rate (None: no rate is known, and the runs are taken as they are);
-    least: how far it has to go to be seen, in the channel's unit.
+    least: the smallest change that is detected, in the channel's unit.
     """
     kept = []
     for first, last in runs:

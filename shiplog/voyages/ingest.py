@@ -98,7 +98,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         pl.col(profile.columns).fill_nan(None),
     )
     estimates = tuple(sensor_consistency.estimates(table, profile))
-    said = sensor_consistency.findings(estimates, table.height, profile)
+    consistency = sensor_consistency.findings(estimates, table.height, profile)
     named = table.lazy().with_columns(voyage=pl.lit(""))
     usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
     report = VoyageReport(
@@ -107,7 +107,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *left_out, *grid.findings, *said),
+        findings=(*reading.health.findings, *left_out, *grid.findings, *consistency),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(_instrument(*one) for one in [*sampled.items(), *driven.items()]),

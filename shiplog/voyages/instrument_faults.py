@@ -15,31 +15,31 @@ from shiplog.voyages.recording import Record
 def without_heading_offset(record: Record, angle: float, turned: bool = False) -> Record:
     """A compass that shows `angle` [rad] too much; with `turned`, the recorder also turned the
     body velocity by it."""
-    seen = record.sighted.turned(-angle)
+    readings = record.sighted.turned(-angle)
     if turned:
         c, s = np.cos(angle), np.sin(angle)
-        ahead, starboard = seen.velocity[:, 0], seen.velocity[:, 1]
+        ahead, starboard = readings.velocity[:, 0], readings.velocity[:, 1]
         was = np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
-        seen = replace(seen, velocity=was)
-    return record.measured_as(seen)
+        readings = replace(readings, velocity=was)
+    return record.measured_as(readings)
 
 
 def without_yaw_rate_bias(record: Record, bias: float) -> Record:
     """A rate gyro that shows `bias` [rad/s] too much."""
-    seen = record.sighted
-    return record.measured_as(replace(seen, yaw_rate=seen.yaw_rate - bias))
+    readings = record.sighted
+    return record.measured_as(replace(readings, yaw_rate=readings.yaw_rate - bias))
 
 
 def without_yaw_rate_scale(record: Record, excess: float) -> Record:
     """A rate gyro that shows 1 + `excess` times the rate."""
-    seen = record.sighted
-    return record.measured_as(replace(seen, yaw_rate=seen.yaw_rate / (1.0 + excess)))
+    readings = record.sighted
+    return record.measured_as(replace(readings, yaw_rate=readings.yaw_rate / (1.0 + excess)))
 
 
 def without_velocity_scale(record: Record, excess: float) -> Record:
     """A log or receiver that shows 1 + `excess` times the velocity."""
-    seen = record.sighted
-    return record.measured_as(replace(seen, velocity=seen.velocity / (1.0 + excess)))
+    readings = record.sighted
+    return record.measured_as(replace(readings, velocity=readings.velocity / (1.0 + excess)))
 
 
 def without_clock_offset(record: Record, channel: str, late: float) -> Record:
@@ -47,14 +47,14 @@ def without_clock_offset(record: Record, channel: str, late: float) -> Record:
     `late` [s] after their time."""
     if channel == "wind":
         return replace(record, wind=record.later(record.wind, late))
-    seen = record.sighted
+    readings = record.sighted
     if channel in ("position", "gnss"):
-        seen = replace(seen, position=record.later(seen.position, late))
+        readings = replace(readings, position=record.later(readings.position, late))
     if channel in ("velocity", "gnss"):
-        seen = replace(seen, velocity=record.later(seen.velocity, late))
+        readings = replace(readings, velocity=record.later(readings.velocity, late))
     if channel == "yaw_rate":
-        seen = replace(seen, yaw_rate=record.later(seen.yaw_rate, late))
-    return record.measured_as(seen)
+        readings = replace(readings, yaw_rate=record.later(readings.yaw_rate, late))
+    return record.measured_as(readings)
 
 
 def without_antenna_offset(record: Record, ahead: float, starboard: float) -> Record:

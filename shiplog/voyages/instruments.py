@@ -40,22 +40,22 @@ def sighted(state: np.ndarray, axes: Axes, sensors: Sensors) -> Sighted:
 
 
 def at_midship(
-    seen: Sighted, sensors: Sensors, moved: tuple[float, float] = (0.0, 0.0)
+    readings: Sighted, sensors: Sensors, moved: tuple[float, float] = (0.0, 0.0)
 ) -> np.ndarray:
     """State at midship [n, 6]. `moved`: the antenna, from where the profile has it [m]."""
     arm = np.array(sensors.position.lever_arm_m)
     of_velocity = np.array(sensors.velocity.lever_arm_m)
     shared = bool(np.array_equal(arm, of_velocity))
-    position = frames.position_at_midship(seen.position, seen.axes, tuple(arm + moved))
-    velocity = seen.velocity
+    position = frames.position_at_midship(readings.position, readings.axes, tuple(arm + moved))
+    velocity = readings.velocity
     if sensors.kind("velocity") != "body":
-        velocity = frames.to_body(velocity, seen.axes)
+        velocity = frames.to_body(velocity, readings.axes)
     velocity = frames.velocity_at_midship(
-        velocity, seen.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
+        velocity, readings.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
     )
     return np.stack(
         (
             position[:, 0], velocity[:, 0], position[:, 1], velocity[:, 1],
-            seen.heading, seen.yaw_rate,
+            readings.heading, readings.yaw_rate,
         ), -1,
     )  # fmt: skip

@@ -12,11 +12,10 @@ from pathlib import Path
 
 import polars as pl
 
-from shiplog.channels import UNUSABLE, Quality
+from shiplog.channels import UNUSABLE, WINDOW, Quality
 
 ONE_SECOND = pl.duration(seconds=1)
 ONE_DAY = timedelta(days=1)
-WINDOW = 100  # s, the paper's I at 1 Hz
 LEAST_SAMPLES = 5  # of ten: fewer is not an average over the second
 
 

@@ -1,4 +1,4 @@
-"""Voyages at 10 Hz as the diagnosis reads them: rows of arrays, unbroken stretches, what was seen.
+"""Voyages at 10 Hz for the diagnosis: rows of arrays, unbroken stretches, measured rows.
 
 A rollout of 1 Hz averages knows an instant to half a second; a delay of a rudder or of a clock is
 smaller than that. So the diagnosis reads the recorded rows themselves.

@@ -156,7 +156,7 @@ def rough(problem: Problem, starts: list[np.ndarray]) -> np.ndarray:
 
 
 def _descended(problem: Problem, value: np.ndarray) -> tuple[np.ndarray, float]:
-    """Levenberg-Marquardt, the memory renewed as it goes: parameters, and what is left."""
+    """Levenberg-Marquardt, the memory renewed as it goes: parameters and residual."""
     free, usable = problem.free, problem.grid.run > ORDER
     precision = np.diag(problem.prior[free] ** -2.0)
     damping, memory, residual = 1e-3, np.zeros(ORDER), problem.model(value)

@@ -39,8 +39,8 @@ CHUNK_ROWS = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
 POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, or neither
 MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
-SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be away from none, to be said
-CERTAIN = 4.0  # the same, to be put right where that is asked for
+SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be from zero, to be reported
+CERTAIN = 4.0  # the same, to be corrected with --correct
 
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
@@ -282,7 +282,7 @@ def _gnss_clocks(found: Fit, profile: Profile) -> Iterator[Estimate]:
 
     Velocities that were turned by the heading when they were recorded keep its turns and not their
     own time: they look punctual, and the position early by what they are late. No profile tells
-    them from a log's own, so of body velocities only the time between the two is said to be off.
+    them from a log's own, so of body velocities only the time between the two is reported.
     """
     if not _separable(profile):
         yield _later_of_two(*found.interval(TAU_V))

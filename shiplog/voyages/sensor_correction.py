@@ -66,11 +66,11 @@ def corrected(voyage: Voyage) -> Voyage:
     done = tuple(e for e in voyage.estimates if e.certain)
     sure = {(e.kind, e.channel) for e in done}
     table, gaps = put_right(voyage.table, voyage.profile, done)
-    said = [
+    applied = [
         replace(f, sentence=f"{f.sentence} Corrected.") if (f.kind, f.channel) in sure else f
         for f in voyage.report.findings
     ]
-    report = replace(voyage.report, findings=(*said, *gaps))
+    report = replace(voyage.report, findings=(*applied, *gaps))
     return replace(voyage, table=table, report=report, corrected=done)
 
 
@@ -93,11 +93,13 @@ def put_right(
     state[:, HEADING] = frames.wrap(state[:, HEADING])
     good = (mark & int(channels.UNUSABLE)) == 0
     whole, gaps = good.copy(), []
-    for name, columns in MEASURED.items():  # a velocity needs its yaw rate: a row is said once
+    for name, columns in MEASURED.items():  # a velocity needs its yaw rate: a row is reported once
         lost = whole & ~np.isfinite(state[:, columns]).all(axis=1)
         whole &= ~lost
         spans = [fault_detection.seconds(stretch) for stretch in fault_detection.stretches(lost)]
-        gaps += fault_detection.said("gap", name, spans, "has no sample once clocks are put right")
+        gaps += fault_detection.findings_of(
+            "gap", name, spans, "has no sample once clocks are put right"
+        )
     mark[good & ~whole] |= int(Quality.GAP)
     state = np.where(good[:, None], state, before)
     put = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]

@@ -27,7 +27,7 @@ SHORTER = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed ins
 def choose_split(
     store: Store, voyages: Sequence[str], validation: Sequence[str], data: str, size: int
 ) -> Split:
-    """Which voyages train, validate and test; what the user did not say is chosen, and said.
+    """Which voyages train, validate and test; what the user did not name is chosen, and reported.
 
     Six voyages in order, or the sample logs, are split as in the paper; else whole voyages are
     dealt out in order of time, about 15 % of the seconds each to validation and test.

@@ -2,12 +2,12 @@
 
     store/catalogue.parquet               one row a voyage, made again from the folders
     store/voyage=<name>/table.parquet     10 Hz, zstd
-    store/voyage=<name>/voyage.json       ship, profile, source hash, report, what was put right
+    store/voyage=<name>/voyage.json       ship, profile, source hash, report, corrections
     store/.lock                           held by the one process that writes
 
-A voyage is written beside its place and renamed when whole. The folders are the truth: a process
-that is killed between a folder's rename and the catalogue's leaves a catalogue that is out of
-date, which every reader notices. The same log through the same profile is recognised by its
+A voyage is written under a hidden name and renamed when complete. The folders are the truth: a
+process that is killed between a folder's rename and the catalogue's leaves a catalogue that is out
+of date, which every reader notices. The same log through the same profile is recognised by its
 content and left alone; another log under a taken name is refused. What was put right is part of
 that: the same log ingested without is the table as it was measured.
 """
@@ -20,11 +20,11 @@ import logging
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 import polars as pl
 from filelock import FileLock
@@ -35,7 +35,8 @@ from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.logs.health_report import CONTRACT, VoyageReport
 from shiplog.profile import Profile
 from shiplog.profile_file import advice
-from shiplog.voyages import one_hertz, parts
+from shiplog.voyages import catalogue, one_hertz, parts
+from shiplog.voyages.catalogue import NEW, OLD, CatalogueEntry
 
 if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second
     from shiplog.voyages.ingest import Voyage
@@ -43,29 +44,8 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
 INGEST_VERSION = 4  # raised when the same log would become another table or report
 LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
-NEW, OLD = ".new", ".old"  # of a voyage's folder, hidden: while it is written, or replaced
-FACTS = ("sha256", "fingerprint", "source", "start", "profile", "report")  # every voyage.json
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class CatalogueEntry:
-    """What the catalogue says of one voyage."""
-
-    name: str
-    ship: str
-    start: str
-    rows: int
-    seconds: float
-    findings: int
-    rate_hz: float | None  # of the instrument that measures least often
-    usable_s: int | None
-    windows: int | None
-    sha256: str
-    fingerprint: str
-    source: str
-    written: int  # ns, last change of voyage.json: another one means that the row is out of date
 
 
 class Store:
@@ -76,17 +56,9 @@ class Store:
 
     def entries(self) -> list[CatalogueEntry]:
         """All voyages, by name. Reads the catalogue, or the folders where the two differ."""
-        if self.path.exists() and not self.path.is_dir():
-            raise StoreError(
-                f"The store {self.path} is a file, not a folder.", hint="give another --store."
-            )
-        if any(self.path.glob(f".voyage=*{OLD}")):
+        if catalogue.interrupted(self.path):
             self.mend()
-        written = self._written()
-        known = self._catalogue()
-        if {e.name: e.written for e in known} == {_name(f): w for f, w in written.items()}:
-            return known
-        return self._scan_folders()
+        return catalogue.entries(self.path, self._catalogue())
 
     def select(self, patterns: Sequence[str] | None = None) -> list[str]:
         """Names that match any of the shell patterns, each name once; all when none is given. A
@@ -140,7 +112,7 @@ class Store:
         fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked)
         state = "added"
         if folder.is_dir():
-            facts = _known(folder)
+            facts = catalogue.known(folder)
             if facts and facts["sha256"] != voyage.contents.sha256:
                 raise StoreError(
                     f"The store {self.path} already holds another log as the voyage "
@@ -170,9 +142,9 @@ class Store:
 
     def holds(self, name: str, sha256: str, profile: Profile, correct: bool = False) -> bool:
         """Whether this very log, read through this very profile, is here already and whole, and
-        was put right if that is asked for."""
+        was corrected if that is requested."""
         folder = self._folder(name)
-        facts = _known(folder) if folder.is_dir() else None
+        facts = catalogue.known(folder) if folder.is_dir() else None
         fingerprint = fingerprint_of(sha256, profile, correct)
         return bool(facts) and facts["fingerprint"] == fingerprint and _whole(folder, facts)
 
@@ -190,7 +162,7 @@ class Store:
 
     def report(self, name: str) -> VoyageReport:
         """What was found when this voyage was ingested."""
-        return VoyageReport.from_json(_facts(self._folder(name))["report"])
+        return VoyageReport.from_json(catalogue.facts(self._folder(name))["report"])
 
     def profile(self, names: Iterable[str]) -> Profile:
         """The profile the voyages were read through. Raises StoreError for two ships."""
@@ -198,7 +170,7 @@ class Store:
         first = ""
         for name in names:
             part = self._part(name)
-            facts = _facts(self._folder(part.whole if part else name))
+            facts = catalogue.facts(self._folder(part.whole if part else name))
             source = facts.get("profile_source", "")
             try:
                 profile = Profile.model_validate(facts["profile"] | {"source": source})
@@ -243,7 +215,7 @@ class Store:
             inside = (elapsed >= part.begin) & (elapsed < part.end)
             return self._table(part.whole).filter(inside).with_columns(voyage=pl.lit(name))
         folder = self._folder(name)
-        if not _whole(folder, _facts(folder)):
+        if not _whole(folder, catalogue.facts(folder)):
             raise StoreError(
                 f"The table of {name} in the store {self.path} is spoilt.",
                 hint="ingest its log again: shiplog ingest LOG --store DIR.",
@@ -294,14 +266,6 @@ class Store:
         for new in self.path.glob(f".voyage=*{NEW}"):
             shutil.rmtree(new, ignore_errors=True)
 
-    def _written(self) -> dict[Path, int]:
-        """Every voyage's folder, and when its voyage.json was written [ns]."""
-        return {
-            folder: (folder / "voyage.json").stat().st_mtime_ns
-            for folder in sorted(self.path.glob("voyage=*"))
-            if (folder / "voyage.json").is_file()
-        }
-
     def _catalogue(self) -> list[CatalogueEntry]:
         """What catalogue.parquet lists; nothing where it cannot be read."""
         path = self.path / "catalogue.parquet"
@@ -313,41 +277,9 @@ class Store:
             return []
         return [CatalogueEntry(**row) for row in table.to_dicts()]
 
-    def _scan_folders(self) -> list[CatalogueEntry]:
-        listed_already = {(e.name, e.written): e for e in self._catalogue()}
-        entries = []
-        for folder, written in self._written().items():
-            if (same := listed_already.get((_name(folder), written))) is not None:
-                entries.append(same)
-                continue
-            facts = _known(folder)
-            if facts is None:
-                log.warning("%s cannot be read and is passed over: ingest its log again", folder)
-                continue
-            report = VoyageReport.from_json(facts["report"])
-            slowest = report.slowest
-            entries.append(
-                CatalogueEntry(
-                    report.name,
-                    facts["profile"]["ship"]["name"],
-                    facts["start"],
-                    report.rows,
-                    report.seconds,
-                    len(report.findings),
-                    slowest.rate_hz if slowest else None,
-                    report.usable_s,
-                    report.windows,
-                    facts["sha256"],
-                    facts["fingerprint"],
-                    facts["source"],
-                    written,
-                )
-            )
-        return sorted(entries, key=lambda entry: entry.name)
-
     def _list(self) -> None:
         """Write the catalogue anew, if it does not say what the folders say."""
-        entries = self._scan_folders()
+        entries = catalogue.entries(self.path, self._catalogue())
         if entries == self._catalogue():
             return
         rows = pl.DataFrame([asdict(entry) for entry in entries])
@@ -359,36 +291,6 @@ def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _facts(folder: Path) -> dict:
-    """A voyage's voyage.json. Raises StoreError."""
-    path = folder / "voyage.json"
-    try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
-        lacking = [key for key in FACTS if key not in facts]
-        if lacking:
-            raise ValueError(f"it lacks {listed(lacking)}")
-        VoyageReport.from_json(facts["report"])
-        facts["profile"]["ship"]["name"]
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise StoreError(
-            f"{path} cannot be read: {error}.", hint="remove that folder and ingest the log again."
-        ) from error
-    return facts
-
-
-def _known(folder: Path) -> dict | None:
-    """The same; None where it is spoilt, or the folder is another voyage's by its own account."""
-    try:
-        facts = _facts(folder)
-    except StoreError:
-        return None
-    return facts if facts["report"]["name"] == _name(folder) else None
-
-
-def _name(folder: Path) -> str:
-    return unquote(folder.name.removeprefix("voyage="))
 
 
 def _whole(folder: Path, facts: dict) -> bool:

@@ -51,7 +51,7 @@ def of_ship(length: float, speed: float, recorded: float = math.inf) -> Timescal
     recorded  s, of the shorter campaign: it is cut into `ENOUGH` segments at least
 
     In steps of two, so that a ship of the three-metre class keeps 30 s, 2 s and 2 s; not below
-    21 s, where a segment has too little to say beside its own start, nor above 240 s, where small
+    21 s, where a segment tells little more than its initial state, nor above 240 s, where small
     errors of a model grow too far for a linearisation.
     """
     time = length / max(speed, 1e-6)

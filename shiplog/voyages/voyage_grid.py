@@ -1,6 +1,6 @@
 """A voyage on its 10 Hz grid while it is being filled, and the faults that only show there.
 
-What is found is marked row by row and said with its times; the values stay as they are.
+Faults are marked row by row and reported with their times; the values stay as they are.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class VoyageGrid:
         """Mark rows [m] bool, and say each stretch of them."""
         rows = list(fault_detection.stretches(mask))
         fault_detection.mark(self.marks, rows, flag)
-        self.findings += fault_detection.said(
+        self.findings += fault_detection.findings_of(
             kind, name, [fault_detection.seconds(i) for i in rows], what
         )
 
@@ -90,12 +90,14 @@ def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
         frozen = [i for i, s in zip(rows, lasted, strict=True) if s > fault_detection.FROZEN_S]
         fault_detection.mark(grid.marks, frozen, Quality.FROZEN)
         long = [
-            i for i, s in zip(intervals, lasted, strict=True) if s >= fault_detection.SAID_HELD_S
+            i
+            for i, s in zip(intervals, lasted, strict=True)
+            if s >= fault_detection.REPORTED_HELD_S
         ]
-        grid.findings += fault_detection.said(
+        grid.findings += fault_detection.findings_of(
             "held", name, long, "repeats the same value while the ship moves,"
         )
-        brief = [s for s in lasted if s < fault_detection.SAID_HELD_S]
+        brief = [s for s in lasted if s < fault_detection.REPORTED_HELD_S]
         if brief:
             often = "once" if len(brief) == 1 else f"{len(brief)} times"
             sentence = f"{name} repeats itself briefly, {often}, {sum(brief):.1f} s in all."

@@ -15,9 +15,8 @@ from torch import Tensor
 
 from shiplog import channels
 from shiplog.exceptions import WindowError
-from shiplog.voyages.one_hertz import WINDOW
 
-SIZE = WINDOW
+SIZE = channels.WINDOW
 
 
 @dataclass(frozen=True)

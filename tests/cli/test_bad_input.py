@@ -335,12 +335,12 @@ def test_a_log_whose_name_is_no_text(desk, capsys):
 
 
 def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys, monkeypatch):
-    from shiplog.voyages.store import Store
+    from shiplog.voyages import catalogue
 
     def broken(_store):
         raise ZeroDivisionError("division\nby zero")
 
-    monkeypatch.setattr(Store, "entries", broken)
+    monkeypatch.setattr(catalogue, "entries", broken)
     assert cli.run(["voyages", "--store", str(desk.store)]) == 1
     said = capsys.readouterr().err
     assert "Traceback" not in said
@@ -355,11 +355,11 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
     """In the temporary folder."""
     import tempfile
 
-    from shiplog.voyages.store import Store
+    from shiplog.voyages import catalogue
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(desk.file("no-folder") / "cache"))
     monkeypatch.setattr(tempfile, "tempdir", str(desk.dir("tmp")))
-    monkeypatch.setattr(Store, "entries", lambda _store: 1 / 0)
+    monkeypatch.setattr(catalogue, "entries", lambda _store: 1 / 0)
     assert cli.run(["voyages", "--store", str(desk.store)]) == 1
     (trace,) = desk.path("tmp").iterdir()
     assert str(trace) in capsys.readouterr().err
@@ -369,24 +369,24 @@ def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
 def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monkeypatch, kind):
     import errno
 
-    from shiplog.voyages.store import Store
+    from shiplog.voyages import catalogue
 
     code = {PermissionError: errno.EACCES, FileNotFoundError: errno.ENOENT}[kind]
 
     def refused(_store):
         raise OSError(code, os.strerror(code), "/somewhere")
 
-    monkeypatch.setattr(Store, "entries", refused)
+    monkeypatch.setattr(catalogue, "entries", refused)
     judge(["voyages", "--store", desk.store], 1, [f"/somewhere: {os.strerror(code)}"], capsys)
 
 
 def test_ctrl_c_is_said_and_has_its_code(desk, capsys, monkeypatch):
-    from shiplog.voyages.store import Store
+    from shiplog.voyages import catalogue
 
     def interrupted(_store):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Store, "entries", interrupted)
+    monkeypatch.setattr(catalogue, "entries", interrupted)
     assert cli.run(["voyages", "--store", str(desk.store)]) == 130
     assert "what was finished is kept" in capsys.readouterr().err
 

@@ -83,7 +83,7 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     assert set(content["floors"]) == {"hold", "least_squares"}
     (voyage,) = content["voyages"].values()
     assert set(voyage) == {"loss", "windows", "coverage"}
-    assert "floor: hold the velocity" in said
+    assert "baseline: hold the velocity" in said
 
 
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
@@ -222,7 +222,7 @@ def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(tmp_path
 
 
 def test_check_says_why_sensors_were_not_held_against_each_other(logs, tmp_path, caplog):
-    """It is no error: the health of the log is said all the same."""
+    """It is no error: the health of the log is reported all the same."""
     caplog.set_level("INFO")
     strange = sailing.write(tmp_path / "turn.mcap")
     for arguments, why in (

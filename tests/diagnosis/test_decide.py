@@ -109,7 +109,8 @@ def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
 def test_a_cause_that_the_remainder_imitates_is_not_named_beside_it(
     trial, monkeypatch, share, word
 ):
-    """What acts through the same inputs may be a part of the unknown force: then that is said."""
+    """What acts through the same inputs may be a part of the unknown force: then that is
+    reported."""
     asked = []
 
     def imitated(self, point, base, label, remainder):

@@ -58,7 +58,7 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
-    """One on which the model ran away: rows of zeros, nothing of it seen."""
+    """One on which the model diverged: rows of zeros, nothing of it seen."""
     linear = passed(40.0)
     none = np.zeros(linear.j.shape[-1])
     lost = np.arange(COUNT) == 7

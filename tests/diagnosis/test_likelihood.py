@@ -111,7 +111,7 @@ def test_gram_is_the_dense_gaussian(unrest):
 
 @EACH
 def test_a_square_of_errors_alone_is_that_of_their_gram(unrest):
-    """Of one pass under each size of unrest, with a pulse and without."""
+    """Of one pass under each size of process noise, with a pulse and without."""
     given = linear(3)
     alone = replace(given, j=given.j[..., :0])
     weighed = likelihood.weighed(alone, unrest)
@@ -226,8 +226,8 @@ def test_marginal_is_the_dense_gaussian():
 
 
 def test_a_pulse_pushes_all_channels_together():
-    """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the unrest's
-    own only within a channel."""
+    """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the process
+    noise's own only within a channel."""
     kernel = PULSED.kernel(4)
     push, pulse = PULSED.push, np.array([0.0, 0.9, -0.4])
     for a in range(3):

@@ -389,7 +389,7 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     assert delay == pytest.approx(late, abs=0.01)
 
 
-# --- ships that need finer steps, and segments in which a model runs away -------------------------
+# --- ships that need finer steps, and segments in which a model diverges -------------------------
 
 
 @jax.tree_util.register_static
@@ -496,7 +496,7 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
     theta = np.array([7.0])
     found = linearisation.linear(Stiff(4), theta, cut, GRID, at, *nothing(cut), wide)
     assert found.lost.tolist() == [False, False, True, False]
-    assert found.said == "1 of 4 segments were left out: the model runs away there."
+    assert found.said == "1 of 4 segments were left out: the model diverges there."
     for values in (found.e, found.z, found.j):
         assert np.isfinite(values).all() and not values[2].any() and values[[0, 1, 3]].any()
     assert not found.cut.used[2].any() and found.cut.used[[0, 1, 3]].all()

@@ -65,9 +65,9 @@ def afloat(tmp_path_factory):
 def test_what_only_renames_its_inputs_is_not_testable_beside_a_network(afloat):
     """Nor what any fit absorbs; what it cannot see is."""
     why = {
-        "rudder_offset": "a network fitted to these voyages takes it in",
-        "antenna_offset": "a network fitted to these voyages takes it in",
-        "wind_direction_offset": "a network fitted to these voyages takes it in",
+        "rudder_offset": "a network fitted to these voyages absorbs it",
+        "antenna_offset": "a network fitted to these voyages absorbs it",
+        "wind_direction_offset": "a network fitted to these voyages absorbs it",
         "fouling": "a model fitted to these voyages absorbs it",
     }
     assert {k: v for k, v in afloat.untested.items() if k in why} == why

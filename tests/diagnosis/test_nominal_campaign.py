@@ -216,5 +216,5 @@ def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):
 
     start = replace(START, values=np.array([3.0, 0.8]))
     assert nominal_campaign.widened(Model(), SETTING, start).spread == pytest.approx([1.5, 2.0])
-    # of a cause that no fit takes in nothing follows
+    # of a cause that no fit absorbs nothing follows
     assert nominal_campaign.widened(model, SETTING, start).spread == pytest.approx([0.3, 2.0])

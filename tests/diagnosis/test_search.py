@@ -110,7 +110,7 @@ def test_nothing_hidden_is_nothing():
 
 
 def test_causes_that_look_alike_share_the_probability():
-    """The two cannot be told apart: neither is named, and their sum is sure."""
+    """The two cannot be distinguished: neither is named, and their sum is sure."""
     found = searched({"drag": [1.2]}, alike=("drag", "load", 0.02))
     decision, weighed = decide(found)
     assert weighed.names["drag"] + weighed.names["load"] > 0.9
@@ -153,7 +153,7 @@ def test_what_a_model_has_already_stays_beside_what_is_found():
 
 
 def pushes() -> np.ndarray:
-    """[S, 3J] three times the usual process noise."""
+    """[S, 3J] three times the nominal process noise."""
     plain, _ = trial_with({})
     kernel = np.linalg.cholesky(straight.UNREST.kernel(plain.grid.knots))
     return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T

@@ -241,7 +241,7 @@ def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
     told = json.loads((sea.work / "away" / "verdict.json").read_text("utf-8"))
     shaped(told)
     assert (done.verdict.verdict, told["causes"]) == ("undecided", [])
-    assert "runs away" in told["sentence"] and "evaluate" in told["sentence"]
+    assert "diverges" in told["sentence"] and "evaluate" in told["sentence"]
 
 
 def test_voyages_of_another_ship_are_refused(sea, tmp_path):
@@ -285,7 +285,7 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
     """Worse than keeping all velocities, with what was named in it too."""
     held = sea.done.held
     assert held.lost(sea.done.verdict.gain) == ""
-    away = replace(sea.done.verdict.gain, after=1e8)  # with what is named in it, it runs away
+    away = replace(sea.done.verdict.gain, after=1e8)  # with what is named in it, it diverges
     assert held.lost(away) == ""
     theta = held.before.theta.copy()
     theta[
@@ -406,7 +406,7 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
 
 
 def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
-    """By as much as the unrest and it together may push, twice."""
+    """By as much as the process noise and it together may push, twice."""
     ref, pulse = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
     plain, pulsed = ref.held(1.5), ref.held(1.5, pulse)
     assert pulsed.push**2 == pytest.approx(plain.push**2 + (2.0 * pulse) ** 2)
@@ -661,7 +661,7 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
 
 
 def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
-    """Three halvings at most; then it has no evidence. A path of kilometres ran away, too."""
+    """Three halvings at most; then it has no evidence. A path of kilometres diverged, too."""
     trial, decision = still
     at, path = trial.at, decision.first.path
     away = []

@@ -1,4 +1,4 @@
-"""What the blind test runs: other families, rivals beside, replays, one commit a table;
+"""What the blind test runs: other families, rivals, replays, one commit a table;
 with a simulator and a program that do nothing."""
 
 import hashlib
@@ -204,7 +204,7 @@ def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeyp
 
 
 def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, monkeypatch):
-    """Two kept cases in which nothing was hidden; without the placebo a name would be said."""
+    """Two kept cases in which nothing was hidden; without the placebo a name would be reported."""
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(keep=True))
     asked = []

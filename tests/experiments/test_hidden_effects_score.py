@@ -34,10 +34,10 @@ ROOT = Path(__file__).parents[2]
 def hidden(**causes):
     """A key: name → (size, parameters); `family` for what is outside."""
     family = causes.pop("family", None)
-    said = [{"name": n, "size": s, "parameters": given(**p)} for n, (s, p) in causes.items()]
-    verdict = "unknown" if family else "named" if said else "none"
+    reported = [{"name": n, "size": s, "parameters": given(**p)} for n, (s, p) in causes.items()]
+    verdict = "unknown" if family else "named" if reported else "none"
     structure = {"family": family} if family else None
-    return {"contract": 1, "verdict": verdict, "causes": said, "structure": structure}
+    return {"contract": 1, "verdict": verdict, "causes": reported, "structure": structure}
 
 
 def given(**parameters):
@@ -135,7 +135,7 @@ def test_the_goals_table_counts_by_hand():
 
 
 def test_a_network_that_learned_the_trial_has_goals_of_its_own():
-    """A current it cannot take in, thrust it can: naming that is wrong, silence is right."""
+    """A current it cannot absorb, thrust it can: naming that is wrong, silence is right."""
 
     def learned(key, verdict):
         planned = Planned("1", 1, None, 1.0, 7000, "feedforward")
@@ -201,20 +201,20 @@ def test_the_truth_in_the_catalogues_own_numbers():
 def test_a_current_is_compared_as_a_vector_across_north():
     """0.1 m/s towards 359 and 1 deg: 2 · 0.1 · sin 1° apart."""
     truth = given(speed=(0.1, "m/s"), direction=(359.0, "deg"))
-    said = given(speed=(0.1, "m/s", 0.09, 0.11), direction=(1.0, "deg", -2.0, 4.0))
-    one = compare("current", truth, said)
+    reported = given(speed=(0.1, "m/s", 0.09, 0.11), direction=(1.0, "deg", -2.0, 4.0))
+    one = compare("current", truth, reported)
     assert one.error == pytest.approx(2.0 * math.sin(math.radians(1.0)))
     assert one.covered == (True, True)
     for low, high in ((358.0, 362.0), (-2.0, 0.0), (718.0, 724.0)):
-        near = said | given(direction=(1.0, "deg", low, high))
+        near = reported | given(direction=(1.0, "deg", low, high))
         assert compare("current", truth, near).covered == (True, True)
     for low, high in ((0.0, 2.0), (360.0, 362.0)):
-        off = said | given(direction=(1.0, "deg", low, high))
+        off = reported | given(direction=(1.0, "deg", low, high))
         assert compare("current", truth, off).covered == (True, False)
 
 
 @pytest.mark.parametrize(
-    ("name", "truth", "said", "error"),
+    ("name", "truth", "reported", "error"),
     [
         ("heading_offset", {"angle": (-4.0, "deg")}, {"angle": (355.0, "deg")}, 0.25),
         ("wind_direction_offset", {"angle": (20.0, "deg")}, {"angle": (21.0, "deg")}, 0.05),
@@ -252,16 +252,16 @@ def test_a_current_is_compared_as_a_vector_across_north():
         ("side_thrust", {"force": (4.0, "N")}, {}, None),
     ],
 )  # fmt: skip
-def test_errors_are_relative_to_what_was_added(name, truth, said, error):
-    found = compare(name, given(**truth), given(**said)).error
+def test_errors_are_relative_to_what_was_added(name, truth, reported, error):
+    found = compare(name, given(**truth), given(**reported)).error
     assert found is None if error is None else found == pytest.approx(error)
 
 
 def test_a_channel_may_be_bare_and_the_wrong_one_covers_nothing():
     truth = given(time=(0.5, "s"), channel=("gnss", ""))
-    said = given(time=(0.5, "s", 0.4, 0.6))
-    assert compare("clock_offset", truth, said | {"channel": "gnss"}).covered == (True,)
-    assert compare("clock_offset", truth, said | {"channel": "wind"}).covered == (False,)
+    reported = given(time=(0.5, "s", 0.4, 0.6))
+    assert compare("clock_offset", truth, reported | {"channel": "gnss"}).covered == (True,)
+    assert compare("clock_offset", truth, reported | {"channel": "wind"}).covered == (False,)
 
 
 def test_medians_and_coverage_are_of_named_causes_by_group():
@@ -294,8 +294,8 @@ def test_medians_and_coverage_are_of_named_causes_by_group():
 
 def test_calibration_of_ten_bins_by_hand():
     """|0.95 - 1/2| weighs 2 of 4, |0.6 - 1| and |0.05 - 0| weigh 1 of 4 each."""
-    said = [(0.95, True), (0.95, False), (0.6, True), (0.05, False)]
-    assert calibration(said) == pytest.approx(0.5 * 0.45 + 0.25 * 0.4 + 0.25 * 0.05)
+    reported = [(0.95, True), (0.95, False), (0.6, True), (0.05, False)]
+    assert calibration(reported) == pytest.approx(0.5 * 0.45 + 0.25 * 0.4 + 0.25 * 0.05)
     assert calibration([(1.0, True)]) == 0.0
 
 
@@ -439,8 +439,8 @@ import json, os, pathlib, sys
 command, first, *options = sys.argv[1:]
 given = {k: v for k, v in zip(options, options[1:])}
 assert os.environ["OMP_NUM_THREADS"] == "1"
-with open(os.environ["SAID"], "a") as said:
-    print(command, "keys" in " ".join(sys.argv), file=said)
+with open(os.environ["SAID"], "a") as reported:
+    print(command, "keys" in " ".join(sys.argv), file=reported)
 print("words on stderr", file=sys.stderr)
 if command == "ingest":
     found = sorted(p.name for p in pathlib.Path(first).iterdir())
@@ -520,7 +520,7 @@ def test_a_diagnosis_that_breaks_is_a_wrong_answer_and_is_tried_again(
 
 
 def test_one_wrong_name_is_too_many(tmp_path, stubs, capsys):
-    """However many are right beside it."""
+    """However many are right next to it."""
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
     key = out / "keys" / "6.json"
@@ -532,8 +532,8 @@ def test_one_wrong_name_is_too_many(tmp_path, stubs, capsys):
 def test_a_ship_is_trained_once_where_that_is_asked_for(tmp_path, stubs):
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("goals", 5, 1)), stubs(share=True, keep=True))
-    said = commands_said(tmp_path)
-    assert (said.count("train"), said.count("diagnose")) == (1, 6)
+    reported = commands_said(tmp_path)
+    assert (reported.count("train"), reported.count("diagnose")) == (1, 6)
     assert (out / "cases" / "5-1" / "logs" / "trial_1.mcap").exists()
 
 

@@ -158,8 +158,8 @@ def test_every_force_changes_the_path_and_no_instrument_does(name):
     """On the first family that offers it, in the same gusts under the same wheel."""
     ship = next(s for s in map(ship_of, OWN) if name in effects.offered(s))
     sized = effects.CATALOGUE.get(name) or effects.OUTSIDE[name][1]
-    changes, said = sized(np.random.default_rng(1), 1.0, ship)
-    assert all(set(value) == {"value", "unit"} for value in said.values())
+    changes, reported = sized(np.random.default_rng(1), 1.0, ship)
+    assert all(set(value) == {"value", "unit"} for value in reported.values())
     order = ship.mixer(0.7, 0.6, 0.3)
     paths = [
         sail(ship, 60.0 * ship.time_unit, seed=1, wind=BREEZE, effects=e, helm=lambda *_: order)

@@ -44,7 +44,7 @@ NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
     ],
 )
 def test_the_first_is_the_answer_or_none(scores, wanted, answer):
-    one = rivals.said(scores, wanted)
+    one = rivals.reported(scores, wanted)
     assert one.answer == answer
     assert list(one.scores.values()) == sorted(scores.values(), reverse=True)
 
@@ -65,11 +65,13 @@ def regressed(size: float, noise: float = 1.0, seed: int = 0):
 def test_what_was_added_is_found_and_nothing_is_not():
     """RSS falls from n (1 + 2 · 0.5²) to n: ½ n log 1.5 of BIC, give or take noise."""
     found = regressed(0.5)
-    assert rivals.said(found).answer == "right"
+    assert rivals.reported(found).answer == "right"
     wanted = 0.5 * (1200 * math.log(1.5) - 2 * math.log(1200))
     assert found["right"] == pytest.approx(wanted, rel=0.15)
     assert found["unseen"] == pytest.approx(-math.log(1200))  # ½ k log n with k = 2
-    alarms = sum(rivals.said(regressed(0.0, seed=seed)).answer is not None for seed in range(40))
+    alarms = sum(
+        rivals.reported(regressed(0.0, seed=seed)).answer is not None for seed in range(40)
+    )
     assert alarms <= 3  # P(χ²₁ > log 1200) = 0.8 % for one number, less for more: 0.35 expected
 
 
@@ -246,10 +248,13 @@ def test_rivals_count_only_as_they_were_sealed(tmp_path):
 # --- the table ------------------------------------------------------------------------------------
 
 
-def answer(hidden, said, size=1.0, seconds=7000, rivals=None, steps=()):
+def answer(hidden, reported, size=1.0, seconds=7000, rivals=None, steps=()):
     causes = [{"name": hidden, "size": size, "parameters": {}}] if hidden else []
     key = {"verdict": "named" if hidden else "none", "causes": causes, "structure": None}
-    verdict = {"verdict": "named" if said else "none", "causes": [{"name": n} for n in said]}
+    verdict = {
+        "verdict": "named" if reported else "none",
+        "causes": [{"name": n} for n in reported],
+    }
     return Answer(Planned("1", 1, None, None, seconds), verdict, key, list(steps), rivals or {})
 
 

@@ -657,11 +657,11 @@ def test_the_sample_logs_are_small_and_complete():
 def test_the_samples_hide_two_things_nothing_and_something_outside_the_catalogue():
     folder = Path(simulated_ship.__file__).parents[3] / "sample_logs"
     key = json.loads((folder / "answers" / "key.json").read_text("utf-8"))
-    said = {voyage: [cause["name"] for cause in causes] for voyage, causes in key.items()}
+    reported = {voyage: [cause["name"] for cause in causes] for voyage, causes in key.items()}
     wanted = {2: ["current", "clock_offset"], 3: [], 4: ["tether"]}
-    assert said == {f"season{s}_{k}": names for s, names in wanted.items() for k in (1, 2)}
+    assert reported == {f"season{s}_{k}": names for s, names in wanted.items() for k in (1, 2)}
     listing = " ".join(p.name for p in folder.iterdir()) + (folder / "README.md").read_text("utf-8")
-    assert not [word for names in said.values() for word in names if word in listing]
+    assert not [word for names in reported.values() for word in names if word in listing]
 
 
 # --- blind cases --------------------------------------------------------------------------------
@@ -717,8 +717,8 @@ def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
     full, half = (cases.draw(12, cause=name, size=size) for size in (1.0, 0.5))
     none = cases.draw(12, cause="none")
     assert [c.name for c in full.causes] == [name] and none.causes == ()
-    said = full.causes[0].parameters
-    assert {p: said[p]["unit"] for p in SAID.get(name, {})} == SAID.get(name, {})
+    reported = full.causes[0].parameters
+    assert {p: reported[p]["unit"] for p in SAID.get(name, {})} == SAID.get(name, {})
     assert full.verdict == ("named" if name in cases.CATALOGUE else "unknown")
     assert (full.ship, full.laws, full.nominal, full.trial, full.ordinary) == (
         half.ship, half.laws, half.nominal, half.trial, half.ordinary
@@ -738,7 +738,7 @@ def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
 
 
 def test_the_sizes_are_those_of_the_table():
-    def said(name, seed):
+    def reported(name, seed):
         parameters = cases.draw(seed, cause=name, size=1.0).causes[0].parameters
         return [value["value"] for value in parameters.values()]
 
@@ -752,10 +752,10 @@ def test_the_sizes_are_those_of_the_table():
     }  # fmt: skip
     for name, ranges in table.items():
         for seed in range(20):
-            values = np.abs(said(name, seed)[: len(ranges)])
+            values = np.abs(reported(name, seed)[: len(ranges)])
             assert all(lo <= x <= hi for x, (lo, hi) in zip(values, ranges, strict=True)), name
-    either = {math.copysign(1, said("heading_offset", seed)[0]) for seed in range(20)}
-    alone = {(p == 0, s == 0) for p, s in (said("rudder_offset", seed) for seed in range(40))}
+    either = {math.copysign(1, reported("heading_offset", seed)[0]) for seed in range(20)}
+    alone = {(p == 0, s == 0) for p, s in (reported("rudder_offset", seed) for seed in range(40))}
     assert either == {-1, 1} and alone == {(True, False), (False, True), (False, False)}
 
 

@@ -106,7 +106,7 @@ def test_each_term_grows_over_a_shoal_by_its_own_share_and_power():
     assert grown(0, 0.4, 0.0, 0.0) == pytest.approx(more("resistance"))
     assert grown(1, 0.0, 0.2, 0.0) == pytest.approx(more("cross_flow"))
     q = 0.5 * 998.0 * ship.length * ship.draught
-    tiny = 1e-7  # m/s: cross-flow drag, of its square, is nothing beside the linear terms
+    tiny = 1e-7  # m/s: cross-flow drag, of its square, is nothing next to the linear terms
     _, y, n = physics.hull(c, h, 0.4, tiny, 0.0, 0.25)
     assert y == pytest.approx(q * ship.sway_damping * more("sway_damping") * 0.4 * tiny, rel=1e-5)
     drift = q * ship.length * ship.yaw_drift * more("yaw_drift") * 0.4 * tiny
@@ -407,8 +407,8 @@ def test_a_prior_is_not_the_middle_of_what_is_hidden(name):
     rng, hide = np.random.default_rng(0), cases.CATALOGUE[name]
     sizes = []
     for _ in range(4000):
-        said = {k: v["value"] for k, v in hide(rng, 1.0)[1].items()}
-        sizes.append(abs(PRIORS[name](said)))
+        reported = {k: v["value"] for k, v in hide(rng, 1.0)[1].items()}
+        sizes.append(abs(PRIORS[name](reported)))
     cause = next(one for one in CATALOGUE if one.name == name)
     prior = cause.on(_setting()).sizes(_setting())[0]
     assert not 0.45 < np.mean(np.array(sizes) < prior) < 0.55

@@ -35,8 +35,8 @@ def lags(width: float) -> list[float]:
     for z in ndtri((np.arange(1000) + 0.5) / 1000):
         truth = {"time": {"value": 2.0 + 0.1 * z, "unit": "s"}}
         half = width * 1.6448536 * 0.1
-        said = {"time": {"value": 2.0, "unit": "s", "low": 2.0 - half, "high": 2.0 + half}}
-        found += compare("rudder_lag", truth, said).standings
+        reported = {"time": {"value": 2.0, "unit": "s", "low": 2.0 - half, "high": 2.0 + half}}
+        found += compare("rudder_lag", truth, reported).standings
     return found
 
 
@@ -58,10 +58,10 @@ def test_narrow_intervals_make_a_valley():
 
 
 def test_two_sides_of_an_interval_are_two_gaussians():
-    said = {"value": 1.0, "low": 0.9, "high": 1.2, "unit": "1"}
+    reported = {"value": 1.0, "low": 0.9, "high": 1.2, "unit": "1"}
 
     def standing(true):
-        one = compare("fouling", {"factor": {"value": true, "unit": "1"}}, {"factor": said})
+        one = compare("fouling", {"factor": {"value": true, "unit": "1"}}, {"factor": reported})
         return one.standings[0], one.covered[0]
 
     assert standing(1.1) == (pytest.approx(0.5 * 1.64485, abs=1e-4), True)

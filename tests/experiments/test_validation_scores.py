@@ -123,7 +123,7 @@ def test_an_undecided_verdict_is_an_alarm_and_no_name():
         True
     ]
     assert not clean.right and not effect.right and not effect.named
-    assert effect.belief == (0.5, True) and "undecided current" in score_tables.said(effect)
+    assert effect.belief == (0.5, True) and "undecided current" in score_tables.reported(effect)
 
 
 # --- the goals' table -----------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_the_rows_of_the_goals_count_by_hand():
     assert found["outside, size 1: unknown or undecided, right family"] == pytest.approx(2 / 3)
     assert found["two at once, size 1: both, no third"] == 0.0
     assert found["traceback, or no verdict in time"] == pytest.approx(1 / 10)
-    # said with 0.9 and more: current and one of two (right), fouling, and another family
+    # stated with 0.9 and more: current and one of two (right), fouling, and another family
     assert found[goals.CERTAIN] == pytest.approx(2 / 4)
     assert goals.cell([True, False]) == "50 % (1/2) [2.5, 97.5]"  # 1 - √0.95 = 2.5 %
 
@@ -185,7 +185,7 @@ def test_the_repair_utility_by_hand():
 
 def test_the_repair_utility_is_the_mean_over_all_orders_of_testing():
     """Components tested one after another until the last missed, and the last false, is found."""
-    everything, true, said = "abcde", {"a", "b"}, {"b", "c", "d"}
+    everything, true, reported = "abcde", {"a", "b"}, {"b", "c", "d"}
 
     def tests(wanted, pool):
         orders = [*itertools.permutations(sorted(pool))]
@@ -193,14 +193,14 @@ def test_the_repair_utility_is_the_mean_over_all_orders_of_testing():
             max((order.index(one) + 1 for one in wanted), default=0) for order in orders
         )
 
-    vain = tests(true - said, set(everything) - said) + tests(said - true, said)
-    assert scores.repair_utility(said, true, 5) == pytest.approx(1.0 - vain / 5.0)
+    vain = tests(true - reported, set(everything) - reported) + tests(reported - true, reported)
+    assert scores.repair_utility(reported, true, 5) == pytest.approx(1.0 - vain / 5.0)
 
 
 def test_the_group_score_is_the_mean_of_what_is_left_open():
     f = scores.COMPONENTS
     assert f == len(parameters.NAMES) + 1 == 22
-    wrong = 1.0 - (22 / 2 + 1) / f  # one missed of 21 not said, one false of one
+    wrong = 1.0 - (22 / 2 + 1) / f  # one missed of 21 not reported, one false of one
     silent = 1.0 - (23 / 2) / f
     expected = {
         (1.0 + wrong) / 2: (CURRENT, named("fouling", group=["current"])),
@@ -249,11 +249,11 @@ def test_the_log_score_by_hand_and_at_its_floor():
     for value, case in given.items():
         assert scores.log_score(answer(*case)) == pytest.approx(value)
     assert scores.log_score(answer(CURRENT, FAILED)) == math.log(0.01)
-    said = scores.prevalence(ANSWERS)
-    assert said == "nothing 2/10, one cause 4/10, two at once 1/10, outside 3/10"
+    reported = scores.prevalence(ANSWERS)
+    assert reported == "nothing 2/10, one cause 4/10, two at once 1/10, outside 3/10"
 
 
-# --- the methods beside ---------------------------------------------------------------------------
+# --- the other methods ---------------------------------------------------------------------------
 
 
 def test_scores_in_nats_become_probabilities_beside_none():
@@ -284,9 +284,9 @@ def test_null_and_random_need_no_run():
 
 def test_a_method_answers_the_cases_that_it_was_asked():
     broke = {"step": "rivals", "rc": 1, "commit": "a" * 40, "dirty": False}
-    said = {"regression": {"answer": None, "ranking": []}, "glr": {"answer": "current"}}
+    reported = {"regression": {"answer": None, "ranking": []}, "glr": {"answer": "current"}}
     given = [
-        answer(CURRENT, none(), rivals=said),
+        answer(CURRENT, none(), rivals=reported),
         replace(answer(CURRENT, none()), steps=[COMMIT, broke]),
         answer(CURRENT, none()),
     ]

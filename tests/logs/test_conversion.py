@@ -1,4 +1,4 @@
-"""Times in every form, tables in every cut, and what is said of what cannot be converted."""
+"""Times in every form, tables in every cut, and what is reported of what cannot be converted."""
 
 import logging
 import time
@@ -178,7 +178,8 @@ BURST = ["$GPGGA,101010.00,6326.4000,N,01025.2000,E,4,19,0.6,2.9,M,40.9,M,,",
 
 
 def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
-    """By hand: knots, minutes of arc, km/h; two headings are two topics; what is broken is said."""
+    """By hand: knots, minutes of arc, km/h; two headings are two topics; what is broken is
+    reported."""
     caplog.set_level(logging.INFO)
     lines = [*BURST, "$HEHDT,350.0,T*00", "!AIVDM,1,1,,A,13u?etPv2;0n:dDPwUM1U1Cb069D,0*24"]
     (tmp_path / "a.nmea").write_text("\n".join(lines))

@@ -45,14 +45,14 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     ref, doubled = first.content["runs"]["ref"], first.content["runs"]["d-ref"]
     assert ref["windows"] == doubled["windows"] == 12
     assert ref["voyages"]["voyage_6"]["coverage"] < 0.5
-    assert "never seen: wind" in first.text
+    assert "not in the training data: wind" in first.text
     json.dumps(first.content)
 
     trained = (
         (tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors").stat().st_mtime_ns
     )
     # a diagnosis is made again, for a minute, and what it says is tested elsewhere
-    said = SimpleNamespace(said="as before", as_json=dict)
+    said = SimpleNamespace(sentence="as before", as_json=dict)
     monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=said))
     again = demo.run_demo(tmp_path / "demo", logs)
     assert again.content["runs"] == first.content["runs"]

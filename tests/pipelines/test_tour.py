@@ -37,7 +37,7 @@ def test_its_results_are_frames_and_files(tour):
     found = cells["found"]
     assert isinstance(found.ranking, pl.DataFrame)
     assert found.ranking["probability"].sum() <= 1.0 + len(found.causes)
-    assert found.verdict.said in str(found) and str(found) == found._repr_markdown_()
+    assert found.verdict.sentence in str(found) and str(found) == found._repr_markdown_()
     assert (folder / found.report).read_text(encoding="utf-8").startswith("# Diagnosis")
 
 

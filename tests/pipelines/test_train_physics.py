@@ -80,7 +80,7 @@ def scored(run, store, to) -> dict:
 
 @pytest.fixture(scope="module")
 def published(store):
-    """Nothing fitted: run folder and what was said of it."""
+    """Nothing fitted: run folder and what was reported of it."""
     out = store.parent / "published"
     code, said, _ = train(store, out, "--model", "mmg", "--no-fit", *BOTH, *HULL)
     assert code == 0

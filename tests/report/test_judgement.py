@@ -57,9 +57,9 @@ def test_windows_that_ran_away_are_counted_and_left_out():
     loss = np.array([10.0] * 7 + [math.inf])
     found = judge("ref", errors(loss), {"hold": np.full(8, 20.0)}, 3.0, 100)
     assert found.lost == 1 and found.against[0].share == pytest.approx(0.5)
-    assert "Windows that ran away, in none of these figures: 1." in found.sentence
+    assert "Windows that diverged, in none of these figures: 1." in found.sentence
     every = judge("ref", errors([math.inf] * 3), {"hold": np.full(3, 20.0)}, 3.0, 100)
-    assert every.sentence == "ref, on 3 windows of 100 s: every one of them ran away."
+    assert every.sentence == "ref, on 3 windows of 100 s: every one of them diverged."
     baseline = np.array([math.inf] + [20.0] * 7)  # nor is a baseline's runaway a success
     found = judge("ref", errors([5.0] + [10.0] * 7), {"hold": baseline}, 3.0, 100)
     assert found.against[0].share == pytest.approx(0.5)

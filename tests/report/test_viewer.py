@@ -158,7 +158,7 @@ def test_windows_start_anew_and_keep_to_the_measured_turn(saved):
 
 
 def test_the_error_is_logarithmic_and_of_the_median_seed(saved, compared):
-    assert display.shown_seeds(compared) == {"network fast": 0, "mmg": 0}
+    assert display.drawn_seeds(compared) == {"network fast": 0, "mmg": 0}
     error = scalars(saved, "/error/harbour/simulated/mmg")
     assert error[99] == pytest.approx(math.log10(1.0 + 0.99**2))
     spread = column(saved, "/error/harbour/seeds/mmg", "Scalars:scalars")["Scalars:scalars"]

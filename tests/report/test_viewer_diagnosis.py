@@ -17,7 +17,7 @@ BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
 
 
 def straight(voyage, speed):
-    """North at a steady speed for 200 s; what is not said is zero."""
+    """North at a steady speed for 200 s; what is not reported is zero."""
     time = np.arange(0.0, 200.0)
     known = {"x0": speed * time, "surge": np.full(200, speed)}
     zero = {channel.name: np.zeros(200) for channel in STATE}

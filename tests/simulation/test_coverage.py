@@ -39,7 +39,7 @@ def test_a_wind_from_the_other_side_is_not_and_is_named(seen):
     assert row["outside_surge"] < 0.1
     sentence = coverage.reason(row, test)
     assert sentence in [
-        f"never seen: wind around 2.5 m/s from {a} deg (100%)" for a in (89, 90, 91)
+        f"not in the training data: wind around 2.5 m/s from {a} deg (100%)" for a in (89, 90, 91)
     ]
     assert "surge" not in sentence
 

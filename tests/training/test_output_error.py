@@ -249,7 +249,7 @@ def test_windows_of_no_weight_say_nothing(exact, blurred):
     assert left_out.noise == pytest.approx(alone.noise)
 
 
-# ---------------------------------------------------------------- what runs away
+# ---------------------------------------------------------------- what diverges
 
 
 @pytest.fixture(scope="module")
@@ -268,7 +268,7 @@ def test_a_start_that_runs_away_is_led_in_from_short_windows(growing):
 
 
 def test_a_start_that_runs_away_at_once_is_refused(growing):
-    with pytest.raises(ModelError, match="The starting values let 8 of 8 windows run away") as e:
+    with pytest.raises(ModelError, match="The starting values let 8 of 8 windows diverge") as e:
         identify(Growing(), np.array([1e200]), np.ones(1), growing)
     assert "--parameters" in e.value.hint
 
@@ -281,7 +281,7 @@ def test_a_window_of_no_weight_may_run_away(growing):
     done = identify(Growing(), np.array([0.015]), np.ones(1), data)
     assert done.values == pytest.approx([0.02], rel=1e-4)
     assert np.isfinite(done.covariance).all() and np.isfinite(done.loss).all()
-    with pytest.raises(ModelError, match="let 1 of 8 windows run away"):
+    with pytest.raises(ModelError, match="let 1 of 8 windows diverge"):
         identify(Growing(), np.array([0.015]), np.ones(1), data._replace(weight=np.ones(COUNT)))
 
 

@@ -157,7 +157,7 @@ def test_a_table_drafts_what_converts_it(tmp_path):
     channels = {name: (c.channel, c.unit) for name, c in profile.table.items()}
     assert channels["SOG [kn]"] == ("sog", "kn")
     assert channels["psi"] == ("heading", "deg")
-    # 0.02 rad/s turn the heading by the 1.146 deg of a second that stand beside it.
+    # 0.02 rad/s turn the heading by the 1.146 deg of a second that stand next to it.
     assert channels["yaw_rate"] == ("yaw_rate", "rad/s")
     assert [a.name for a in profile.actuators] == ["rudder", "pwm_1"]
     assert profile.actuators[1].scale() == [(1500.0, 1 / 400)]

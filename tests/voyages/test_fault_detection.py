@@ -76,7 +76,7 @@ def test_a_gap_that_the_ship_sailed_through_is_no_jump_but_a_clock_step_is():
 
 
 def test_long_lists_are_counted_not_cut():
-    findings = fault_detection.said(
+    findings = fault_detection.findings_of(
         "gap", "wind", [(float(i), i + 0.5) for i in range(30)], "is silent"
     )
     assert len(findings) == fault_detection.LISTED + 1

@@ -106,7 +106,7 @@ def test_a_dropout_is_a_gap_of_that_channel_with_its_times(voyage):
 
 
 def jittered(sigma, seconds=300.0):
-    """The circle with stamps beside the instants measured, by less than half a period."""
+    """The circle with stamps next to the instants measured, by less than half a period."""
     rng = np.random.default_rng(1)
     off = {t: sigma * rng.standard_normal(len(s.time)) for t, s in sailing.series(seconds).items()}
     return {

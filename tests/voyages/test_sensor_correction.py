@@ -1,4 +1,4 @@
-"""What is certain is put right by what was hidden, said, and undone by ingesting again."""
+"""What is certain is put right by what was hidden, reported, and undone by ingesting again."""
 
 import json
 from datetime import UTC, datetime

@@ -1,4 +1,4 @@
-"""Whole voyages apart: the user's split, the paper's, or a sensible one that is said."""
+"""Whole voyages apart: the user's split, the paper's, or a sensible one that is reported."""
 
 import pytest
 import sailing

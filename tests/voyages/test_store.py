@@ -185,7 +185,7 @@ def test_a_killed_replacement_never_loses_the_voyage(tmp_path, voyage, killed_at
         store.add(other)
     monkeypatch.undo()
     again = Store(store.path)
-    (entry,) = again.entries()  # whole, the one or the other, and what is said of it is true
+    (entry,) = again.entries()  # whole, the one or the other, and what is reported of it is true
     assert again.tables(["one"])[0].collect().height == entry.rows
     arm = again.profile(["one"]).sensors.position.lever_arm_m
     held = again.holds("one", other.contents.sha256, other.profile)

@@ -89,7 +89,7 @@ def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
 
 @pytest.mark.parametrize("empty", ["trial", "nominal campaign"])
 def test_without_a_row_there_is_no_speed_to_scale_by(empty):
-    """The campaigns stay as they are; that they are too short for a verdict is said later."""
+    """The campaigns stay as they are; that they are too short for a verdict is reported later."""
     none = replace(SEEN, state=SEEN.state[:0], voyage=SEEN.voyage[:0], time=SEEN.time[:0])
     nominal, recorded = (SEEN, none) if empty == "trial" else (none, SEEN)
     given = trial_voyages.in_ship_time(None, nominal, recorded)

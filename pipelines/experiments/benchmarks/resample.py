@@ -1,4 +1,4 @@
-"""10 Hz to 1 Hz: rows a second and peak memory, beside polars' `group_by_dynamic` as the peer.
+"""10 Hz to 1 Hz: rows a second and peak memory, next to polars' `group_by_dynamic` as the peer.
 
     python -m pipelines.experiments.benchmarks.resample [--rows 1e7 1e8] [--ray ADDRESS]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipelines.experiments.esso_osaka import TWIN, trials_store
 from pipelines.experiments.extrapolation import physics
-from pipelines.experiments.findings.said import diagnosed, variant
+from pipelines.experiments.findings.reported import diagnosed, variant
 from pipelines.identify import identify_run
 from pipelines.prepare import expand, ingest_logs
 from shiplog.report import tables
@@ -27,21 +27,21 @@ COLUMNS = {  # kind and channel of an estimate → its column
 def sensors(folder: Path, out: Path) -> str:
     """A row a voyage: what its instruments say of each other, in brackets where it may be none."""
     store = trials_store(folder, out)
-    said = {name: _estimates(store, name) for name in trials(store)}
+    reported = {name: _estimates(store, name) for name in trials(store)}
     rows = [
-        (name, *(_cell(found.get(key)) for key in COLUMNS)) for name, found in said.items()
+        (name, *(_cell(found.get(key)) for key in COLUMNS)) for name, found in reported.items()
     ]  # fmt: skip
     lines = [tables.table(("voyage", *COLUMNS.values()), rows), ""]
     for key, column in COLUMNS.items():
         for kind in MANOEUVRES:
-            values = [f[key].value for n, f in said.items() if n.startswith(kind) and key in f]
+            values = [f[key].value for n, f in reported.items() if n.startswith(kind) and key in f]
             if values:
                 lines.append(
                     f"{column}, {kind}: {min(values):.3f} to {max(values):.3f} in {len(values)}"
                 )
     lines += [
         f"also {name}: {e.kind} of {e.channel} {_cell(e)} {e.unit}"
-        for name, found in said.items()
+        for name, found in reported.items()
         for key, e in found.items()
         if e.notable and key not in COLUMNS
     ]
@@ -59,7 +59,7 @@ def _estimates(store: Store, name: str) -> dict[tuple[str, str], Estimate]:
 
 
 def _cell(e: Estimate | None) -> str:
-    """Value and 90 % interval; in brackets where it is not said, since it may be none."""
+    """Value and 90 % interval; in brackets where it is not reported, since it may be none."""
     if e is None:
         return "-"
     digits = 2 if e.unit == "s" else 3
@@ -95,7 +95,7 @@ def wind(folder: Path, out: Path) -> str:
     if not calm.entries():
         path = variant("esso-osaka", out / "esso-calm.toml", _without_wind)
         ingest_logs(expand([out / "logs"]), str(path), calm)
-    said = []
+    reported = []
     for what, there in (("withheld", calm), ("offered", store)):
         run = out / f"no-wind-{what}"
         if not run.exists():
@@ -103,8 +103,8 @@ def wind(folder: Path, out: Path) -> str:
             config = Config.model_validate({"model": "mmg", "split": split(there), "physics": off})
             identify_run(config, there, run)
         names = trials(there, "random_*")
-        said.append(diagnosed(run, there, names, out / f"no-wind-random-{what}", what))
-    return "\n\n".join(said)
+        reported.append(diagnosed(run, there, names, out / f"no-wind-random-{what}", what))
+    return "\n\n".join(reported)
 
 
 def _without_wind(profile: dict) -> None:

@@ -1,7 +1,7 @@
 """Known faults, written into measured voyages.
 
 The ship and its model, the waves, the wind and the noise are not ours; one thing is changed in what
-two of its voyages recorded. Its model was learned from the others. What is written is worked out
+two of its voyages recorded. Its model was trained on the others. What is written is worked out
 here from the table alone, and shares nothing with the causes that are to find it.
 """
 
@@ -18,7 +18,7 @@ import polars as pl
 from pipelines.diagnose import diagnose_run
 from pipelines.experiments.esso_osaka import trials_store
 from pipelines.experiments.extrapolation import physics
-from pipelines.experiments.findings.said import parameters, unit
+from pipelines.experiments.findings.reported import parameters, unit
 from pipelines.prepare import expand, ingest_logs
 from shiplog.profile import Profile
 from shiplog.report import tables
@@ -87,7 +87,7 @@ def other_ship(folder: Path, out: Path) -> str:
 def _table(
     store: Store, logs: Sequence[Path], nominal: str, trial: Sequence[str], out: Path
 ) -> str:
-    """A row a fault and share: what was written, and what was said of it."""
+    """A row a fault and share: what was written, and what was reported of it."""
     of = {path.stem: path for path in logs}
     others = tuple(n for n in store.select([nominal]) if n not in trial and "+" not in n)
     run = physics(store, out / "base", Split(training=others, validation=()))
@@ -100,9 +100,9 @@ def _table(
             if not (folder / "verdict.json").exists():
                 names = [written(store, of[n], profile, label, write, share) for n in trial]
                 diagnose_run(run, store, names, folder)
-            said = json.loads((folder / "verdict.json").read_text("utf-8"))
-            rows.append((fault, size(share), *_said(said, fault)))
-    return tables.table(("written", "size", "said", "least that would be seen"), rows)
+            reported = json.loads((folder / "verdict.json").read_text("utf-8"))
+            rows.append((fault, size(share), *_reported(reported, fault)))
+    return tables.table(("written", "size", "reported", "smallest detectable size"), rows)
 
 
 def written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:
@@ -123,19 +123,19 @@ def written(store: Store, log: Path, profile: Profile, label: str, write, share:
     return name
 
 
-def _said(said: dict, fault: str) -> tuple[str, str]:
+def _reported(reported: dict, fault: str) -> tuple[str, str]:
     causes = [
         f"{c['name']} ({c['probability']:.2f}): {parameters(c['parameters'])}"
-        for c in said["causes"]
+        for c in reported["causes"]
     ]
     name, _, channel = fault.partition(", ")
     least = [
         ", ".join(f"{k} {p['value']:.2g} {unit(p)}".strip() for k, p in one["parameters"].items())
-        for one in said["limits"]
+        for one in reported["limits"]
         if one["name"] == name and one.get("channel", channel) == channel
     ]
-    structure = said.get("structure") or {}
-    word = f"{said['verdict']} {structure.get('family', '')}".strip()
+    structure = reported.get("structure") or {}
+    word = f"{reported['verdict']} {structure.get('family', '')}".strip()
     return "; ".join(causes) or word, "" if causes else "; ".join(least)
 
 

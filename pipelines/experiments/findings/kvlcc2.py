@@ -9,7 +9,7 @@ import polars as pl
 
 from pipelines.convert import convert
 from pipelines.evaluate import evaluate_runs
-from pipelines.experiments.findings.said import diagnosed
+from pipelines.experiments.findings.reported import diagnosed
 from pipelines.identify import identify_run
 from pipelines.prepare import expand, ingest_logs
 from shiplog import profile_file as profiles

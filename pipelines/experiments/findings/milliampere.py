@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from pipelines.convert import convert
 from pipelines.experiments.extrapolation import physics
-from pipelines.experiments.findings.said import diagnosed, variant
+from pipelines.experiments.findings.reported import diagnosed, variant
 from pipelines.prepare import ingest_logs
 from shiplog import frames
 from shiplog import profile_file as profiles

@@ -7,8 +7,8 @@ python -m pipelines.experiments.hidden_effects brief --out DIR
 python -m pipelines.experiments.hidden_effects nightly --out DIR [--count 200] [--first-seed 30000]
     the same with other seeds; shift the block monthly, and never tune on it
 python -m pipelines.experiments.hidden_effects network --out DIR [--count 15] [--first-seed 25000]
-    the paper's network, trained on the very voyages in question: what it cannot take in is to be
-    named, and what it has taken in never
+    the paper's network, trained on the very voyages in question: what it cannot absorb is to be
+    named, and what it has absorbed never
 python -m pipelines.experiments.hidden_effects goals --out DIR [--count 20] [--first-seed 20000]
     count cases for each row of the goals' table; multiples of 21 meet every cause equally often
 python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [--first-seed 70000]
@@ -129,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
             suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
     again = commands.add_parser("replay", help="kept cases, diagnosed again")
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
-    again.add_argument("--out", type=Path, help="another folder; beside DIR unless given")
+    again.add_argument("--out", type=Path, help="another folder; next to DIR unless given")
     _how(again)
     again.set_defaults(share=False, oracle=False)
     scored = commands.add_parser("score", help="the tables of what is there by now")
@@ -137,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
     page = commands.add_parser("scores", help="the validation page of all cases found")
     page.add_argument("out", type=Path, nargs="+", metavar="DIR")
     page.add_argument(
-        "--markdown", type=Path, metavar="PATH", help="write it there, its picture beside it"
+        "--markdown", type=Path, metavar="PATH", help="write it there, with its picture"
     )
     for one in (one for name, one in commands.choices.items() if name != "scores"):
         one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "

@@ -62,7 +62,8 @@ def outside_found(answer: Answer) -> bool:
 
 
 def outside_its_group(answer: Answer) -> bool:
-    """Something is named that is not there, and all that is there is in no group that is said."""
+    """Something is named that is not there, and all that is there is in no group that is
+    reported."""
     return answer.misnamed and not answer.found
 
 

@@ -22,8 +22,8 @@ def answers(given: Sequence[Answer]) -> dict[str, list[Answer]]:
     for one in given:
         found[PROGRAM].append(one)
         for rival, title in RIVALS.items():
-            if (said := _rival(one, rival)) is not None:
-                found[title].append(said)
+            if (reported := _rival(one, rival)) is not None:
+                found[title].append(reported)
         found[NULL].append(null(one))
         found[RANDOM].append(random(one))
     return {method: of for method, of in found.items() if of}

@@ -48,7 +48,7 @@ def true_cause(truth: Truth, setting: Setting) -> tuple[Cause, np.ndarray] | Non
 
 
 def numbers(cause: Cause, told: Mapping[str, float], setting: Setting) -> np.ndarray:
-    """[count] whose `shown` is what is told; what is not told is zero."""
+    """[count] whose `shown` equals the known values; every other number is zero."""
     size = cause.sizes(setting)
 
     def off(x: np.ndarray) -> np.ndarray:

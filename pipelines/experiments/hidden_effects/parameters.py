@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-Values = Mapping[str, Any]  # name → {"value", "unit"} and, as said, "low" and "high"
+Values = Mapping[str, Any]  # name → {"value", "unit"} and, as reported, "low" and "high"
 
 NAMES = (  # the contract's, section 6
     "current", "wind_force", "shallow_water", "bank",
@@ -33,7 +33,7 @@ FACTORS = (  # new over old: 1 is none, and the error is a share of what was add
     "wind_speed_scale",
 )  # fmt: skip
 BEARINGS = ("heading_offset", "wind_direction_offset")
-SURVIVE = (  # what a network that was trained on the affected voyages cannot take in
+SURVIVE = (  # what a network that was trained on the affected voyages cannot absorb
     "current", "rudder_delay", "clock_offset", "yaw_rate_bias", "thrust_drift", "shallow_water",
     "rudder_lag", "yaw_rate_scale", "bank",
 )  # fmt: skip
@@ -58,17 +58,17 @@ class Comparison:
     standings: tuple[float, ...] = ()
 
 
-def compare(name: str, truth: Values, said: Values) -> Comparison:
-    """The error is that of the vector: |said - true| over |true - none|. What a key says in words,
-    such as which unit has lost thrust, is no number and is left out."""
+def compare(name: str, truth: Values, reported: Values) -> Comparison:
+    """The error is that of the vector: |reported - true| over |true - none|. What a key says in
+    words, such as which unit has lost thrust, is no number and is left out."""
     truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
-    if not any(parameter in said for parameter in truth):
+    if not any(parameter in reported for parameter in truth):
         return Comparison(None, ())
     if name in OTHER_FORM:  # only what both of them have
-        truth = {parameter: value for parameter, value in truth.items() if parameter in said}
+        truth = {parameter: value for parameter, value in truth.items() if parameter in reported}
     none = 1.0 if name in FACTORS else 0.0
-    away, size = VECTORS.get(name, _plain)(truth, said, none)
-    intervals = list(_intervals(name, truth, said))
+    away, size = VECTORS.get(name, _plain)(truth, reported, none)
+    intervals = list(_intervals(name, truth, reported))
     return Comparison(
         away / size if size > 0.0 else None,
         tuple(within for within, _ in intervals),
@@ -76,16 +76,16 @@ def compare(name: str, truth: Values, said: Values) -> Comparison:
     )
 
 
-def _plain(truth: Values, said: Values, none: float) -> tuple[float, float]:
-    """A parameter that is not said is one that is not there."""
+def _plain(truth: Values, reported: Values, none: float) -> tuple[float, float]:
+    """A parameter that is not reported is one that is not there."""
     true = [(parameter, float(_value(truth, parameter, none))) for parameter in truth]
-    away = math.hypot(*(float(_value(said, p, none)) - v for p, v in true))
+    away = math.hypot(*(float(_value(reported, p, none)) - v for p, v in true))
     return away, math.hypot(*(v - none for _, v in true))
 
 
-def _current(truth: Values, said: Values, none: float) -> tuple[float, float]:
+def _current(truth: Values, reported: Values, none: float) -> tuple[float, float]:
     true, found = (
-        _turned(_value(p, "speed", 0.0), _value(p, "direction", 0.0)) for p in (truth, said)
+        _turned(_value(p, "speed", 0.0), _value(p, "direction", 0.0)) for p in (truth, reported)
     )
     return abs(found - true), abs(true)
 
@@ -94,26 +94,28 @@ def _turned(length: float, degrees: float) -> complex:
     return length * complex(math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
 
 
-def _bearing(truth: Values, said: Values, none: float) -> tuple[float, float]:
+def _bearing(truth: Values, reported: Values, none: float) -> tuple[float, float]:
     true = _value(truth, "angle", 0.0)
-    return abs(_wrapped(_value(said, "angle", 0.0) - true)), abs(_wrapped(true))
+    return abs(_wrapped(_value(reported, "angle", 0.0) - true)), abs(_wrapped(true))
 
 
 def _wrapped(degrees: float) -> float:
     return (degrees + 180.0) % 360.0 - 180.0
 
 
-def _payload(truth: Values, said: Values, none: float) -> tuple[float, float]:
-    """kg and kg m over a lever of 1 m, the largest there is: beside 30 kg, 1 m would not count."""
+def _payload(truth: Values, reported: Values, none: float) -> tuple[float, float]:
+    """kg and kg m over a lever of 1 m, the largest there is: next to 30 kg, 1 m would not count."""
     (mass, moment), (found, turning) = (
-        (m, m * _value(p, "position", 0.0)) for p in (truth, said) for m in [_value(p, "mass", 0.0)]
+        (m, m * _value(p, "position", 0.0))
+        for p in (truth, reported)
+        for m in [_value(p, "mass", 0.0)]
     )
     return math.hypot(found - mass, turning - moment), math.hypot(mass, moment)
 
 
-def _clock(truth: Values, said: Values, none: float) -> tuple[float, float]:
+def _clock(truth: Values, reported: Values, none: float) -> tuple[float, float]:
     """One number a channel: the right time on the wrong channel is wrong."""
-    true, found = _late(truth, truth), _late(said, truth)
+    true, found = _late(truth, truth), _late(reported, truth)
     away = [found.get(c, 0.0) - true.get(c, 0.0) for c in true.keys() | found.keys()]
     return math.hypot(*away), math.hypot(*true.values())
 
@@ -133,23 +135,23 @@ VECTORS: dict[str, Callable[[Values, Values, float], tuple[float, float]]] = {
 }  # fmt: skip
 
 
-def _intervals(name: str, truth: Values, said: Values) -> Iterator[tuple[bool, float]]:
-    """For every parameter of the key that is said with an interval: whether the truth lies within,
-    and where it stands."""
+def _intervals(name: str, truth: Values, reported: Values) -> Iterator[tuple[bool, float]]:
+    """For every parameter of the key that is reported with an interval: whether the truth lies
+    within, and where it stands."""
     for parameter, one in truth.items():
-        interval = said.get(parameter)
+        interval = reported.get(parameter)
         if not isinstance(interval, Mapping) or parameter == "channel":
             continue
         low, high, true = interval.get("low"), interval.get("high"), one["value"]
         if low is None or high is None:
             continue
-        value = _value(said, parameter, 0.5 * (low + high))
+        value = _value(reported, parameter, 0.5 * (low + high))
         # 359 to 361 deg contains 0, 360 and 1
         above = (true - low) % 360.0 if one["unit"] == "deg" else true - low
         within = 0.0 <= above <= high - low
         away = _wrapped(true - value) if one["unit"] == "deg" else true - value
         standing = _standing(away, value - low, high - value)
-        if name == "clock_offset" and _channels(said, truth) != _channels(truth, truth):
+        if name == "clock_offset" and _channels(reported, truth) != _channels(truth, truth):
             within, standing = False, math.inf
         yield bool(within), standing
 

@@ -1,4 +1,4 @@
-"""Where the truth stands within the intervals that are said: rank histograms, and coverage at
+"""Where the truth stands within the intervals that are reported: rank histograms, and coverage at
 several levels.
 
 An interval is taken as the 90 % interval of a Gaussian on each side of its value. A verdict may
@@ -49,7 +49,7 @@ def uniform(counts: np.ndarray) -> float:
 
 
 def within(standing: Sequence[float], level: float) -> list[bool]:
-    """For every interval, whether it would hold the truth if it were said for this level."""
+    """For every interval, whether it would hold the truth if it were reported for this level."""
     reach = float(ndtri(0.5 * (1.0 + level))) + 1e-9  # a truth on the edge is within
     return [abs(z) <= reach for z in standing]
 

@@ -1,4 +1,4 @@
-"""The reliability diagram: how often an answer said with a probability is right.
+"""The reliability diagram: how often an answer stated with a probability is right.
 
 Murphy & Winkler 1977. Drawn as SVG, which a browser and a repository's page show as it is.
 """
@@ -18,7 +18,7 @@ SIDE, MARGIN, GAP = 240, 50, 40  # px of a panel, around it, and between two
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """Answers said with nearly the same probability."""
+    """Answers stated with nearly the same probability."""
 
     low: float
     high: float

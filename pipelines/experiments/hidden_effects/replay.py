@@ -24,7 +24,7 @@ MADE = ("logs", "ingest", "train")  # steps of the first run that a replay stand
 
 
 def folder_of(source: Path) -> Path:
-    """Where a replay of `source` goes unless told otherwise: beside it, named after the commit."""
+    """Where a replay of `source` goes unless told otherwise: next to it, named after the commit."""
     return source.with_name(f"{source.name}-{name(identity()).replace(' ', '-')}")
 
 
@@ -58,11 +58,11 @@ def _left(out: Path, planned: Planned, settings: Settings) -> bool:
 
 
 def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What was said, for the log; None where somebody stopped it."""
+    """What was reported, for the log; None where somebody stopped it."""
     first = plans.case_folder(source, planned).resolve()
     folder = plans.case_folder(out, planned).resolve()
     store, base = first / "store", run.base_of(source, planned)
-    said = []
+    reported = []
     if not run.finished(folder):
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
@@ -71,12 +71,12 @@ def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str 
             return None
         steps = json.loads((first / "steps.json").read_text(encoding="utf-8"))
         made = [one for one in steps if one["step"] in MADE]
-        said.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")
+        reported.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")
     if settings.rivals and not (folder / "rivals.sha256").exists():
-        said.append(run.ask_rivals(folder, base, store, settings))
-    if None in said:
+        reported.append(run.ask_rivals(folder, base, store, settings))
+    if None in reported:
         return None
     if not settings.keep:
         shutil.rmtree(folder / "d", ignore_errors=True)
     shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
-    return "; ".join(said)
+    return "; ".join(reported)

@@ -49,7 +49,7 @@ ROUNDS = 6  # of learning the white noise
 
 
 @dataclass(frozen=True)
-class Said:
+class Ranked:
     """One method's answer, and its scores of all causes [nats above none], best first."""
 
     answer: str | None
@@ -60,25 +60,25 @@ class Said:
         return {"answer": self.answer, "ranking": ranking}
 
 
-def said(scores: Mapping[str, float], wanted: Mapping[str, float] | float = 0.0) -> Said:
+def reported(scores: Mapping[str, float], wanted: Mapping[str, float] | float = 0.0) -> Ranked:
     """The first cause, where its score exceeds what is wanted of it."""
     order = dict(sorted(scores.items(), key=lambda pair: -pair[1]))
     first = next(iter(order), None)
     if first is None:
-        return Said(None, order)
+        return Ranked(None, order)
     least = wanted[first] if isinstance(wanted, Mapping) else wanted
-    return Said(first if order[first] > least else None, order)
+    return Ranked(first if order[first] > least else None, order)
 
 
-def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, Said]:
+def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, Ranked]:
     """Of every method. Raises ShiplogError."""
     run = load_model.load(run_path)
     names = store.select(list(voyages))
     trained = [*run.config.split.training, *run.config.split.validation]
     if set(names) & set(trained):
         raise RunError(
-            f"{run.name} was made on {', '.join(sorted(set(names) & set(trained)))}.",
-            hint="compare the methods on voyages that no fit has seen.",
+            f"{run.name} was trained on {', '.join(sorted(set(names) & set(trained)))}.",
+            hint="compare the methods on voyages that no fit has used.",
         )
     profile = store.profile(names)
     usual, recorded = (
@@ -98,8 +98,8 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, S
 # --- regression of accelerations ------------------------------------------------------------------
 
 
-def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Said:
-    """Coefficients stay as they were fitted; noise is as large as it was on the usual voyages."""
+def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Ranked:
+    """Coefficients stay as they were fitted; noise is as large as it was on the nominal voyages."""
     ref = trial.reference
     columns, model = ref.columns, ref.model
     theta = np.concatenate((fitted, np.zeros(columns.linearised - columns.base)))
@@ -123,7 +123,7 @@ def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Said:
             )
             own.append((low - high)[used] / (2.0 * step))  # what is left falls as it explains
         by[cause.label] = np.stack(own, -1)
-    return said(bic(beyond(model, theta, y, driven)[used], by, sd))
+    return reported(bic(beyond(model, theta, y, driven)[used], by, sd))
 
 
 def _with(theta: np.ndarray, at: int, value: float) -> np.ndarray:
@@ -183,7 +183,7 @@ def bic(rest: np.ndarray, columns: Mapping[str, np.ndarray], sd: np.ndarray) -> 
 
 @dataclass(frozen=True)
 class White:
-    """What the usual voyages say where nothing but white noise is unexplained: its size [6], and
+    """What the nominal voyages say where nothing but white noise is unexplained: its size [6], and
     of the coefficients [P] information and pull, in units."""
 
     noise: np.ndarray
@@ -191,8 +191,9 @@ class White:
     pull: np.ndarray
 
 
-def likelihood_ratio(trial: TrialEvidence, point: Point) -> Said:
-    """Coefficients after the usual voyages, all of which count (κ = 1); BIC's price for numbers."""
+def likelihood_ratio(trial: TrialEvidence, point: Point) -> Ranked:
+    """Coefficients after the nominal voyages, all of which count (κ = 1); BIC's price for
+    numbers."""
     ref = trial.reference
     assert ref.nominal is not None
     before = learnt(ref.nominal, ref.columns, ref.wide.start, ref.wide.noise)
@@ -204,11 +205,11 @@ def likelihood_ratio(trial: TrialEvidence, point: Point) -> Said:
     price = {label: 0.5 * len(at) * math.log(count) for label, at in tried.items()}
     share = (1.0 - SURE) / max(len(tried), 1)  # Bonferroni
     wanted = {n: 0.5 * float(chdtri(len(at), share)) - price[n] for n, at in tried.items()}
-    return said({label: 0.5 * found[label] - price[label] for label in tried}, wanted)
+    return reported({label: 0.5 * found[label] - price[label] for label in tried}, wanted)
 
 
 def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarray) -> White:
-    """Noise and coefficients of the usual voyages together, by turns."""
+    """Noise and coefficients of the nominal voyages together, by turns."""
     alone = _white(linear)
     base, unit = columns.base, columns.unit
     numbers = np.zeros(len(unit))
@@ -249,7 +250,7 @@ def _quiet(noise: np.ndarray, start: np.ndarray) -> Unrest:
 def ratios(
     total: np.ndarray, known: np.ndarray, pull: np.ndarray, tried: Mapping[str, np.ndarray]
 ) -> dict[str, float]:
-    """2 log Λ of each cause: by how much its numbers, free, lower χ² beside coefficients [P]
+    """2 log Λ of each cause: by how much its numbers, free, lower χ² together with coefficients [P]
     held by `known` and `pull`."""
     base = slice(1, 1 + len(pull))
     inverse = np.linalg.inv(total[base, base] + known)
@@ -267,10 +268,10 @@ def ratios(
 # --- our evidence, linearised once ----------------------------------------------------------------
 
 
-def linear(trial: TrialEvidence, point: Point) -> Said:
+def linear(trial: TrialEvidence, point: Point) -> Ranked:
     causes = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
     _, found = trial.scan(point, causes, trial.fixed)
-    return said({one.name: one.evidence for one in found}, SHOWS_NATS)
+    return reported({one.name: one.evidence for one in found}, SHOWS_NATS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -279,7 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("base", type=Path, help="a run made on the usual voyages")
+    parser.add_argument("base", type=Path, help="a run trained on the nominal voyages")
     parser.add_argument("--store", type=Path, required=True)
     parser.add_argument("--voyages", nargs="+", default=["trial_*"], help="of the trial")
     parser.add_argument("--json", type=Path, required=True, help="the file for the answers")

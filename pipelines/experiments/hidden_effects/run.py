@@ -84,19 +84,19 @@ def run(out: Path, plan: Plan, settings: Settings) -> None:
 def in_turn(
     groups: Sequence[Sequence[Planned]], case: Callable[[Planned], str | None], jobs: int
 ) -> None:
-    """`case` on all: groups beside each other, the cases of one group one after another, since they
-    may share a base. Raises KeyboardInterrupt where a case was stopped (`case` gives None)."""
+    """`case` on all: groups next to each other, the cases of one group one after another, since
+    they may share a base. Raises KeyboardInterrupt where a case was stopped (`case` gives None)."""
     stop = threading.Event()
 
     def group(cases: Sequence[Planned]) -> None:
         for planned in cases:
             if stop.is_set():
                 return
-            said = case(planned)
-            if said is None:
+            reported = case(planned)
+            if reported is None:
                 stop.set()
             else:
-                log.info("%s: %s", planned.label, said)
+                log.info("%s: %s", planned.label, reported)
 
     with ThreadPoolExecutor(jobs) as pool:
         try:
@@ -119,7 +119,7 @@ def finished(folder: Path) -> bool:
 
 
 def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What was said, for the log; None where somebody stopped it, and nothing is sealed."""
+    """What was reported, for the log; None where somebody stopped it, and nothing is sealed."""
     folder = plans.case_folder(out, planned).resolve()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -151,7 +151,7 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
             break
         if name == "train" and settings.share:
             _mark(base, logs)
-    said = seal(folder, steps)
+    reported = seal(folder, steps)
     compared = None
     if steps[-1]["step"] == "diagnose" and settings.rivals:  # where it failed they may not
         compared = ask_rivals(folder, base_of(out, planned), store, settings)
@@ -162,8 +162,8 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
     if not settings.keep:
         for name in LARGE:
             shutil.rmtree(folder / name, ignore_errors=True)
-    said = f"{said} after {sum(done['wall_s'] for done in steps):.0f} s"
-    return f"{said}; {compared}" if compared else said
+    reported = f"{reported} after {sum(done['wall_s'] for done in steps):.0f} s"
+    return f"{reported}; {compared}" if compared else reported
 
 
 def diagnosing(settings: Settings, base: Path, store: Path, folder: Path) -> list[str]:
@@ -260,7 +260,7 @@ def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> d
         finally:
             timer.cancel()
     child.returncode = os.waitstatus_to_exitcode(status)
-    said = path.read_text(encoding="utf-8", errors="replace")
+    reported = path.read_text(encoding="utf-8", errors="replace")
     path.unlink()
     unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kB elsewhere
     return {
@@ -269,7 +269,7 @@ def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> d
         "wall_s": round(time.perf_counter() - began, 3),
         "cpu_s": round(used.ru_utime + used.ru_stime, 3),
         "peak_mb": round(used.ru_maxrss * unit / 1e6, 1),  # not below this process's own
-        "stderr": said[-TAIL:],
+        "stderr": reported[-TAIL:],
     }
 
 
@@ -288,7 +288,7 @@ def _mark(base: Path, logs: Path) -> None:
 
 
 def _trained_on(base: Path) -> Path:
-    return base.with_name(f"{base.name}.trained_on.json")  # beside: the run folder is shiplog's
+    return base.with_name(f"{base.name}.trained_on.json")  # next to: the run folder is shiplog's
 
 
 def _nominal(logs: Path) -> dict[str, str]:
@@ -316,7 +316,7 @@ def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:
 
 
 def _seal_file(path: Path) -> None:
-    """NAME.sha256 beside NAME.json, whole or not at all."""
+    """NAME.sha256 next to NAME.json, whole or not at all."""
     files.write_text(path.with_suffix(".sha256"), f"{_sha256(path.read_bytes())}  {path.name}\n")
 
 

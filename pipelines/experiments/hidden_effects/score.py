@@ -64,7 +64,7 @@ def _as_sealed(path: Path, key: Path, hint: str) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was hidden in one case, and what was said of it; by simpler methods, too, if asked.
+    """What was hidden in one case, and what was reported of it; by simpler methods, too, if asked.
 
     oracle   share of the held-out error that exactly what was hidden would take off; None where
              it was not asked, or has no term here
@@ -84,12 +84,12 @@ class Answer:
         cause = {"name": name}
         if name and _name(name) in ranking:
             cause["probability"] = ranking[_name(name)]
-        said = {
+        reported = {
             "verdict": "named" if name else "none",
             "causes": [cause] if name else [],
             "ranking": [{"name": n, "probability": p} for n, p in ranking.items()],
         }
-        return self.answered(said)
+        return self.answered(reported)
 
     def answered(self, verdict: dict[str, Any]) -> Answer:
         """The same case with another verdict."""
@@ -110,13 +110,13 @@ class Answer:
 
     @cached_property
     def named(self) -> tuple[str, ...]:
-        """Causes in the order said; a clock of two channels is one name."""
+        """Causes in the order reported; a clock of two channels is one name."""
         if self.word != "named":
             return ()
-        return tuple(dict.fromkeys(_name(cause["name"]) for cause in self.said))
+        return tuple(dict.fromkeys(_name(cause["name"]) for cause in self.reported))
 
     @property
-    def said(self) -> list[dict[str, Any]]:
+    def reported(self) -> list[dict[str, Any]]:
         return self.verdict.get("causes") or []
 
     @property
@@ -133,7 +133,7 @@ class Answer:
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Of what is hidden, what may be found: of what a network has taken in nothing is."""
+        """The hidden causes that can be found: none that a network has absorbed."""
         taken = parameters.ABSORBED if self.planned.model == "feedforward" else ()
         return tuple(name for name in self.hidden if name not in taken)
 
@@ -160,7 +160,7 @@ class Answer:
             return ()
         return tuple(
             frozenset(map(_name, (c["name"], *(c.get("indistinguishable_from") or ()))))
-            for c in self.said
+            for c in self.reported
         )
 
     @property
@@ -179,7 +179,7 @@ class Answer:
 
     @property
     def found(self) -> bool:
-        """Right; or every truth is in a group of its own that is said, and no group is left; or
+        """Right; or every truth is in a group of its own that is reported, and no group is left; or
         `undecided`, with all that is true first or second in the ranking."""
         if self.right:
             return True
@@ -193,14 +193,16 @@ class Answer:
     def probability(self, label: str) -> float | None:
         """What the verdict gives a cause, `none` or `unknown:family`; None where it gives no
         probability at all."""
-        said = [one for one in self.said if self.word == "named"]
+        reported = [one for one in self.reported if self.word == "named"]
         ranking = self.verdict.get("ranking") or ()
-        given = [one for one in (*said, *ranking) if one.get("probability") is not None]
+        given = [one for one in (*reported, *ranking) if one.get("probability") is not None]
         if not given:
             return None
         if label in self.named:
-            said = [one for one in said if one.get("probability") is not None]
-            if own := [float(one["probability"]) for one in said if _name(one["name"]) == label]:
+            reported = [one for one in reported if one.get("probability") is not None]
+            if own := [
+                float(one["probability"]) for one in reported if _name(one["name"]) == label
+            ]:
                 return max(own)
         return min(1.0, sum(
             float(one["probability"]) for one in ranking
@@ -209,10 +211,14 @@ class Answer:
 
     @cached_property
     def compared(self) -> dict[str, Comparison]:
-        """Hidden causes that were named, whatever else was."""
-        said = {_name(cause["name"]): cause for cause in reversed(self.said)}  # the first counts
+        """Hidden causes that were named, whatever else was named."""
+        reported = {
+            _name(cause["name"]): cause for cause in reversed(self.reported)
+        }  # the first counts
         return {
-            name: parameters.compare(name, one["parameters"], said[name].get("parameters") or {})
+            name: parameters.compare(
+                name, one["parameters"], reported[name].get("parameters") or {}
+            )
             for name, one in zip(self.hidden, self.key["causes"], strict=True)
             if name in self.named
         }
@@ -224,7 +230,7 @@ class Answer:
         Of a named verdict its first cause; otherwise the first of the ranking, which may be a
         cause, `none` or `unknown` with its family. None where no probability was given.
         """
-        first = next(iter(self.said if self.named else self.verdict.get("ranking") or ()), {})
+        first = next(iter(self.reported if self.named else self.verdict.get("ranking") or ()), {})
         if first.get("probability") is None:
             return None
         name = first["name"]

@@ -213,7 +213,7 @@ def methods(answers: Sequence[Answer]) -> str:
 
 
 def per_cause(answers: Sequence[Answer]) -> str:
-    """Right of n for what is hidden alone, named of n beside another, errors wherever named."""
+    """Right of n for what is hidden alone, named of n next to another, errors wherever named."""
     columns = {
         "size 1": among("one", full), "0.3 to 1": among("one", small),
         "below": among("one", tiny), "500 s": among("one", seconds=500),
@@ -251,7 +251,7 @@ def mistakes(answers: Sequence[Answer]) -> str:
     if not wrong:
         return "Nothing was mistaken."
     rows = [
-        (a.planned.label, hidden(a), said(a), _margin(a), _again(a))
+        (a.planned.label, hidden(a), reported(a), _margin(a), _again(a))
         for a in sorted(wrong, key=lambda a: (a.kind, a.hidden))
     ]
     away = all(answer.abroad for answer in wrong)
@@ -271,12 +271,12 @@ def hidden(answer: Answer) -> str:
     return " + ".join(causes) + (f" ({family})" if family else "")
 
 
-def said(answer: Answer) -> str:
+def reported(answer: Answer) -> str:
     """What the verdict says."""
     if answer.word == "failed":
         return f"failed: {answer.verdict.get('step')} ended with {answer.verdict.get('rc')}"
     words = [answer.word, " + ".join(answer.named), f"({answer.family})" if answer.family else ""]
-    others = chain.from_iterable(c.get("indistinguishable_from") or () for c in answer.said)
+    others = chain.from_iterable(c.get("indistinguishable_from") or () for c in answer.reported)
     alike = list(dict.fromkeys(others)) if answer.named else []
     if alike:
         words.append(f"or {', '.join(alike)}")
@@ -289,7 +289,7 @@ def said(answer: Answer) -> str:
 
 def _margin(answer: Answer) -> str:
     """Over the runner-up in nats, where the verdict gives one; the contract does not ask for it."""
-    for place in (answer.verdict, *answer.said, answer.verdict.get("structure") or {}):
+    for place in (answer.verdict, *answer.reported, answer.verdict.get("structure") or {}):
         if isinstance(margin := place.get("margin"), int | float) and math.isfinite(margin):
             return f"{margin:.1f}"
     return ""

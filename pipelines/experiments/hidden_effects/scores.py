@@ -17,7 +17,7 @@ from pipelines.experiments.hidden_effects.parameters import NAMES
 from pipelines.experiments.hidden_effects.score import FAILED, Answer
 from shiplog.report import tables
 
-OUTSIDE = "outside the catalogue"  # a component of its own, beside the names
+OUTSIDE = "outside the catalogue"  # a component of its own, next to the names
 COMPONENTS = len(NAMES) + 1
 FLOOR = 0.01  # least probability that the log score takes: a ranking lists nothing below it
 KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside": "outside"}
@@ -27,8 +27,8 @@ KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside":
 
 
 def alarms_on_effects(answers: Sequence[Answer]) -> list[bool]:
-    """Detection rate: of the cases with something hidden, those that anything was said of. A case
-    without a verdict is not detected."""
+    """Detection rate: of the cases with something hidden, those that anything was reported of. A
+    case without a verdict is not detected."""
     return [alarmed(a) and a.word != FAILED for a in answers if a.kind != "none"]
 
 
@@ -61,10 +61,10 @@ def right_among_alarms(answers: Sequence[Answer]) -> list[bool]:
 def _given(one: Answer, label: str) -> float:
     """Probability of a label; of a verdict that gives none, 1 for what it says and 0 otherwise."""
     found = one.probability(label)
-    return found if found is not None else float(label in _said(one))
+    return found if found is not None else float(label in _reported(one))
 
 
-def _said(one: Answer) -> tuple[str, ...]:
+def _reported(one: Answer) -> tuple[str, ...]:
     if one.word == "unknown":
         return (f"unknown:{one.family}",)
     return one.named or ((one.word,) if one.word == "none" else ())
@@ -74,21 +74,21 @@ def _said(one: Answer) -> tuple[str, ...]:
 
 
 def repair_utility(
-    said: Collection[str], true: Collection[str], components: int = COMPONENTS
+    reported: Collection[str], true: Collection[str], components: int = COMPONENTS
 ) -> float:
     """m_utl of one diagnosis: 1 less the share of the components that a repair tests in vain.
 
         m_utl = 1 - n (N + 1) / (f (n + 1)) - n' (N' + 1) / (f (n' + 1))
 
-    f components; n true ones that are not said, to be found among the N = f - |said| that are not
-    said; n' that are said and not true, to be found among the N' = |said|. n (N + 1) / (n + 1) is
-    the expected number of tests, in random order, until the last of n among N is found. 1 where
-    said is true, 0 where all that is not true is said. Kurtoglu et al. 2009; Feldman et al. 2010,
-    "Empirical evaluation of diagnostic algorithm performance using a generic framework", metric
-    "system repair utility".
+    f components; n true ones that are not reported, to be found among the N = f - |reported| that
+    are not reported; n' that are reported and not true, to be found among the N' = |reported|. n (N
+    + 1) / (n + 1) is the expected number of tests, in random order, until the last of n among N is
+    found. 1 where reported is true, 0 where all that is not true is reported. Kurtoglu et al. 2009;
+    Feldman et al. 2010, "Empirical evaluation of diagnostic algorithm performance using a generic
+    framework", metric "system repair utility".
     """
-    missed, false = len(set(true) - set(said)), len(set(said) - set(true))
-    tests = _tests(missed, components - len(set(said))) + _tests(false, len(set(said)))
+    missed, false = len(set(true) - set(reported)), len(set(reported) - set(true))
+    tests = _tests(missed, components - len(set(reported))) + _tests(false, len(set(reported)))
     return 1.0 - tests / components
 
 
@@ -108,7 +108,7 @@ def group_utility(one: Answer) -> float:
     true = (OUTSIDE,) if one.kind == "outside" else one.sought
     open_ = candidates(one)
     total = sum(open_.values())
-    return sum(w * repair_utility(said, true) for said, w in open_.items()) / total
+    return sum(w * repair_utility(reported, true) for reported, w in open_.items()) / total
 
 
 def candidates(one: Answer) -> dict[frozenset[str], float]:
@@ -118,10 +118,10 @@ def candidates(one: Answer) -> dict[frozenset[str], float]:
     if one.word == "undecided":
         found: dict[frozenset[str], float] = {}
         for entry in one.verdict.get("ranking") or ():
-            said = _component(entry["name"])
-            found[said] = found.get(said, 0.0) + float(entry.get("probability") or 0.0)
+            reported = _component(entry["name"])
+            found[reported] = found.get(reported, 0.0) + float(entry.get("probability") or 0.0)
         return found if sum(found.values()) > 0.0 else {frozenset(): 1.0}
-    return {frozenset(said): 1.0 for said in itertools.product(*one.groups)}
+    return {frozenset(reported): 1.0 for reported in itertools.product(*one.groups)}
 
 
 def _component(label: str) -> frozenset[str]:

@@ -37,7 +37,7 @@ class Page:
     picture: str  # SVG
 
     def write(self, path: Path) -> None:
-        """Page and, beside it, its picture."""
+        """Page and, next to it, its picture."""
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(self.text + "\n", encoding="utf-8")
         picture_of(path).write_text(self.picture, encoding="utf-8")
@@ -100,9 +100,9 @@ def one_program(answers: Sequence[Answer]) -> str:
     """The program of all verdicts. Raises Mixed where there are several."""
     counts = Counter(name for answer in answers for name in program.of_answers(answer.steps))
     if len(counts) > 1:
-        said = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
+        reported = ", ".join(f"{name} ({count} cases)" for name, count in counts.most_common())
         raise Mixed(
-            f"The answers are of several programs: {said}. One table holds one program's figures.",
+            f"The answers are of several programs: {reported}. One table is of one program.",
             hint="replay the cases with one commit, or give the folders of one.",
         )
     return next(iter(counts))
@@ -173,7 +173,7 @@ def misses(answers: Sequence[Answer]) -> str:
     wrong.sort(key=lambda a: (WORST.index(how(a)), a.planned.family, a.planned.label))
     rows = [
         (a.planned.label, *([a.planned.family] if a.abroad else []), f"{a.planned.seconds} s",
-         score_tables.hidden(a), score_tables.said(a), _probability(a), how(a))
+         score_tables.hidden(a), score_tables.reported(a), _probability(a), how(a))
         for a in wrong
     ]  # fmt: skip
     family = ["family"] if wrong[0].abroad else []

@@ -112,7 +112,7 @@ def _no_share_of_causes(stack: ExitStack) -> None:
 
 
 def _no_imitation(stack: ExitStack) -> None:
-    """A cause is named though the remainder beside it could do most of what it does."""
+    """A cause is named though the remainder next to it could do most of what it does."""
     stack.enter_context(patch.object(Trial, "imitated", lambda *given: 0.0))
 
 
@@ -181,8 +181,8 @@ def table(source: Path, parts: Sequence[str], jobs: int) -> str:
         replay.replay(source, out, Settings(jobs=jobs, shiplog=command))
         answers = {a.planned.label: a for a in score.read(out).answers}
         if part == WHOLE:
-            whole = {label: _said(a) for label, a in answers.items()}
-        other = sum(label in whole and _said(a) != whole[label] for label, a in answers.items())
+            whole = {label: _reported(a) for label, a in answers.items()}
+        other = sum(label in whole and _reported(a) != whole[label] for label, a in answers.items())
         rows.append((
             part, len(answers), sum(a.right for a in answers.values()),
             sum(a.misnamed for a in answers.values()), other,
@@ -191,7 +191,7 @@ def table(source: Path, parts: Sequence[str], jobs: int) -> str:
     return f"{shlex.join(sys.argv)}\n\n{tables.table(head, rows)}"
 
 
-def _said(answer: score.Answer) -> tuple:
+def _reported(answer: score.Answer) -> tuple:
     return answer.word, answer.named, answer.family
 
 

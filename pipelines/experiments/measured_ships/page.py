@@ -51,16 +51,16 @@ def _row(one: Way) -> tuple[object, ...]:
         window = given[given.index("--window") + 1] if "--window" in given else str(WINDOW)
         each = (evaluated["loss"], floors["hold"], floors["least_squares"])
         losses = (window, *(_number(x) for x in each))
-    said, explained = "-", "-"
+    reported, explained = "-", "-"
     if verdict:
         named = ", ".join(dict.fromkeys(c["name"] for c in verdict["causes"]))
         family = (verdict.get("structure") or {}).get("family")
-        said = named or ": ".join(filter(None, (verdict["verdict"], family)))
+        reported = named or ": ".join(filter(None, (verdict["verdict"], family)))
         explained = f"{verdict.get('explained') or 0.0:.0%}"
     elif one.stopped:
-        said = "ends before"
+        reported = "ends before"
     counted = (len(one.voyages), usable, windows) if one.voyages else ("-", "-", "-")
-    return (DATA_SETS[one.name].ship, *counted, *losses, said, explained, f"{one.cpu_s:.0f}")
+    return (DATA_SETS[one.name].ship, *counted, *losses, reported, explained, f"{one.cpu_s:.0f}")
 
 
 def _number(value: float | None) -> str:

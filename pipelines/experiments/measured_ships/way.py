@@ -57,11 +57,11 @@ def go(name: str, one: DataSet, data: Path, out: Path) -> Way:
         if done[-1]["rc"] not in (DONE, LOST):
             break
     last = done[-1]
-    said = "" if last["rc"] in (DONE, LOST) else _sentence(last["stderr"])
-    said = said.replace(f"{folder}/", "")
+    reported = "" if last["rc"] in (DONE, LOST) else _sentence(last["stderr"])
+    reported = reported.replace(f"{folder}/", "")
     answers = {p.stem: json.loads(p.read_text("utf-8")) for p in folder.glob("*.answer")}
     traced = any("Traceback" in s["stderr"] or "unexpected fault" in s["stderr"] for s in done)
-    return Way(name, said, answers, sum(s["cpu_s"] for s in done), traced)
+    return Way(name, reported, answers, sum(s["cpu_s"] for s in done), traced)
 
 
 def _commands(one: DataSet, data: Path, folder: Path):

@@ -120,11 +120,11 @@ def draw(
         changes, parameters = sized(stream(seed, f"hidden {name}"), large, ship)
         effects = replace(effects, **changes)
         causes.append(Cause(name.partition(":")[0], large, parameters, structure))
-    usual = max(CAMPAIGN, LENGTHS * ship.time_unit)
-    trial = usual if seconds is None else float(seconds)
+    default = max(CAMPAIGN, LENGTHS * ship.time_unit)
+    trial = default if seconds is None else float(seconds)
     if trial < LEAST:
         raise ValueError(f"A trial of {trial:g} s is too short: at least {LEAST:g} s.")
-    nominal = nominal_seconds or (usual if trial < SHORT else trial)
+    nominal = nominal_seconds or (default if trial < SHORT else trial)
     return Case(
         seed, ship, tuple(causes), effects, _legs(seed, "nominal", NOMINAL_DAY, nominal, ship),
         _legs(seed, "trial", NOMINAL_DAY + LATER, trial, ship),
@@ -200,7 +200,7 @@ def write(case: Case, folder: str | Path, key: str | Path) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     key.parent.mkdir(parents=True, exist_ok=True)
-    key.unlink(missing_ok=True)  # an old key must not stand beside half-new logs
+    key.unlink(missing_ok=True)  # an old key must not stand next to half-new logs
     (folder / PROFILE).write_text(profile(case.ship), encoding="utf-8")
     pulses = {}
     for leg in legs:

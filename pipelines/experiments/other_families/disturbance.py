@@ -77,7 +77,7 @@ def bursts(rng: np.random.Generator, times: np.ndarray, noise: Noise) -> np.ndar
 def process_noise(
     rng: np.random.Generator, noise: Noise, times: np.ndarray, louder: float
 ) -> np.ndarray:
-    """[N, 3] accelerations at `times` [s]: m/s², m/s², rad/s²; `louder` is 1 on an ordinary day."""
+    """[N, 3] accelerations at `times` [s]: m/s², m/s², rad/s²; `louder` is 1 on a calm day."""
     grid = GRID * np.arange(int(np.ceil(times[-1] / GRID)) + 2)
     columns = []
     for sigma in noise.sigma:

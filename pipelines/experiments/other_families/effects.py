@@ -137,7 +137,7 @@ def _size(rng: np.random.Generator, size: float, ship: Ship, name: str) -> float
     return RANGES[name].draw(rng, size) * _unit(ship, RANGES[name].unit)
 
 
-def _said(**parameters: tuple[Any, str]) -> Parameters:
+def _reported(**parameters: tuple[Any, str]) -> Parameters:
     return {name: {"value": value, "unit": unit} for name, (value, unit) in parameters.items()}
 
 
@@ -154,7 +154,7 @@ def _share(name: str, parameter: str, sign: float = 0.0) -> Draw:
 
     def draw(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
         share = (sign or _either(rng)) * _size(rng, size, ship, name)
-        return {name: share}, _said(**{parameter: (1.0 + share, "1")})
+        return {name: share}, _reported(**{parameter: (1.0 + share, "1")})
 
     return draw
 
@@ -162,7 +162,7 @@ def _share(name: str, parameter: str, sign: float = 0.0) -> Draw:
 def _angle(name: str) -> Draw:
     def draw(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
         degrees = _either(rng) * _size(rng, size, ship, name)
-        return {name: math.radians(degrees)}, _said(angle=(degrees, "deg"))
+        return {name: math.radians(degrees)}, _reported(angle=(degrees, "deg"))
 
     return draw
 
@@ -170,7 +170,7 @@ def _angle(name: str) -> Draw:
 def _time(name: str) -> Draw:
     def draw(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
         seconds = _size(rng, size, ship, name)
-        return {name: seconds}, _said(time=(seconds, "s"))
+        return {name: seconds}, _reported(time=(seconds, "s"))
 
     return draw
 
@@ -180,14 +180,14 @@ def _current(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     changes = {
         "current_north": speed * math.cos(towards), "current_east": speed * math.sin(towards)
     }  # fmt: skip
-    return changes, _said(speed=(speed, "m/s"), direction=(math.degrees(towards), "deg"))
+    return changes, _reported(speed=(speed, "m/s"), direction=(math.degrees(towards), "deg"))
 
 
 def _wind_force(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     sign = _either(rng)
     shares = tuple(s * _size(rng, size, ship, "wind_force") for s in (sign, sign, _either(rng)))
     names = ("surge_factor", "sway_factor", "yaw_factor")
-    return {"wind": shares}, _said(
+    return {"wind": shares}, _reported(
         **{name: (1.0 + share, "1") for name, share in zip(names, shares, strict=True)}
     )
 
@@ -203,7 +203,7 @@ def _shallow_water(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
         "keel": keel, "slope_half": half, "slope_north": north, "slope_east": east,
         "slope_towards": towards,
     }  # fmt: skip
-    return changes, _said(
+    return changes, _reported(
         strength=(float(grown[1]) - 1.0, "1"), length=(half, "m"), keel_clearance=(keel, "T"),
         slope_towards=(math.degrees(towards), "deg"),
     )  # fmt: skip
@@ -211,33 +211,33 @@ def _shallow_water(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
 
 def _bank(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     strength, reach = _size(rng, size, ship, "bank"), rng.uniform(0.8, 2.0) * ship.length
-    return {"bank": strength, "bank_reach": reach}, _said(
+    return {"bank": strength, "bank_reach": reach}, _reported(
         strength=(strength, "1"), length=(reach, "m")
     )
 
 
 def _payload(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     mass, ahead = _size(rng, size, ship, "payload"), rng.uniform(-0.33, 0.33) * ship.length
-    return {"payload": mass, "payload_ahead": ahead}, _said(
+    return {"payload": mass, "payload_ahead": ahead}, _reported(
         mass=(mass, "kg"), position=(ahead, "m")
     )
 
 
 def _thrust_loss(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     lost = _size(rng, size, ship, "thrust_loss")
-    return {"thrust_loss": lost}, _said(factor=(1.0 - lost, "1"))
+    return {"thrust_loss": lost}, _reported(factor=(1.0 - lost, "1"))
 
 
 def _unit_loss(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     unit, lost = int(rng.integers(len(ship.drives))), _size(rng, size, ship, "unit_loss")
-    return {"unit": unit, "unit_loss": lost}, _said(
+    return {"unit": unit, "unit_loss": lost}, _reported(
         factor=(1.0 - lost, "1"), unit=(ship.drives[unit], "")
     )
 
 
 def _thrust_drift(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     slope = -_size(rng, size, ship, "thrust_drift")
-    return {"thrust_drift": slope}, _said(slope=(slope, "1"))
+    return {"thrust_drift": slope}, _reported(slope=(slope, "1"))
 
 
 def _rudder_offset(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
@@ -246,9 +246,9 @@ def _rudder_offset(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     which = int(rng.integers(3))
     if not any(ship.actuators[i].position[1] for i in ship.steering):
         radians = math.radians(two[1])
-        return {"rudder_offset": (radians, radians)}, _said(angle=(two[1], "deg"))
+        return {"rudder_offset": (radians, radians)}, _reported(angle=(two[1], "deg"))
     port, starboard = (0.0 if which == 1 - side else two[side] for side in range(2))
-    return {"rudder_offset": (math.radians(port), math.radians(starboard))}, _said(
+    return {"rudder_offset": (math.radians(port), math.radians(starboard))}, _reported(
         port=(port, "deg"), starboard=(starboard, "deg")
     )
 
@@ -256,44 +256,46 @@ def _rudder_offset(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
 def _side_thrust(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     force, at = _size(rng, size, ship, "side_thrust"), rng.uniform(0.25, 0.45) * ship.length
     at *= _either(rng)
-    return {"side_thrust": force, "device_at": at}, _said(force=(force, "N"), position=(at, "m"))
+    return {"side_thrust": force, "device_at": at}, _reported(
+        force=(force, "N"), position=(at, "m")
+    )
 
 
 def _yaw_rate_bias(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     value = _either(rng) * _size(rng, size, ship, "yaw_rate_bias")
-    return {"yaw_rate_bias": value}, _said(value=(math.degrees(value), "deg/s"))
+    return {"yaw_rate_bias": value}, _reported(value=(math.degrees(value), "deg/s"))
 
 
 def _clock_offset(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     channels = ("position", "velocity", "gnss", "yaw_rate", *(("wind",) if ship.winds else ()))
     channel, late = str(rng.choice(channels)), _size(rng, size, ship, "clock_offset")
-    return {"clock_offset": {channel: late}}, _said(time=(late, "s"), channel=(channel, ""))
+    return {"clock_offset": {channel: late}}, _reported(time=(late, "s"), channel=(channel, ""))
 
 
 def _antenna_offset(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     ahead = _either(rng) * _size(rng, size, ship, "antenna_ahead")
     aside = _either(rng) * _size(rng, size, ship, "antenna_aside")
-    return {"antenna_offset": (ahead, aside)}, _said(x=(ahead, "m"), y=(aside, "m"))
+    return {"antenna_offset": (ahead, aside)}, _reported(x=(ahead, "m"), y=(aside, "m"))
 
 
 def _tether(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     pull, off, at = _size(rng, size, ship, "tether"), rng.uniform(0.0, 0.5), _bearing(rng)
     north, east = (off * ship.radius * part for part in (math.cos(at), math.sin(at)))
-    return {"tether": pull, "tether_north": north, "tether_east": east}, _said(
+    return {"tether": pull, "tether_north": north, "tether_east": east}, _reported(
         force=(pull, "N"), north=(north, "m"), east=(east, "m")
     )
 
 
 def _tow(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     pull, at = _size(rng, size, ship, "tow"), _bearing(rng)
-    return {"tow_north": pull * math.cos(at), "tow_east": pull * math.sin(at)}, _said(
+    return {"tow_north": pull * math.cos(at), "tow_east": pull * math.sin(at)}, _reported(
         force=(pull, "N"), direction=(math.degrees(at), "deg")
     )
 
 
 def _aside(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     share = _either(rng) * _size(rng, size, ship, "aside")
-    return {"aside": share}, _said(share_of_thrust=(share, "1"))
+    return {"aside": share}, _reported(share_of_thrust=(share, "1"))
 
 
 def _couple(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
@@ -301,7 +303,7 @@ def _couple(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     one, other = (int(i) for i in rng.choice(columns, 2, replace=False))
     share = _either(rng) * _size(rng, size, ship, "couple")
     names = (ship.actuators[one].name, ship.actuators[other].name)
-    return {"couple": share, "couple_from": one, "couple_to": other}, _said(
+    return {"couple": share, "couple_from": one, "couple_to": other}, _reported(
         share=(share, "1"), of=(names[0], ""), on=(names[1], "")
     )
 
@@ -310,12 +312,12 @@ def _rudder_limit(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     """At full size 9 to 16 deg, at none the stops of the rudders themselves."""
     most = math.degrees(ship.actuators[ship.rudders[0]].high)
     degrees = most - (most - RANGES["rudder_limit"].draw(rng, 1.0)) * size
-    return {"rudder_limit": math.radians(degrees)}, _said(angle=(degrees, "deg"))
+    return {"rudder_limit": math.radians(degrees)}, _reported(angle=(degrees, "deg"))
 
 
 def _louder(rng: np.random.Generator, size: float, ship: Ship) -> Drawn:
     factor = 1.0 + (RANGES["louder"].draw(rng, 1.0) - 1.0) * size
-    return {"louder": factor}, _said(factor=(factor, "1"))
+    return {"louder": factor}, _reported(factor=(factor, "1"))
 
 
 CATALOGUE: dict[str, Draw] = {  # the contract's names; "thrust_loss:unit" is told as thrust_loss

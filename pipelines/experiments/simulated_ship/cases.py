@@ -45,7 +45,7 @@ Draw = Callable[[np.random.Generator, float], Drawn]
 # --- what can be hidden: each at its realistic size, times `size` ---------------------------------
 
 
-def _said(**parameters: tuple[Any, str]) -> Parameters:
+def _reported(**parameters: tuple[Any, str]) -> Parameters:
     return {name: {"value": value, "unit": unit} for name, (value, unit) in parameters.items()}
 
 
@@ -67,7 +67,7 @@ def _share(
     def draw(rng: np.random.Generator, size: float) -> Drawn:
         share = float(rng.choice(signs)) * _within(rng, low, high) * size
         factor = 1.0 - share if name == "thrust_loss" else 1.0 + share
-        return {name: share}, _said(**{parameter: (factor, "1")})
+        return {name: share}, _reported(**{parameter: (factor, "1")})
 
     return draw
 
@@ -77,7 +77,7 @@ def _angle(name: str, low: float, high: float, parameter: str = "angle", unit: s
 
     def draw(rng: np.random.Generator, size: float) -> Drawn:
         degrees = _either(rng) * _within(rng, low, high) * size
-        return {name: math.radians(degrees)}, _said(**{parameter: (degrees, unit)})
+        return {name: math.radians(degrees)}, _reported(**{parameter: (degrees, unit)})
 
     return draw
 
@@ -85,7 +85,7 @@ def _angle(name: str, low: float, high: float, parameter: str = "angle", unit: s
 def _time(name: str, low: float, high: float) -> Draw:
     def draw(rng: np.random.Generator, size: float) -> Drawn:
         seconds = _within(rng, low, high) * size
-        return {name: seconds}, _said(time=(seconds, "s"))
+        return {name: seconds}, _reported(time=(seconds, "s"))
 
     return draw
 
@@ -96,7 +96,7 @@ def _current(rng: np.random.Generator, size: float) -> Drawn:
         "current_north": speed * math.cos(towards),
         "current_east": speed * math.sin(towards),
     }
-    return changes, _said(speed=(speed, "m/s"), direction=(math.degrees(towards), "deg"))
+    return changes, _reported(speed=(speed, "m/s"), direction=(math.degrees(towards), "deg"))
 
 
 def _wind_force(rng: np.random.Generator, size: float) -> Drawn:
@@ -105,8 +105,8 @@ def _wind_force(rng: np.random.Generator, size: float) -> Drawn:
     signs = (sign, sign, _either(rng))
     force = tuple(s * _within(rng, 0.25, 0.50) * size for s in signs)
     names = ("surge_factor", "sway_factor", "yaw_factor")
-    said = {name: (1.0 + share, "1") for name, share in zip(names, force, strict=True)}
-    return {"wind_force": force}, _said(**said)
+    reported = {name: (1.0 + share, "1") for name, share in zip(names, force, strict=True)}
+    return {"wind_force": force}, _reported(**reported)
 
 
 def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
@@ -118,7 +118,7 @@ def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
         "shallow_water": strength, "shoal_length": length, "shoal_north": north,
         "shoal_east": east, "shoal_towards": towards,
     }  # fmt: skip
-    return changes, _said(
+    return changes, _reported(
         strength=(strength, "1"), length=(length, "m"), crest_north=(north, "m"),
         crest_east=(east, "m"), crest_towards=(math.degrees(towards), "deg"),
     )  # fmt: skip
@@ -127,12 +127,12 @@ def _shallow_water(rng: np.random.Generator, size: float) -> Drawn:
 def _bank(rng: np.random.Generator, size: float) -> Drawn:
     strength, length = _within(rng, 0.8, 1.6) * size, rng.uniform(7.0, 13.0)
     changes = {"bank": strength, "bank_length": length}
-    return changes, _said(strength=(strength, "1"), length=(length, "m"))
+    return changes, _reported(strength=(strength, "1"), length=(length, "m"))
 
 
 def _payload(rng: np.random.Generator, size: float) -> Drawn:
     mass, ahead = _within(rng, 20.0, 55.0) * size, rng.uniform(-1.0, 1.0)
-    return {"payload": mass, "payload_ahead": ahead}, _said(
+    return {"payload": mass, "payload_ahead": ahead}, _reported(
         mass=(mass, "kg"), position=(ahead, "m")
     )
 
@@ -146,51 +146,51 @@ def _rudder_offset(rng: np.random.Generator, size: float) -> Drawn:
         "rudder_offset_port": math.radians(port),
         "rudder_offset_starboard": math.radians(starboard),
     }
-    return changes, _said(port=(port, "deg"), starboard=(starboard, "deg"))
+    return changes, _reported(port=(port, "deg"), starboard=(starboard, "deg"))
 
 
 def _side_thrust(rng: np.random.Generator, size: float) -> Drawn:
-    return {"side_thrust": 4.0 * size}, _said(force=(4.0 * size, "N"))  # pulses 1.5 to 4 N
+    return {"side_thrust": 4.0 * size}, _reported(force=(4.0 * size, "N"))  # pulses 1.5 to 4 N
 
 
 def _thrust_drift(rng: np.random.Generator, size: float) -> Drawn:
     slope = -_within(rng, 0.12, 0.35) * size
-    return {"thrust_drift": slope}, _said(slope=(slope, "1"))
+    return {"thrust_drift": slope}, _reported(slope=(slope, "1"))
 
 
 def _clock_offset(rng: np.random.Generator, size: float) -> Drawn:
     channel = str(rng.choice(("position", "velocity", "gnss", "yaw_rate", "wind")))
     late = _within(rng, 0.3, 1.5) * size
-    return {"clock_offset": {channel: late}}, _said(time=(late, "s"), channel=(channel, ""))
+    return {"clock_offset": {channel: late}}, _reported(time=(late, "s"), channel=(channel, ""))
 
 
 def _antenna_offset(rng: np.random.Generator, size: float) -> Drawn:
     ahead = _either(rng) * _within(rng, 0.3, 1.2) * size
     aside = _either(rng) * _within(rng, 0.05, 0.3) * size
-    return {"antenna_offset": (ahead, aside)}, _said(x=(ahead, "m"), y=(aside, "m"))
+    return {"antenna_offset": (ahead, aside)}, _reported(x=(ahead, "m"), y=(aside, "m"))
 
 
 def _tether(rng: np.random.Generator, size: float) -> Drawn:
     pull, off, at = rng.uniform((0.6, 0.0, -np.pi), (2.0, 25.0, np.pi))
     north, east = off * math.cos(at), off * math.sin(at)
     changes = {"tether": pull * size, "tether_north": north, "tether_east": east}
-    return changes, _said(force=(pull * size, "N"), north=(north, "m"), east=(east, "m"))
+    return changes, _reported(force=(pull * size, "N"), north=(north, "m"), east=(east, "m"))
 
 
 def _propeller_side_force(rng: np.random.Generator, size: float) -> Drawn:
     share = _either(rng) * rng.uniform(0.05, 0.12) * size
-    return {"propeller_side_force": share}, _said(share_of_thrust=(share, "1"))
+    return {"propeller_side_force": share}, _reported(share_of_thrust=(share, "1"))
 
 
 def _rudder_limit(rng: np.random.Generator, size: float) -> Drawn:
     """At full size 50 to 75 deg, at none the stops of the rudders themselves."""
     degrees = 105.0 - (105.0 - rng.uniform(50.0, 75.0)) * size
-    return {"rudder_limit": math.radians(degrees)}, _said(angle=(degrees, "deg"))
+    return {"rudder_limit": math.radians(degrees)}, _reported(angle=(degrees, "deg"))
 
 
 def _turbulence(rng: np.random.Generator, size: float) -> Drawn:
     factor = 1.0 + (rng.uniform(4.0, 9.0) - 1.0) * size
-    return {"turbulence": factor}, _said(factor=(factor, "1"))
+    return {"turbulence": factor}, _reported(factor=(factor, "1"))
 
 
 _BOTH = (-1.0, 1.0)
@@ -256,7 +256,7 @@ class Case:
     ship: Ship
     laws: Laws
     causes: tuple[Cause, ...]
-    ordinary: Effects  # noise and unrest of both campaigns
+    ordinary: Effects  # noise and process noise of both campaigns
     effects: Effects  # the same, and what is hidden in the trial
     nominal: tuple[Leg, ...] = field(repr=False)
     trial: tuple[Leg, ...] = field(repr=False)
@@ -362,7 +362,7 @@ def write(case: Case, folder: str | Path, key: str | Path) -> None:
         )
     folder.mkdir(parents=True, exist_ok=True)
     key.parent.mkdir(parents=True, exist_ok=True)
-    key.unlink(missing_ok=True)  # an old key must not stand beside half-new logs
+    key.unlink(missing_ok=True)  # an old key must not stand next to half-new logs
     pulses = {}
     for leg in legs:
         sailed = voyage(case, leg)

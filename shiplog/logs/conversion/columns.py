@@ -39,7 +39,7 @@ def voyages(
 ) -> Iterator[tuple[str, pl.DataFrame]]:
     """The table in SI, a column a channel and `time` in ns, one part a voyage.
 
-    Rows without a time are dropped, and said; without a voyage column the file is one voyage.
+    Rows without a time are dropped, and reported; without a voyage column the file is one voyage.
     Raises ChannelMissing for columns that are not there, ProfileError for what cannot be read.
     """
     if not profile.table:
@@ -216,9 +216,9 @@ def _of_one_vessel(
 def busiest(vessels: pl.Series) -> str:
     """The vessels with most rows, for a message."""
     counts = vessels.drop_nulls().value_counts(sort=True, name="rows")
-    shown = [f"{name} ({rows} rows)" for name, rows in counts.head(NAMED).iter_rows()]
-    rest = counts.height - len(shown)
-    return ", ".join(shown) + (f", and {rest} more" if rest > 0 else "")
+    named = [f"{name} ({rows} rows)" for name, rows in counts.head(NAMED).iter_rows()]
+    rest = counts.height - len(named)
+    return ", ".join(named) + (f", and {rest} more" if rest > 0 else "")
 
 
 def _time(frame: pl.DataFrame, present: dict[str, Column]) -> pl.Series:
@@ -236,7 +236,7 @@ def _named(present: dict[str, Column], channel: str) -> list[str]:
 
 
 def _si(values: pl.Series, column: Column, path: Path) -> pl.Series:
-    """A column as SI numbers; words in it are blanks, and said."""
+    """A column as SI numbers; words in it become blanks, and are reported."""
     if values.dtype == pl.String:
         number = clock.number_of(values)
         words = values.filter(number.is_null() & (values.str.strip_chars() != ""))

@@ -28,7 +28,7 @@ REGULAR = 0.8  # share of lines that a separator cuts alike
 
 @dataclass(frozen=True, slots=True)
 class DelimitedTable:
-    """A table and what its file says of it besides."""
+    """A table, and what its file states in addition."""
 
     frame: pl.DataFrame
     units: dict[str, str] = field(default_factory=dict)  # of a row of units under the header
@@ -167,12 +167,12 @@ def _number(text: str) -> bool:
 
 def _unlike(names: list[str]) -> list[str]:
     """Each name once: a second `angle` becomes `angle_2`, an empty one its place."""
-    seen: Counter[str] = Counter()
+    uses: Counter[str] = Counter()
     unlike = []
     for place, name in enumerate(names, 1):
         name = name or f"column_{place}"
-        seen[name] += 1
-        unlike.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
+        uses[name] += 1
+        unlike.append(name if uses[name] == 1 else f"{name}_{uses[name]}")
     return unlike
 
 

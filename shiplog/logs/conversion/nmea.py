@@ -37,7 +37,7 @@ ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\
 NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
 OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
 SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
-LATE_S = 0.5  # clocks that differ by more are said: at 10 m/s a ship is 5 m further by then
+LATE_S = 0.5  # clocks that differ by more are reported: at 10 m/s a ship is 5 m further by then
 EPOCH = date(1970, 1, 1)
 
 
@@ -115,14 +115,14 @@ class _Reader:
         try:
             message = pynmea2.parse(text, check="*" in text)
             own = self._own(message)
-            said = facts(message)
+            decoded = facts(message)
         except NotValid:
             self.invalid += 1
             return
         except (pynmea2.ParseError, ValueError, TypeError, AttributeError, ArithmeticError):
             self.damaged += 1  # a field that is no number raises whatever its converter raises
             return
-        for topic, values in said or ():
+        for topic, values in decoded or ():
             rows = self.rows.setdefault((topic, message.talker), Rows(topic))
             rows.own.append(own)
             rows.received.append(received)
@@ -160,7 +160,7 @@ class _Reader:
         return day + (of_day < before - DAY_NS // 2) - (of_day > before + DAY_NS // 2)
 
     def _stamp(self, around: str) -> int | None:
-        """The receive stamp [ns] in what stands beside the sentence; None where there is none."""
+        """The receive stamp [ns] in the text around the sentence; None without one."""
         if iso := ISO.search(around):
             zone = (iso[4] or "Z").replace("Z", "+00:00")
             whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
@@ -285,8 +285,8 @@ class _Clock:
         if not len(self.utc):
             return np.full(len(place), -1, np.int64)
         before = np.searchsorted(self.places, place, side="right") - 1
-        usual = int(np.median(np.diff(self.utc))) if len(self.utc) > 1 else 0
-        step = np.diff(self.utc, append=self.utc[-1] + usual)
+        period = int(np.median(np.diff(self.utc))) if len(self.utc) > 1 else 0
+        step = np.diff(self.utc, append=self.utc[-1] + period)
         first = np.searchsorted(before, before, side="left")  # `before` only grows
         many = np.searchsorted(before, before, side="right") - first
         spread = self.utc[before] + step[before] * (np.arange(len(place)) - first) // many

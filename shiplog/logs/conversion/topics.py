@@ -19,7 +19,7 @@ from shiplog.profile import Profile
 log = logging.getLogger(__name__)
 
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
-# A flight recorder's GNSS topic holds UTC besides; its `timestamp` is what all its topics share.
+# A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
 STAMPS = ("stamp_ns", "stamp", "header.stamp", "timestamp", "utc", "time_utc", "datetime", "time",
           "t", "unix", "epoch")  # fmt: skip
 LOGGED = (

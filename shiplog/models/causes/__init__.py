@@ -61,7 +61,7 @@ def testable(
             if fitted and one.absorbed:
                 untested[one.label] = "a model fitted to these voyages absorbs it"
             elif fitted == "network" and one.renames:
-                untested[one.label] = "a network fitted to these voyages takes it in"
+                untested[one.label] = "a network fitted to these voyages absorbs it"
             else:
                 chosen.append(one)
     return chosen, untested

@@ -1,9 +1,8 @@
 """What a cause is: a name, a story, numbers that are zero where it is absent, and a hook.
 
-A cause stands around any dynamic model. It may say what the instruments should have shown and
-what the actuators really did (`read`), how the water moves (`water`), which coefficients of the
-ship are others (`coefficients`), or which force is there besides (`force`). All numbers zero is
-the model as it was, exactly.
+A cause extends any dynamic model. It may correct the measurements of instruments and actuators
+(`read`), set the water in motion (`water`), change coefficients of the ship (`coefficients`), or
+add a force (`force`). With all numbers zero the model is exactly as before.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a cause knows of ship and place, besides its numbers.
+    """The ship and the place of a cause, in addition to its numbers.
 
     scale   "speed" (root mean square of the campaigns, m/s), "length" (m), "mass" (kg) and
             "moment", their product
@@ -142,19 +141,19 @@ class Cause:
 
     @property
     def absorbed(self) -> bool:
-        """Whether any model that is fitted to the affected data takes it in."""
+        """Whether any model that is fitted to the affected data absorbs it."""
         return False
 
     @property
     def renames(self) -> bool:
-        """Whether it only says otherwise what drives the ship or where it is measured: a network
-        that is fitted to the affected data, without symmetry or origin, takes that in, too."""
+        """Whether it only changes an input of the model or the point of measurement: a network that
+        is fitted to the affected data, without symmetry or origin, absorbs that, too."""
         return False
 
     @property
     def usual(self) -> bool:
-        """Whether a ship may have some of it always: false where coefficients, or another cause,
-        already stand for that."""
+        """Whether its nominal value may differ from zero: false where it is an alias of
+        coefficients or of another cause."""
         return not self.absorbed
 
     @property
@@ -171,7 +170,7 @@ class Cause:
         return (self.on(setting),)
 
     def beside(self, label: str) -> bool:
-        """Whether it may stand beside a cause that is named already."""
+        """Whether it may be in one hypothesis with this cause."""
         return label != self.label
 
     def missing(self, setting: Setting) -> str | None:
@@ -193,11 +192,11 @@ class Cause:
     # --- hooks ---
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        """What was, of what was recorded: sensors put right, actuators as they acted."""
+        """The true record, from the measured one: sensors corrected, actuators as they acted."""
         return record
 
     def inverse(self, p: np.ndarray) -> np.ndarray:
-        """The numbers whose `read` undoes this one's: what the instruments will show."""
+        """The numbers whose `read` inverts this one's: from true values to measurements."""
         return -p
 
     def water(self, p: Any) -> tuple[Any, Any] | None:
@@ -209,7 +208,7 @@ class Cause:
         return c
 
     def force(self, p: Any, state: Any, at: dict) -> Any | None:
-        """X, Y, N [..., 3] at midship besides the ship's own [N, N, N m]."""
+        """X, Y, N [..., 3] at midship, in addition to the ship's own [N, N, N m]."""
         return None
 
     # --- words ---
@@ -244,8 +243,8 @@ class Cause:
         return found
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        said = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in shown.items())
-        return f"{self.story} {said}."
+        numbers = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in shown.items())
+        return f"{self.story} {numbers}."
 
     def practical(self, p: np.ndarray, setting: Setting) -> bool:
         """Whether any of its numbers is large enough to matter."""

@@ -20,7 +20,7 @@ class Current(Cause):
 
     name = "current"
     kind = "environment"
-    story = "The water moves, and the ship with it."
+    story = "The water moves with a steady current."
     equation = "ν̇ = f(ν - RᵀV, u, ω) + d(RᵀV)/dt,  V = ({north:+.3f}, {east:+.3f}) m/s"
     parameters = (
         Parameter("north", "m/s", 0.25, 0.015, of="speed"),
@@ -61,7 +61,7 @@ class WindForce(Cause):
     name = "wind_force"
     kind = "environment"
     needs = ("wind",)
-    story = "The wind pushes otherwise than the model has it."
+    story = "The wind force differs from the model's."
     equation = "X_A·{surge_factor:.2f}, Y_A·{sway_factor:.2f}, N_A·{yaw_factor:.2f}"
     parameters = (
         Parameter("surge_factor", "1", 0.3, 0.03, low=-1.0),
@@ -106,10 +106,10 @@ class WindForce(Cause):
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         x, y, n = (shown[q.name].value for q in self.parameters)
-        whose = "it does such a ship; the model has no wind" if self.lacking else "the model has it"
+        whose = "of a ship of this kind; the model has none" if self.lacking else "in the model"
         return (
-            f"The wind pushes {x:.2f} times as hard ahead, {y:.2f} athwart, and turns {n:.2f} "
-            f"times as hard as {whose}."
+            f"The wind force is {x:.2f} times that {whose} ahead, {y:.2f} times athwart, and its "
+            f"yaw moment {n:.2f} times."
         )
 
 
@@ -125,7 +125,7 @@ class ShallowWater(Cause):
 
     name = "shallow_water"
     kind = "environment"
-    story = "The bottom is near in places."
+    story = "The water is shallow in places."
     equation = "X₀, Y_v, N_r, C_D, m_y and J grow with a map of depth; at most {strength:.2f}"
     parameters = ()
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
@@ -161,7 +161,7 @@ class ShallowWater(Cause):
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return (
-            "Shallow water: where it is shallowest, cross-flow drag is "
+            "Shallow water: at the shallowest place, cross-flow drag is "
             f"{1.0 + 1.2 * shown['strength'].value:.2f} times that of deep water."
         )
 
@@ -186,7 +186,7 @@ class Bank(Cause):
     name = "bank"
     kind = "environment"
     needs = ("bank",)
-    story = "A bank draws the ship in."
+    story = "A bank attracts the ship."
     equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/L/3)³), N bow out"
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
     separated_by = {"shallow_water": "the same run farther from the bank"}
@@ -223,6 +223,6 @@ class Bank(Cause):
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
         return (
-            f"The bank draws the ship in, with {shown['strength'].value:.2f} of the suction that "
-            "is usual."
+            f"The bank attracts the ship with {shown['strength'].value:.2f} times the suction of "
+            "the reference formula."
         )

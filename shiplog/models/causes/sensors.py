@@ -14,7 +14,7 @@ from shiplog.voyages.recording import Record
 
 @dataclass(frozen=True)
 class HeadingOffset(Cause):
-    """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which knows
+    """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which needs
     no heading, or from GNSS velocity that the recorder has turned by the compass: `turned`.
 
     Size: a gyro may settle 0.75 deg · sec(latitude) off (ISO 8728), up to 2.2 deg at 70 deg, and
@@ -25,7 +25,7 @@ class HeadingOffset(Cause):
 
     name = "heading_offset"
     kind = "sensor"
-    story = "The compass stands beside the ship's axis."
+    story = "The compass is misaligned."
     equation = "ψ_measured = ψ {angle:+.2f} deg"
     parameters = (Parameter("angle", "deg", np.radians(2.5), np.radians(0.25)),)
     separated_by = {
@@ -48,7 +48,7 @@ class HeadingOffset(Cause):
         return faults.without_heading_offset(record, float(p[0]), self.turned)
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The heading shows {shown['angle'].value:+.2f} deg beside the ship's own."
+        return f"The compass is misaligned by {shown['angle'].value:+.2f} deg."
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class YawRateBias(Cause):
     name = "yaw_rate_bias"
     kind = "sensor"
     needs = ("yaw rate",)
-    story = "The gyro shows a turn where there is none."
+    story = "The gyro has a bias."
     equation = "r_measured = r {value:+.3f} deg/s"
     parameters = (Parameter("value", "deg/s", np.radians(0.2), np.radians(0.01)),)
     separated_by = {"yaw_rate_scale": "rest (bias) against steady turns both ways (scale)"}
@@ -68,7 +68,7 @@ class YawRateBias(Cause):
         return faults.without_yaw_rate_bias(record, float(p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The yaw rate shows {shown['value'].value:+.3f} deg/s too much."
+        return f"The measured yaw rate has a bias of {shown['value'].value:+.3f} deg/s."
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class YawRateScale(Cause):
     name = "yaw_rate_scale"
     kind = "sensor"
     needs = ("yaw rate",)
-    story = "The gyro shows more or less than the ship turns."
+    story = "The gyro has a scale error."
     equation = "r_measured = {value:.3f} r"
     parameters = (Parameter("value", "1", 0.05, 0.003, low=-0.9),)
     separated_by = {"yaw_rate_bias": "rest (bias) against steady turns both ways (scale)"}
@@ -93,7 +93,7 @@ class YawRateScale(Cause):
         return {"value": (1.0 + p[..., 0], "1")}
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The yaw rate shows {shown['value'].value:.3f} times what the ship turns."
+        return f"The measured yaw rate is {shown['value'].value:.3f} times the true one."
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class ClockOffset(Cause):
 
     name = "clock_offset"
     kind = "sensor"
-    story = "A channel's clock is off."
+    story = "A channel has a clock offset."
     shifts = True
     equation = "measured(t) = true(t - {time:.2f} s)"
     parameters = (Parameter("time", "s", 0.6, 0.04, low=-5.0, high=5.0),)
@@ -125,7 +125,7 @@ class ClockOffset(Cause):
         return self.channel != "gnss"  # that is position and velocity together
 
     def beside(self, label: str) -> bool:
-        """`gnss` is position and velocity together: two of the three say it all."""
+        """`gnss` is position and velocity together: two of the three determine the third."""
         both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
         if self.channel == "gnss":
             return label != self.label and label not in both
@@ -144,11 +144,9 @@ class ClockOffset(Cause):
             self.channel, f"the {self.channel}"
         )
         what = what[0].upper() + what[1:]
-        ending = "" if self.channel == "gnss" else "s"
-        return (
-            f"{what} come{ending} {abs(late):.2f} s {'after' if late > 0 else 'before'} the "
-            "heading."
-        )
+        verb = "are" if self.channel == "gnss" else "is"
+        how = "late" if late > 0 else "early"
+        return f"{what} {verb} {abs(late):.2f} s {how} against the heading."
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ class AntennaOffset(Cause):
 
     name = "antenna_offset"
     kind = "sensor"
-    story = "The antenna stands elsewhere than the profile has it."
+    story = "The antenna is not at its position in the profile."
     equation = "antenna at profile + ({x:+.2f}, {y:+.2f}) m"
     parameters = (
         Parameter("x", "m", 0.3, 0.015, of="length"),
@@ -178,19 +176,19 @@ class AntennaOffset(Cause):
         x, y = shown["x"].value, shown["y"].value
         return (
             f"The antenna is {abs(x):.2f} m {'ahead' if x >= 0 else 'astern'} and {abs(y):.2f} m "
-            f"to {'starboard' if y >= 0 else 'port'} of where the profile has it."
+            f"to {'starboard' if y >= 0 else 'port'} of its position in the profile."
         )
 
 
 @dataclass(frozen=True)
 class WindDirectionOffset(Cause):
-    """Size: 5 deg is what is asked of an instrument (WMO-No. 8, Chap. 5); a vane's zero on its mast
-    and the flow about the ship make it twice that (Smith, Bourassa & Sharp 1999)."""
+    """Size: 5 deg is the required accuracy of an instrument (WMO-No. 8, Chap. 5); a vane's zero on
+    its mast and the flow about the ship make it twice that (Smith, Bourassa & Sharp 1999)."""
 
     name = "wind_direction_offset"
     kind = "sensor"
     needs = ("wind", "wind force")
-    story = "The anemometer is turned on its mast."
+    story = "The anemometer is misaligned."
     equation = "γ_measured = γ_A {angle:+.1f} deg"
     parameters = (Parameter("angle", "deg", np.radians(10.0), np.radians(1.5)),)
     separated_by = {"current": "one full slow turn; a drifting stop shows the current alone"}
@@ -203,18 +201,19 @@ class WindDirectionOffset(Cause):
         return faults.without_wind_direction_offset(record, float(p[0]))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The wind's direction shows {shown['angle'].value:+.1f} deg too much."
+        return f"The anemometer is misaligned by {shown['angle'].value:+.1f} deg."
 
 
 @dataclass(frozen=True)
 class WindSpeedScale(Cause):
-    """Size: 10 % is what is asked of an instrument (WMO-No. 8, Chap. 5); the flow about a bridge is
-    faster by 10 % or more (Moat, Yelland, Pascal & Molland 2005): both, and the height's share."""
+    """Size: 10 % is the required accuracy of an instrument (WMO-No. 8, Chap. 5); the flow about a
+    bridge is faster by 10 % or more (Moat, Yelland, Pascal & Molland 2005): both, and the height's
+    share."""
 
     name = "wind_speed_scale"
     kind = "sensor"
     needs = ("wind", "wind force")
-    story = "The anemometer shows more or less than blows."
+    story = "The anemometer has a scale error."
     equation = "U_measured = {value:.2f} U_A"
     parameters = (Parameter("value", "1", 0.18, 0.02, low=-0.9),)
     separated_by = {"wind_force": "a second anemometer, or fast straight runs in calm"}
@@ -233,4 +232,4 @@ class WindSpeedScale(Cause):
         return {"value": (1.0 + p[..., 0], "1")}
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The wind speed shows {shown['value'].value:.2f} times what blows."
+        return f"The measured wind speed is {shown['value'].value:.2f} times the true one."

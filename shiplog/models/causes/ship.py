@@ -66,7 +66,7 @@ class Fouling(_Factor):
     and 0.34, 0.52 and 0.80 with more and more shells (Schultz 2007): 0.46 in the mean square."""
 
     name = "fouling"
-    story = "The hull has grown rough."
+    story = "The hull resistance has changed by fouling."
     equation = "X'₀·{factor:.2f}"
     scaled = ("hull.x_0f", "hull.x_0a")
     parameters = (Parameter("factor", "1", 0.45, 0.06, low=-1.0),)
@@ -75,7 +75,7 @@ class Fouling(_Factor):
     }
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The hull resists {shown['factor'].value:.2f} times as much as it did."
+        return f"The hull resistance is {shown['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class CrossFlowDrag(_Factor):
     more than with that of one in ballast (5), by Hoerner's curve (Fossen 2011, Sec. 6.4)."""
 
     name = "cross_flow_drag"
-    story = "The hull resists being pushed sideways otherwise than the model has it."
+    story = "The cross-flow drag differs from the model's."
     equation = "C_D·{factor:.2f}"
     scaled = ("hull.c_d",)
     parameters = (Parameter("factor", "1", 0.25, 0.03, low=-1.0),)
@@ -94,7 +94,7 @@ class CrossFlowDrag(_Factor):
     }
 
     def beside(self, label: str) -> bool:
-        """Shallow water makes it grow where it is shallow, and a map of that is rough."""
+        """Not with shallow water, which raises it in places by a coarse map."""
         return super().beside(label) and label != "shallow_water"
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
@@ -109,7 +109,7 @@ class RudderForce(_Factor):
 
     name = "rudder_force"
     needs = ("rudder",)
-    story = "The rudders are stronger or weaker than the model has them."
+    story = "The rudder force differs from the model's."
     equation = "F_N, F_T·{factor:.2f}"
     scaled = ("rudder.f_alpha", "rudder.f_t")
     parameters = (Parameter("factor", "1", 0.25, 0.02, low=-1.0),)
@@ -134,7 +134,7 @@ class ThrustLoss(Cause):
     name = "thrust_loss"
     kind = "ship"
     needs = ("thrust",)
-    story = "The screw pushes less than it did."
+    story = "The thrust has decreased."
     equation = "K_T·{factor:.2f}"
     parameters = (Parameter("factor", "1", 0.3, 0.02, low=-1.0),)
     separated_by = {
@@ -159,7 +159,7 @@ class ThrustLoss(Cause):
         return (replace(self, actuator=""), *(replace(self, actuator=name) for name in names))
 
     def beside(self, label: str) -> bool:
-        """All together says what each unit says, and does not stand beside one."""
+        """The loss of all units is not tested together with that of one."""
         same = label.partition(":")[0] == self.name
         return not same or (bool(self.actuator) and ":" in label and label != self.label)
 
@@ -181,7 +181,7 @@ class ThrustDrift(Cause):
     name = "thrust_drift"
     kind = "ship"
     needs = ("thrust",)
-    story = "The screw pushes less from voyage to voyage."
+    story = "The thrust changes from voyage to voyage."
     equation = "K_T·(1 {slope:+.2f} · share of the campaign)"
     parameters = (Parameter("slope", "1", 0.2, 0.025, low=-1.0),)
     separated_by = {"thrust_loss": "the same run at the beginning and at the end"}
@@ -276,7 +276,7 @@ class RudderOffset(_OnRudders):
     groups: tuple[str, ...] = ("port", "starboard")
 
     name = "rudder_offset"
-    story = "The rudders stand beside where they are recorded."
+    story = "The rudders have an offset from their recorded angles."
     equation = "δ = δ_recorded + offset"
     parameters = ()
     separated_by = {
@@ -317,11 +317,11 @@ class RudderOffset(_OnRudders):
         return {name: (np.degrees(p[..., i]), "deg") for i, name in enumerate(self.groups)}
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        said = " and ".join(
+        angles = " and ".join(
             f"{v.value:+.1f} deg" + (f" ({name})" if self.count > 1 else "")
             for name, v in shown.items()
         )
-        return f"The {self.what} stand {said} off what is recorded."
+        return f"The {self.what} have an offset of {angles} from the recorded angle."
 
     def practical(self, p: np.ndarray, setting: Setting) -> bool:
         return bool(np.abs(p).max() > np.radians(0.3))
@@ -333,7 +333,7 @@ class RudderLag(_OnRudders):
     2011, Sec. 9.5), and the record of the order lacks all of that."""
 
     name = "rudder_lag"
-    story = "The rudders follow what is recorded with a lag of the first order."
+    story = "The rudders follow their recorded angle with a first-order lag."
     equation = "T δ̇ = δ_recorded - δ,  T = {time:.2f} s"
     parameters = (Parameter("time", "s", 1.6, 0.1, low=0.0, high=20.0),)
     separated_by = {"rudder_delay": "rudder doublets of 2 to 4 s at constant revolutions"}
@@ -342,7 +342,9 @@ class RudderLag(_OnRudders):
         return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The {self.what} follow their record with a lag of {shown['time'].value:.2f} s."
+        return (
+            f"The {self.what} follow the recorded angle with a lag of {shown['time'].value:.2f} s."
+        )
 
 
 def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
@@ -380,7 +382,7 @@ class RudderDelay(_OnRudders):
     """Size: a second, the interval at which an autopilot's sentences come (IEC 61162-1)."""
 
     name = "rudder_delay"
-    story = "The rudders act later than they are recorded."
+    story = "The rudders act later than recorded."
     equation = "δ(t) = δ_recorded(t - {time:.2f} s)"
     parameters = (Parameter("time", "s", 1.0, 0.1, low=0.0, high=10.0),)
     separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
@@ -393,4 +395,4 @@ class RudderDelay(_OnRudders):
         return self._with(record, record.later(self._recorded(record), -float(p[0])))
 
     def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The {self.what} act {shown['time'].value:.2f} s later than they are recorded."
+        return f"The {self.what} act {shown['time'].value:.2f} s later than recorded."

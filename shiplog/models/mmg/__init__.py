@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import jax
 import numpy as np
 
+from shiplog import jit_cache  # noqa: F401  # JAX in double precision
 from shiplog.models.coefficients import Parameters
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import beside, estimated, load
 from shiplog.models.physical import Beginning, PhysicalModel, Settings
 from shiplog.profile import Profile
-
-jax.config.update("jax_enable_x64", True)  # sensitivities in float32 do not tell causes apart
 
 __all__ = [
     "MMG",

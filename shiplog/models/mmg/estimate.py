@@ -20,7 +20,7 @@ SALT, FRESH = 1025.0, 998.0  # kg/m³
 ASPECT = 1.5  # span over mean chord of a ship's rudder
 BLOCK_COEFFICIENTS = (0.35, 1.0)
 FULLEST = 0.2  # C_b B/L; a full tanker's is 0.15, and the regressions are of merchant ships
-BROADEST = 0.2  # B/L of the shape that the wind regression is asked for
+BROADEST = 0.2  # B/L of the shape that the wind regression is evaluated for
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,8 @@ def inertia(p: Particulars) -> dict[str, float]:
     ratio, full = p.breadth / p.length, p.block * p.breadth / p.draught
     volume = p.mass / p.density
     m_x = 2.7 * volume ** (5 / 3) / p.length**2 / (0.5 * p.length**2 * p.draught)
-    # Both brackets turn negative for B/L past 0.3 to 0.5. The floors keep 0.4 of a slender body's
+    # Both brackets turn negative for B/L past 0.3 to 0.5. The lower limits keep 0.4 of a slender
+    # body's
     # sway mass and a quarter of its yaw inertia.
     m_y = strip * max(1.0 + 0.16 * full - 5.1 * ratio**2, 0.4)
     j_z = strip * max(1 / 12 + 0.017 * full - 0.33 * ratio, 0.25 / 12)

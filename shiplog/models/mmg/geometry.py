@@ -195,7 +195,7 @@ def _full(thruster: Actuator) -> float:
     if not reach and thruster.si_unit != "1":
         raise ProfileError(
             f"The profile gives no limits for the thruster {thruster.name!r}, and its command is "
-            f"in {thruster.unit}: what full thrust is cannot be told.",
+            f"in {thruster.unit}: the full thrust is not known.",
             hint="add limits to that actuator, or leave the force out with --without thruster.",
         )
     return reach or 1.0

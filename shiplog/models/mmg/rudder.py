@@ -64,7 +64,7 @@ def rudder(
     f₃, F_T and f_i are ours, without effect in the MMG. A fish-tail blade (Schilling, VecTwin)
     turns the jet until it leaves along its chord; by the balance of momentum J (Rankine) its
     force is then J sin α across and J (1 - cos α) along the chord. Of two blades, the one turned
-    inboard works beside the other: its force is f_i times that of the one turned outboard.
+    inboard works next to the other: its force is f_i times that of the one turned outboard.
     """
     gamma = jnp.where(v + blade.ahead * r >= 0.0, p["rudder.gamma_p"], p["rudder.gamma_n"])
     v_r = -gamma * (v + p["rudder.l_r"] * g.length * r)

@@ -67,13 +67,13 @@ def wind(rows: Mapping[str, pl.DataFrame]) -> pl.DataFrame:
 
     rows     the 1 Hz rows of each set, wind_angle in rad
     """
-    shown = {name: frame.with_columns(pl.col("wind_angle") / channels.DEGREE)
+    frames = {name: frame.with_columns(pl.col("wind_angle") / channels.DEGREE)
              for name, frame in rows.items()}  # fmt: skip
-    speeds = np.concatenate([f["wind_speed"].drop_nulls().to_numpy() for f in shown.values()])
+    speeds = np.concatenate([f["wind_speed"].drop_nulls().to_numpy() for f in frames.values()])
     fastest = SPEED_BIN * (math.floor(float(speeds.max(initial=0.0)) / SPEED_BIN) + 1)
     fastest = min(fastest, FASTEST)
     found = []
-    for name, frame in shown.items():
+    for name, frame in frames.items():
         counts = wind_counts(frame, fastest).T
         speed, angle = np.nonzero(counts)
         found.append(pl.DataFrame({

@@ -17,7 +17,7 @@ import polars as pl
 from scipy.stats import t as student
 
 LEVEL = 0.05  # of all comparisons together
-SAME_RATIO = 1.25  # ratio: "no significant difference" is shown where the interval ends below it
+SAME_RATIO = 1.25  # ratio: "no significant difference" holds where the interval ends below it
 
 HOLDS, FAILS, UNCLEAR = "holds", "does not hold", "not shown"
 
@@ -32,7 +32,7 @@ class Statement:
     words: str
 
 
-SAID = (
+STATEMENTS = (
     Statement("sli2", "ref", True, "Slicing to twice the data improves on the reference set."),
     Statement("sli10", "ref", True, "Slicing to ten times the data improves on it."),
     Statement("sli10", "sli2", False, "Slicing finer than twice makes no significant difference."),
@@ -51,28 +51,28 @@ def differences(losses: pl.DataFrame) -> pl.DataFrame:
     losses   set, seed, loss: L over the test windows of each training
 
     statement, left, right, seeds, ratio (geometric mean of L_left / L_right), low, high (null with
-    one seed), finding: "holds", "does not hold" (the contrary is shown) or "not shown".
+    one seed), finding: "holds", "does not hold" (the contrary holds) or UNCLEAR.
     """
     by_set = {
         str(name): dict(own.select("seed", "loss").iter_rows())
         for (name,), own in losses.group_by("set", maintain_order=True)
     }
     rows = []
-    for said in SAID:
-        right = _best(by_set) if said.right == "best augmented" else said.right
-        if said.left not in by_set or right not in by_set:
+    for one in STATEMENTS:
+        right = _best(by_set) if one.right == "best augmented" else one.right
+        if one.left not in by_set or right not in by_set:
             continue
-        pairs = _paired(by_set[said.left], by_set[right])
+        pairs = _paired(by_set[one.left], by_set[right])
         if not len(pairs):
             continue
         middle, half = float(pairs.mean()), _half_width(pairs)
         low, high = middle - half, middle + half
         rows.append({
-            "statement": said.words, "left": said.left, "right": right, "seeds": len(pairs),
+            "statement": one.words, "left": one.left, "right": right, "seeds": len(pairs),
             "ratio": math.exp(middle),
             "low": math.exp(low) if math.isfinite(half) else None,
             "high": math.exp(high) if math.isfinite(half) else None,
-            "finding": _finding(said, low, high, math.isfinite(half)),
+            "finding": _finding(one, low, high, math.isfinite(half)),
         })  # fmt: skip
     return pl.DataFrame(rows, schema=SCHEMA)
 
@@ -94,14 +94,14 @@ def _half_width(pairs: np.ndarray) -> float:
     n = len(pairs)
     if n < 2:
         return math.inf
-    quantile = float(student.ppf(1.0 - LEVEL / len(SAID) / 2.0, n - 1))
+    quantile = float(student.ppf(1.0 - LEVEL / len(STATEMENTS) / 2.0, n - 1))
     return quantile * float(pairs.std(ddof=1)) / math.sqrt(n)
 
 
-def _finding(said: Statement, low: float, high: float, sure: bool) -> str:
+def _finding(one: Statement, low: float, high: float, sure: bool) -> str:
     if not sure:
         return UNCLEAR
-    if not said.smaller:
+    if not one.smaller:
         if low > 0.0 or high < 0.0:
             return FAILS
         return HOLDS if max(-low, high) < math.log(SAME_RATIO) else UNCLEAR

@@ -47,9 +47,9 @@ def figure(height: float, path: Path) -> Iterator[Figure]:
         try:
             yield drawn
             for kind in ("svg", "png"):
-                said = {"Date": None} if kind == "svg" else {}
+                facts = {"Date": None} if kind == "svg" else {}
                 with files.whole(path.with_suffix(f".{kind}")) as partial:
-                    drawn.savefig(partial, format=kind, metadata=said)
+                    drawn.savefig(partial, format=kind, metadata=facts)
                 drawn.set_layout_engine("none")  # laid out once, and alike in both files
         finally:
             pyplot.close(drawn)

@@ -1,4 +1,4 @@
-"""Measured against simulated in Rerun. Only this package imports it, and only when it is asked."""
+"""Measured against simulated in Rerun. Only this package imports Rerun, when it is needed."""
 
 from __future__ import annotations
 

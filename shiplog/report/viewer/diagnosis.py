@@ -19,7 +19,7 @@ from shiplog.report.viewer.style import entity
 
 SIDES = 1.645  # standard deviations of a 90 % band
 LACKS = "model lacks (black)"  # a dark dot does not show in Rerun's dark legend
-COLOURS_SAID = ("blue", "orange")  # style.MODELS: before, and after
+COLOUR_NAMES = ("blue", "orange")  # style.MODELS: before, and after
 NAMED = style.MODELS[1]  # the force of what the model after has
 ROOM = 1.0  # sizes of the measured track that a simulated one is followed beyond it
 CHANNELS = dict(zip((c.name for c in channels.VELOCITY), forces.AXES, strict=True))
@@ -37,7 +37,7 @@ class Pictured:
     models    what `tracks` calls BEFORE and, where there is one, AFTER; in this order their names
               sort, which is the order of their colours
     closeups  voyage → the name of that window
-    pushed    voyage, time, part, surge, sway, yaw [N, N m]: as Comparison.forces has them
+    pushed    voyage, time, part, surge, sway, yaw [N, N m]: as ComparisonData.forces
     errors    voyage, time, seconds, before, after: root mean square
     """
 
@@ -45,7 +45,7 @@ class Pictured:
     tracks: Drawn
     models: dict[str, str]
     closeups: dict[str, str]
-    pushed: pl.DataFrame
+    acting: pl.DataFrame
     errors: pl.DataFrame
 
     @property
@@ -86,10 +86,10 @@ def pictured(exhibit: Exhibit) -> Pictured:
         training=exhibit.measured.clear(),
         summary=exhibit.report,
     )
-    # L is over seconds: what is left of it per second, and its root, reads as a speed
+    # L is over seconds: its value per second has a root that reads as a speed
     root = [(pl.col(n) / pl.col("seconds")).sqrt().alias(n) for n in (BEFORE, AFTER)]
     return Pictured(
-        exhibit, display.drawn(compared), models, closeups, _pushed(exhibit),
+        exhibit, display.drawn(compared), models, closeups, _acting(exhibit),
         exhibit.errors.with_columns(root),
     )  # fmt: skip
 
@@ -100,7 +100,7 @@ def _spoken(names: tuple[str, ...]) -> str:
     return " and ".join(f"{cause} ({of})" if of else cause for cause, _, of in spoken)
 
 
-def _pushed(exhibit: Exhibit) -> pl.DataFrame:
+def _acting(exhibit: Exhibit) -> pl.DataFrame:
     """A row an instant and part: what the model lacks, the ends of its band, what was named."""
     part = {
         LACKS: pl.col("force"),
@@ -138,7 +138,7 @@ def _tab(picture: Pictured, voyage: str) -> rrb.Container:
         row_shares=[1.55, 1.0],
     )
     right: list[rrb.View] = []
-    if (picture.pushed["voyage"] == voyage).any():
+    if (picture.acting["voyage"] == voyage).any():
         right += [_force(picture, voyage, axis) for axis in forces.AXES]
     if (picture.errors["voyage"] == voyage).any():
         right.append(_errors(picture, voyage))
@@ -151,11 +151,11 @@ def _in_words(picture: Pictured, voyage: str) -> str:
     """The window's heading, which says what the colours are."""
     _, unit = trajectory.in_chart_units(picture.tracks)
     what = "Most improved" if AFTER in picture.models else "Worst"
-    lines = zip(picture.models.values(), COLOURS_SAID, strict=False)
-    said = ", ".join(["measured black", *(f"{model} {colour}" for model, colour in lines)])
+    lines = zip(picture.models.values(), COLOUR_NAMES, strict=False)
+    text = ", ".join(["measured black", *(f"{model} {colour}" for model, colour in lines)])
     when = picture.closeups.get(voyage, "").removeprefix(f"{voyage}, ")
     short = {"metres": "m", "kilometres": "km"}[unit]
-    return f"{what}, {when} [{short}]: {said}"
+    return f"{what}, {when} [{short}]: {text}"
 
 
 def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
@@ -174,12 +174,12 @@ def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
 
 def _force(picture: Pictured, voyage: str, axis: str) -> rrb.View:
     what, _, positive = forces.AXES[axis]
-    name, factor = forces.unit(picture.pushed, axis)
+    name, factor = forces.unit(picture.acting, axis)
     return rrb.TimeSeriesView(
         origin=entity("unexplained", voyage, axis),
         name=f"{what} [{name}], positive {positive}",
         axis_x=_whole_voyage(picture, voyage),
-        axis_y=rrb.ScalarAxis(range=forces.readable_range(picture.pushed, axis, factor)),
+        axis_y=rrb.ScalarAxis(range=forces.readable_range(picture.acting, axis, factor)),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=axis == "surge"),
         background=style.plot_background(),
     )
@@ -202,7 +202,7 @@ def _whole_voyage(picture: Pictured, voyage: str) -> rrb.TimeAxis:
 
 
 def error_range(errors: pl.DataFrame) -> tuple[float, float]:
-    """From zero to the largest; a rollout that ran away does not flatten the others."""
+    """From zero to the largest; a rollout that diverged does not flatten the others."""
     values = np.concatenate([display.column(errors, name) for name in (BEFORE, AFTER)])
     middle = float(np.nanmedian(display.column(errors, BEFORE)))
     most = max(min(float(np.nanmax(values)), CUT_OFF * middle), 1e-3)
@@ -218,12 +218,12 @@ def send(recording: rr.RecordingStream, picture: Pictured) -> None:
     for voyage in picture.voyages:
         _send_forces(recording, picture, voyage)
         _send_errors(recording, picture, voyage)
-    said = picture.exhibit.report.translate(DRAWABLE)
-    recording.log("/report", rr.TextDocument(said, media_type=rr.MediaType.MARKDOWN), static=True)
+    text = picture.exhibit.report.translate(DRAWABLE)
+    recording.log("/report", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
-    rows = picture.pushed.filter(pl.col("voyage") == voyage)
+    rows = picture.acting.filter(pl.col("voyage") == voyage)
     lacks, low, high, named = (
         rows.filter(pl.col("part") == part) for part in (LACKS, "low", "high", "named")
     )
@@ -232,7 +232,7 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
         return
     ends, none = time[[0, -1]], np.empty(0, dtype=np.intp)
     for axis in forces.AXES:
-        _, factor = forces.unit(picture.pushed, axis)
+        _, factor = forces.unit(picture.acting, axis)
         band = np.column_stack([display.column(end, axis) for end in (low, high)])
         # drawn in order of names: zero, the band, what the model lacks, what was named
         for name, at, values, cuts, labels, colour, width in (

@@ -1,4 +1,4 @@
-"""The tables as they are drawn: display units, headings without jumps, one shown seed a model."""
+"""The tables as they are drawn: display units, headings without jumps, one drawn seed a model."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _forces(forces: pl.DataFrame | None) -> pl.DataFrame | None:
     )
 
 
-def shown_seeds(comparison: ComparisonData) -> dict[str, int]:
+def drawn_seeds(comparison: ComparisonData) -> dict[str, int]:
     """For each model the seed that is drawn boldly: the one whose mean error is the median.
 
     It is a rollout that a trained model made, which a mean over seeds is not, and neither the

@@ -1,4 +1,4 @@
-"""Who pushes when: what each part of the first model that knows its forces exerts on the ship,
+"""Force components: what each part of the first physical model exerts on the ship,
 along the measured voyage."""
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
     if voyage is not None:
         return None
     rows = of_first_model(drawn)
-    pushed = rows["voyage"].unique().to_list()
+    known = rows["voyage"].unique().to_list()
     tabs = [
         _plots(drawn, voyage, rows, rows.filter(pl.col("voyage") == voyage))
-        for voyage in [v for v in drawn.voyages if v in pushed][: display.MOST_TABS]
+        for voyage in [v for v in drawn.voyages if v in known][: display.MOST_TABS]
     ]
     if not tabs:
         return None
@@ -44,7 +44,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
         _send_zero(recording, voyage, rows.filter(pl.col("voyage") == voyage))
     factors = {axis: unit(rows, axis)[1] for axis in AXES}
     for (voyage, part), lines in rows.group_by("voyage", "part", maintain_order=True):
-        whole = part == "total"  # behind, and wide: seen under a part that acts alone
+        whole = part == "total"  # behind, and wide: visible under a part that acts alone
         for axis, factor in factors.items():
             timeline.send_lines(
                 recording,
@@ -115,7 +115,7 @@ def _send_zero(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame) -
 def _reach(rows: pl.DataFrame, axis: str) -> tuple[float, float]:
     """From the lowest to the highest that a part does, zero among it, without its spikes.
 
-    Part by part: a bow thruster's minute is no spike because the hull pushes all the time.
+    Part by part: a bow thruster's minute is no spike because the hull force acts all the time.
     """
     ends = [0.0]
     for _, lines in rows.group_by("part"):

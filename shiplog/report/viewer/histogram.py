@@ -1,6 +1,6 @@
 """What the training data covered and the test voyages asked for, as in the paper's figures.
 
-Frequencies are logarithmic; Rerun has no such axis, so log10(1 + rows) is drawn and said.
+Frequencies are logarithmic; Rerun has no such axis, so log10(1 + rows) is drawn.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SETS = ("training", "test")
 
 
 def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
-    """Beside a voyage the winds, on their own tab all of them."""
+    """A voyage's winds on its own tab; all of them on a tab of theirs."""
     winds = [
         rrb.Spatial2DView(
             origin=entity("hist", "wind", of),
@@ -55,7 +55,7 @@ def _whose(drawn: Drawn, of: str) -> str:
 
 
 def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
-    """Training data beside all test voyages."""
+    """Training data and all test voyages, side by side."""
     sets = dict(zip(SETS, (drawn.training, drawn.measured), strict=True))
     for channel in _singles(drawn):
         values = {of: _finite(table, channel.name) for of, table in sets.items()}

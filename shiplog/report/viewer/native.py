@@ -48,12 +48,12 @@ def open_viewer(path: str | Path) -> None:
     path = existing(path)
     if sys.platform == "linux" and not (os.getenv("DISPLAY") or os.getenv("WAYLAND_DISPLAY")):
         raise ShiplogError("No display is there to open the viewer on.", hint=WITHOUT_A_WINDOW)
-    with tempfile.TemporaryFile() as said:
-        viewer = start([str(path), "--port", "auto"], said)
+    with tempfile.TemporaryFile() as output:
+        viewer = start([str(path), "--port", "auto"], output)
         with contextlib.suppress(subprocess.TimeoutExpired):
             if viewer.wait(NATIVE_PATIENCE) != 0:
                 raise ShiplogError(
-                    f"The viewer did not start: {last_words(said)}", hint=WITHOUT_A_WINDOW
+                    f"The viewer did not start: {last_words(output)}", hint=WITHOUT_A_WINDOW
                 )
 
 
@@ -87,21 +87,21 @@ def serve(path: str | Path, port: int = 9090) -> Served:
     path = existing(path)
     web, data = free_port(port), free_port(9876)
     source = urllib.parse.quote(f"rerun+http://{HOST}:{data}/proxy", safe="")
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         arguments = [str(path), "--serve-web", "--port", str(data), "--web-viewer-port", str(web)]
-        process = start(arguments, said, supervised=True)
+        process = start(arguments, output, supervised=True)
         try:
             wait_for(process, (web, data), WEB_PATIENCE)
         except TimeoutError:
             stop(process)
             raise ShiplogError(
-                f"The web viewer did not start: {last_words(said)}",
+                f"The web viewer did not start: {last_words(output)}",
                 hint="use --save FILE.rrd, and open the file with `rerun FILE.rrd`.",
             ) from None
     return Served(f"http://{HOST}:{web}/?url={source}", process)
 
 
-def start(arguments: list[str], said: IO[bytes], supervised: bool = False) -> subprocess.Popen:
+def start(arguments: list[str], output: IO[bytes], supervised: bool = False) -> subprocess.Popen:
     """Start Rerun's program in a group of its own, so that Ctrl-C here does not close a window.
 
     supervised   it ends when this process ends, however that comes about
@@ -111,7 +111,7 @@ def start(arguments: list[str], said: IO[bytes], supervised: bool = False) -> su
         [sys.executable, "-I", "-c", SUPERVISOR, *command] if supervised else command,
         env=_environment(),
         stdin=subprocess.PIPE if supervised else subprocess.DEVNULL,
-        stdout=said,
+        stdout=output,
         stderr=subprocess.STDOUT,
         start_new_session=True,
     )
@@ -182,8 +182,8 @@ def existing(path: str | Path) -> Path:
     return path
 
 
-def last_words(said: IO[bytes]) -> str:
+def last_words(output: IO[bytes]) -> str:
     """The program's last line, for a message."""
-    said.seek(0)
-    lines = [line for line in said.read().decode(errors="replace").splitlines() if line.strip()]
-    return lines[-1].strip()[:300] if lines else "it said nothing."
+    output.seek(0)
+    lines = [line for line in output.read().decode(errors="replace").splitlines() if line.strip()]
+    return lines[-1].strip()[:300] if lines else "it gave no message."

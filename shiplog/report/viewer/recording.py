@@ -25,7 +25,7 @@ from shiplog.report.viewer import (
 )
 from shiplog.report.viewer.display import Drawn
 
-# A view sends entities and says where it stands: beside the others of a voyage, or, asked without
+# A view sends entities and names its place: with the others of a voyage, or, called without
 # a voyage, on a tab of its own.
 VIEWS = {
     "trajectory": trajectory,

@@ -36,9 +36,9 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     """The summary, under the comparison's title."""
     bold = "\n".join(
         f"- {model}: seed {seed} is drawn boldly."
-        for model, seed in display.shown_seeds(drawn).items()
+        for model, seed in display.drawn_seeds(drawn).items()
     )
-    pushing = forces.of_first_model(drawn)["model"].unique().to_list()
-    said = "".join(FORCES.format(model=model) for model in pushing)
-    text = f"# {drawn.title}\n\n{drawn.summary}\n{LEGEND}{said}{bold}\n"
+    physical = forces.of_first_model(drawn)["model"].unique().to_list()
+    legend = "".join(FORCES.format(model=model) for model in physical)
+    text = f"# {drawn.title}\n\n{drawn.summary}\n{LEGEND}{legend}{bold}\n"
     recording.log("/report", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)

@@ -40,14 +40,14 @@ def screenshot(rrd: str | Path, png: str | Path, time_s: float | None = None) ->
 def headless() -> Iterator[ViewerClient]:
     """A viewer without a window, ended whatever happens."""
     port = native.free_port()
-    with tempfile.TemporaryFile() as said:
-        process = native.start(["--headless", "--port", str(port)], said, supervised=True)
+    with tempfile.TemporaryFile() as output:
+        process = native.start(["--headless", "--port", str(port)], output, supervised=True)
         try:
             native.wait_for(process, (port,), PATIENCE)
             yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")
         except TimeoutError:
             raise ShiplogError(
-                f"The headless viewer did not start: {native.last_words(said)}",
+                f"The headless viewer did not start: {native.last_words(output)}",
                 hint="it needs a Vulkan driver, such as the package mesa-vulkan-drivers.",
             ) from None
         finally:

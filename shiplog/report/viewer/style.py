@@ -9,7 +9,7 @@ Colour = tuple[int, int, int, int]
 
 TIMELINE = "sim_time"
 MEASURED: Colour = (25, 25, 25, 255)
-MODELS: tuple[Colour, ...] = (  # Okabe and Ito: told apart by colour-blind readers too
+MODELS: tuple[Colour, ...] = (  # Okabe and Ito: colour-blind readers can distinguish them
     (0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 255), (204, 121, 167, 255),
     (230, 159, 0, 255), (86, 180, 233, 255), (120, 80, 40, 255), (150, 150, 0, 255),
 )  # fmt: skip
@@ -34,7 +34,7 @@ def colours(models: list[str]) -> dict[str, Colour]:
 
 
 def part_colours(parts: list[str]) -> dict[str, Colour]:
-    """A part's own colour wherever it is drawn; parts without one share what is left."""
+    """A part's own colour wherever it is drawn; parts without one share the other colours."""
     others = sorted(part for part in parts if part not in PARTS)
     spare = {part: OTHER_PARTS[i % len(OTHER_PARTS)] for i, part in enumerate(others)}
     return {part: PARTS.get(part) or spare[part] for part in parts}

@@ -17,7 +17,7 @@ from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
 AXES = {"x0": "north x₀ [m]", "y0": "east y₀ [m]"}  # x₀ alone says little
-BESIDE_THE_ERROR = ("surge", "sway", "yaw_rate", "heading")  # the rest stands one column on
+IN_THE_FIRST_COLUMN = ("surge", "sway", "yaw_rate", "heading")  # the others are one column on
 
 
 def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
@@ -41,16 +41,16 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
             background=style.plot_background(),
         )
 
-    shown = display.shown_seeds(drawn)
-    banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, shown[m]), "surge")]
+    seeds = display.drawn_seeds(drawn)
+    banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, seeds[m]), "surge")]
     titles = {c.name: AXES.get(c.name, c.label) for c in channels.STATE}
-    if banded:  # said once: a legend would hide a third of so flat a plot
+    if banded:  # named once: a legend would hide a third of so flat a plot
         titles["surge"] += f", pale lines: 90 % band of {', '.join(banded)}"
     states = {
         name: plot(title, "state", voyage, name, shows=[name]) for name, title in titles.items()
     }
     first = [plot("error: log10(1 + d), dots where a window starts", "error", voyage, legend=True)]
-    first += [states.pop(name) for name in BESIDE_THE_ERROR]
+    first += [states.pop(name) for name in IN_THE_FIRST_COLUMN]
     second: list[rrb.View | rrb.Container] = [rrb.Horizontal(*states.values())]
     second += [
         plot(f"{'s, '.join(kinds)}s [{unit}]", "actuator", voyage, group, legend=True, shows=names)
@@ -100,8 +100,11 @@ def readable_range(
     room = 0.6 * max(high - low, 1e-3)
     drawn = [name + end for name in names for end in ("", *BAND)]
     models = [display.column(simulated, n) for n in drawn if n in simulated.columns]
-    seen = np.concatenate([real, *models])
-    low, high = max(low - room, float(np.nanmin(seen))), min(high + room, float(np.nanmax(seen)))
+    every = np.concatenate([real, *models])
+    low, high = (
+        max(low - room, float(np.nanmin(every))),
+        min(high + room, float(np.nanmax(every))),
+    )
     low, high = with_two_labels(low, max(high, low + 1e-3))
     margin = 0.05 * (high - low)
     return low - margin, high + margin
@@ -121,7 +124,7 @@ def with_two_labels(low: float, high: float) -> tuple[float, float]:
 
 
 def actuator_groups(drawn: Drawn) -> dict[str, tuple[list[str], str, list[str]]]:
-    """Actuators by unit, as plots share an axis: entity → kinds, unit shown, names."""
+    """Actuators by unit, as plots share an axis: entity → kinds, display unit, names."""
     groups: dict[str, tuple[list[str], str, list[str]]] = {}
     for actuator in drawn.actuators:
         unit = {"rad": "deg"}.get(actuator.unit, actuator.unit)
@@ -150,7 +153,7 @@ def _send_measured(
 
     for channel in channels.STATE:
         path = entity("state", voyage, channel.name, "measured")
-        line(path, channel, style.MEASURED, "measured", 2.5)  # seen under a model that is right
+        line(path, channel, style.MEASURED, "measured", 2.5)  # visible under a model that is right
     by_name = {actuator.name: actuator for actuator in drawn.actuators}
     for group, (_, _, names) in actuator_groups(drawn).items():
         for i, name in enumerate(names):
@@ -165,7 +168,7 @@ def _send_measured(
 def _send_simulated(
     recording: rr.RecordingStream, drawn: Drawn, voyage: str, simulated: pl.DataFrame
 ) -> None:
-    shown = display.shown_seeds(drawn)
+    seeds = display.drawn_seeds(drawn)
     simulated = simulated.with_columns(d=(1.0 + pl.col("d")).log10())
     curves: list[tuple[str, tuple[str, ...]]] = [
         (c.name, ("state", voyage, c.name)) for c in channels.STATE
@@ -173,7 +176,7 @@ def _send_simulated(
     curves.append(("d", ("error", voyage)))
     for model, colour in style.colours(drawn.models).items():
         rollouts = simulated.filter(pl.col("model") == model)
-        bold = _bold(simulated, model, shown[model])
+        bold = _bold(simulated, model, seeds[model])
         time, begins = display.column(bold, "time"), display.pieces(bold)
         spread = _spread(rollouts) if rollouts["seed"].n_unique() > 1 else None
         for name, parent in curves:

@@ -47,7 +47,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None
     drawn, _ = in_chart_units(drawn)
     measured = drawn.measured
     simulated = drawn.simulated
-    shown = display.shown_seeds(drawn)
+    seeds = display.drawn_seeds(drawn)
     for voyage in drawn.voyages:
         _send_chart(recording, drawn, voyage, room)
         rows = measured.filter(pl.col("voyage") == voyage)
@@ -55,7 +55,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn, room: float = 0.0) -> None
         _send_window_starts(recording, voyage, simulated.filter(pl.col("voyage") == voyage))
         for model, colour in style.colours(drawn.models).items():
             rollouts = simulated.filter(pl.col("voyage") == voyage, pl.col("model") == model)
-            bold = pl.col("seed") == shown[model]
+            bold = pl.col("seed") == seeds[model]
             _send_simulated(recording, drawn, voyage, model, colour, rollouts.filter(bold))
             others = _strips(rollouts.filter(~bold), ("seed", "window"))
             recording.log(

@@ -1,7 +1,7 @@
 """Draft a ship profile for a log or a table that nobody has described yet.
 
 A draft is a proposal: what was guessed from a name says CHECK, what was not found says so, and
-beside each line stands what the data hold there.
+each line has a comment on what the data hold.
 """
 
 from shiplog.voyages.draft_profile.tables import draft_table

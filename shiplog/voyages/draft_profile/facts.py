@@ -1,10 +1,10 @@
-"""What the data hold, in the few words that fit beside a line of a draft."""
+"""What the data hold, in the few words of a comment in a draft."""
 
 from __future__ import annotations
 
 import polars as pl
 
-FIRST_VALUES = 3  # values shown
+FIRST_VALUES = 3  # values in a comment
 ASKED = 8  # vessels named where a draft has to ask
 
 
@@ -30,5 +30,5 @@ def of_times(times: pl.Series) -> str:
 def counted(counts: dict[str, int], what: str) -> str:
     """The largest of many, for a question."""
     most = sorted(counts, key=lambda name: -counts[name])[:ASKED]
-    shown = ", ".join(f"{name} ({counts[name]} {what})" for name in most)
-    return shown + (f", and {len(counts) - len(most)} more" if len(counts) > len(most) else "")
+    text = ", ".join(f"{name} ({counts[name]} {what})" for name in most)
+    return text + (f", and {len(counts) - len(most)} more" if len(counts) > len(most) else "")

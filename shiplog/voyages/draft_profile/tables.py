@@ -92,7 +92,8 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
 
     vessel  which ship, where a column tells several apart
 
-    Raises ChannelMissing for what is no table, ProfileError where nobody said which vessel.
+    Raises ChannelMissing for what is no table, and ProfileError where there are several vessels
+    and none is chosen.
     """
     table = read_table(path)
     frame = table.frame
@@ -106,7 +107,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     for channel, (pattern, unit) in CHANNELS.items():
         names = _matching(frame, pattern, channel, taken)
         found[channel] = [_found(rows[n], channel, unit, table) for n in names]
-    _settle_turning(found, labels, rows)
+    _choose_turning(found, labels, rows)
     chosen, second = _kinds(found)
     taken |= {f.column for _, _, columns in chosen for f in columns}
     taken |= {f.column for columns in found.values() for f in columns}
@@ -187,19 +188,19 @@ def _time(values: pl.Series, table: DelimitedTable) -> FoundColumn:
         return FoundColumn(values.name, "time", None, f"CHECK: {error.message}")
 
 
-def _found(values: pl.Series, channel: str, usual: str, table: DelimitedTable) -> FoundColumn:
-    """A column with its unit: the one it states, else the usual one where the values allow it."""
+def _found(values: pl.Series, channel: str, default: str, table: DelimitedTable) -> FoundColumn:
+    """A column with its unit: the one it states, else the default where the values allow it."""
     stated = words.unit_of(values.name) or words.spelled(table.units.get(values.name, ""))
     check = "CHECK: a set-point, not a measurement" if words.is_set_point(values.name) else ""
     if stated:
         return FoundColumn(values.name, channel, stated, check)
-    unit = usual
-    if usual in ("deg", "deg/s") and values.dtype.is_numeric() and channel not in (
+    unit = default
+    if default in ("deg", "deg/s") and values.dtype.is_numeric() and channel not in (
         "latitude", "longitude",
     ):  # fmt: skip
         most = values.cast(pl.Float64).fill_nan(None).abs().max()
         limit = FULL_TURN_RAD if channel else HARD_OVER_RAD
-        if isinstance(most, float) and 0 < most < limit and usual == "deg":
+        if isinstance(most, float) and 0 < most < limit and default == "deg":
             unit = "rad"
     sure = channel in ("latitude", "longitude")
     return FoundColumn(
@@ -207,7 +208,7 @@ def _found(values: pl.Series, channel: str, usual: str, table: DelimitedTable) -
     )
 
 
-def _settle_turning(
+def _choose_turning(
     found: dict[str, list[FoundColumn]], labels: list[FoundColumn], rows: pl.DataFrame
 ) -> None:
     """The unit of a yaw rate that states none: the one that fits how fast the heading turns."""
@@ -253,14 +254,14 @@ def _kinds(
 
 
 def _sensor(name: str, kind: str) -> str:
-    topic, fields, said = SINGLE[name, kind]
+    topic, fields, unit_names = SINGLE[name, kind]
     quoted = ", ".join(f'"{f}"' for f in fields)
     lines = [f"[sensors.{name}]", f'kind = "{kind}"', f'topic = "{topic}"']
     lines.append(f"fields = [{quoted}]" if len(fields) > 1 else f"field = {quoted}")
-    if len(said) == 1:
-        lines.append(f'unit = "{said[0]}"')
+    if len(unit_names) == 1:
+        lines.append(f'unit = "{unit_names[0]}"')
     else:
-        lines.append("units = [" + ", ".join(f'"{u}"' for u in said) + "]")
+        lines.append("units = [" + ", ".join(f'"{u}"' for u in unit_names) + "]")
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
     return "\n".join(lines) + "\n"

@@ -15,7 +15,7 @@ from shiplog.voyages.draft_profile import facts, words
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
 LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted
-SEARCHED = 200  # topics whose data are read at most, for what stands beside the lines
+SEARCHED = 200  # topics whose data are read at most, for the comments of the lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class Log:
         self.data: dict[str, pl.DataFrame] = {}
 
     def look(self, wanted: dict[str, set[str]]) -> None:
-        """Read what the draft speaks of, beside what was read already."""
+        """Read the topics of the draft that were not read yet."""
         if wanted:
             self.data |= read(self.contents.path, dict(list(wanted.items())[:SEARCHED])).frames
 
@@ -145,8 +145,8 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
     parts = [_ship(log.contents)]
     parts += [_sensor(name, found, log) for name, found in choices.items()]
     parts += [_actuator(*one, log=log) for one in driven] or [NO_ACTUATOR]
-    shown = [choice for found in choices.values() for choice in found[:2]]
-    used = {*(choice.topic for choice in shown), *(topic for _, topic, _, _ in driven)}
+    listed_first = [choice for found in choices.values() for choice in found[:2]]
+    used = {*(choice.topic for choice in listed_first), *(topic for _, topic, _, _ in driven)}
     unused = sorted(set(log.leaves) - used)
     if unused:
         parts.append("# Topics not used: " + listed(unused, most=40) + "\n")
@@ -171,7 +171,7 @@ def _fields_of(choices: Iterable[Choice]) -> dict[str, set[str]]:
 def _of_one_vessel(
     leaves: dict[str, tuple[str, ...]], vessel: str | None, found: Contents
 ) -> dict[str, tuple[str, ...]]:
-    """Without the topics of other ships. Raises ProfileError where nobody said which one."""
+    """Without the topics of other ships. Raises ProfileError where no ship was chosen."""
     counts: dict[str, int] = {}
     for topic in leaves:
         if match := MMSI.search(topic):
@@ -245,7 +245,7 @@ def _section(name: str, choice: Choice, log: Log) -> str:
     fallback = guess.unit.split()
     fallback = fallback * len(paths) if len(fallback) == 1 else fallback
     known = [log.unit(path, topic) for path in paths]
-    said = [unit or other for unit, other in zip(known, fallback, strict=True)]
+    units = [unit or other for unit, other in zip(known, fallback, strict=True)]
     sure = all(known) or guess.kind.startswith("quaternion")
     ordered = "CHECK: a set-point, not a measurement; " if words.is_set_point(topic) else ""
     lines = [f"[sensors.{name}]"]
@@ -255,10 +255,10 @@ def _section(name: str, choice: Choice, log: Log) -> str:
     lines.append(f"fields = [{quoted}]" if len(paths) > 1 else f"field = {quoted}")
     lines += [f"#   {path}: {log.values(topic, path)}" for path in paths]
     check = "" if sure else "  # CHECK: the log does not say"
-    if len(set(said)) == 1:
-        lines.append(f'unit = "{said[0]}"{check}')
+    if len(set(units)) == 1:
+        lines.append(f'unit = "{units[0]}"{check}')
     else:
-        lines.append("units = [" + ", ".join(f'"{u}"' for u in said) + f"]{check}")
+        lines.append("units = [" + ", ".join(f'"{u}"' for u in units) + f"]{check}")
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
     return "\n".join(lines) + "\n"

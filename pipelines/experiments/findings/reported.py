@@ -1,4 +1,4 @@
-"""What a diagnosis said, in a few lines; and profiles that differ in one thing."""
+"""What a diagnosis reported, in a few lines; and profiles that differ in one thing."""
 
 from __future__ import annotations
 
@@ -30,40 +30,40 @@ def diagnosed(
         began = time.monotonic()
         diagnose_run(run, store, names, out)
         log.info("%s: %.0f s", out.name, time.monotonic() - began)
-    said = json.loads((out / "verdict.json").read_text("utf-8"))
-    lines = [f"## {run.name}, {what}", "", f"{said['verdict']}: {said['sentence']}", ""]
-    for cause in said["causes"]:
+    reported = json.loads((out / "verdict.json").read_text("utf-8"))
+    lines = [f"## {run.name}, {what}", "", f"{reported['verdict']}: {reported['sentence']}", ""]
+    for cause in reported["causes"]:
         lines.append(f"- {cause['name']}: {parameters(cause['parameters'])}")
-    gain = said.get("gain")
+    gain = reported.get("gain")
     if gain:
         lines.append(
             f"- held out: L {gain['before']:.0f} to {gain['after']:.0f}, "
             f"{gain['reduction']:.0%} less ({gain['low']:.0%} to {gain['high']:.0%}), "
             f"{gain['held_out_windows']} windows"
         )
-    lines += [f"- rejected {r['name']}: {r['reason']}" for r in said["rejected"]]
-    lines += [f"- trace {t['name']}: {t['sentence']}" for t in said["traces"]]
+    lines += [f"- rejected {r['name']}: {r['reason']}" for r in reported["rejected"]]
+    lines += [f"- trace {t['name']}: {t['sentence']}" for t in reported["traces"]]
     lines += [
         f"- {i['kind']}: {i['voyage']} {i['start_s']:.0f} to {i['end_s']:.0f} s: {i['sentence']}"
-        for i in said["intervals"]
+        for i in reported["intervals"]
         if i["kind"] == "external"
     ]
     lines += [
         f"- not seen by the model, {u['variable']}: {u['sentence']}"
-        for u in said["unseen"]
+        for u in reported["unseen"]
         if u["significant"]
     ]
-    lines += [f"- {note}" for note in said.get("notes", ())]
+    lines += [f"- {note}" for note in reported.get("notes", ())]
     return "\n".join(lines)
 
 
-def parameters(said: dict) -> str:
+def parameters(reported: dict) -> str:
     """A cause's numbers with their 90 % intervals and units, in a line."""
     return ", ".join(
         f"{name} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g}) {unit(p)}".strip()
         if not isinstance(p["value"], str)
         else f"{name} {p['value']}"
-        for name, p in said.items()
+        for name, p in reported.items()
     )
 
 
