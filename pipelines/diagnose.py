@@ -23,6 +23,7 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.result import Decision
 from shiplog.exceptions import RunError, listed
 from shiplog.models.causes import Cause, user
 from shiplog.paths import refuse_taken
@@ -148,14 +149,8 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         simulated = network.beside(decision)
         whole = simulated[0].covering(simulated[1].first)
     if held and decision.named and tried.reference.adapts:
-        if run.judges_itself:
-            notes.append(
-                f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
-                "cause. The numbers are then those of the residual, and too small."
-            )
-        if decision.adapted:
-            alone = held.adapted(decision).reduction
-            notes.append(f"{run.name} is fitted again together with the named causes.")
+        notes += _of_own_voyages(run, decision)
+        alone = held.adapted(decision).reduction if decision.adapted else None
     reach("report")
     context = Context(
         run,
@@ -174,6 +169,19 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
     return DiagnosedTrial(verdict, out, decision, tried, simulated, whole, held, after)
+
+
+def _of_own_voyages(run: Run, decision: Decision) -> list[str]:
+    """What a verdict about a run's own training voyages cannot tell."""
+    notes = []
+    if run.judges_itself:
+        notes.append(
+            f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
+            "cause. The numbers are then those of the residual, and too small."
+        )
+    if decision.adapted:
+        notes.append(f"{run.name} is fitted again together with the named causes.")
+    return notes
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:

@@ -21,17 +21,7 @@ from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.models.causes import Cause
 from shiplog.voyages.recording import Record
 
-LOUDER = (
-    1.0,
-    1.4,
-    2.0,
-    2.8,
-    4.0,
-    5.6,
-    8.0,
-    11.0,
-    16.0,
-)  # λ, factors of the process noise
+LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ, factors of process noise
 QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less

@@ -19,7 +19,6 @@ STEP_NATS = 100.0  # nats: no step of a converging fit loses as much
 SHORTER = 3  # times that a step is halved where the fit diverges
 AT_REST = 0.02  # of a number's size: it rests
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
-HOPE = 4.0  # times what the last round of linearising brought may still come
 
 
 def settle(
@@ -27,14 +26,12 @@ def settle(
     included: Sequence[str],
     numbers: Mapping[str, np.ndarray],
     path: Path | None,
-    beat: float = -np.inf,
     lowest: float = -np.inf,
 ) -> tuple[Point, Found]:
-    """These causes together, linearised where they are until they rest (from where they did
-    before, if they have); or until it is plain that their evidence will not `beat` what
-    another has. A step after which it is below the `lowest` that it can be at rest, where that is
-    known, or then falls far, went too far."""
-    point, louder, lately, before = None, 1.0, None, np.inf
+    """These causes together, linearised at their numbers until these converge (from where they did
+    before, if they have). A step goes too far if the evidence is then below the `lowest` that is
+    possible, where that is known, or falls far."""
+    point, louder, lately = None, 1.0, None
     near: Path | Point | None = path
     key = (tuple(included), trial.pulse)
     if key in trial.rested:
@@ -42,33 +39,22 @@ def settle(
         lately = louder
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
-    steady = False  # whether the process noise is at rest: then it is not looked for in a round
+    steady = False  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, louder)
-            if np.abs(point.linear.e).max() > AWAY:
-                raise np.linalg.LinAlgError("the path diverged")
-            if steady and lately is not None:
-                base = trial.fit(point, included, lately)
-            else:
-                base, _ = trial.scan(point, (), included, lately)
-            if base.evidence < lowest:
-                raise np.linalg.LinAlgError("a step too far")
+            base = _fitted(trial, point, included, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
             if shorter == SHORTER:
                 assert trial.first is not None
                 return trial.first, Found("+".join(included), -np.inf, louder, numbers)
             shorter += 1
-            if stood is None:
-                numbers = {**numbers, included[-1]: 0.5 * numbers[included[-1]]}
-            else:
-                numbers = {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
+            numbers = _half_way(numbers, stood, included[-1])
             continue
         near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
             lowest = max(lowest, base.evidence - STEP_NATS)
-        tried = steady
-        steady = lately is not None and abs(math.log(base.louder / lately)) < STEADY
+        kept, steady = steady, lately is not None and abs(math.log(base.louder / lately)) < STEADY
         louder = lately = base.louder
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit diverged
@@ -76,18 +62,39 @@ def settle(
         moved = _within_bounds(trial, base.numbers, base.covariance)
         far = trial.apart(moved, numbers)
         numbers = moved
-        lost = base.evidence + HOPE * max(base.evidence - before, 0.0) < beat
         if far < AT_REST:
-            if tried:
+            if kept:
                 base, _ = trial.scan(point, (), included, lately)
                 numbers, louder = _within_bounds(trial, base.numbers, base.covariance), base.louder
             trial.rested[key] = (numbers, point.path, louder)
             break
-        if lost and np.isfinite(before):
-            break
-        before = base.evidence
     assert point is not None
     return point, replace(base, name="+".join(included), numbers=numbers)
+
+
+def _fitted(
+    trial: TrialEvidence, point: Point, included: Sequence[str], lately: float | None,
+    steady: bool, lowest: float,
+) -> Found:  # fmt: skip
+    """The hypothesis at a point. Raises np.linalg.LinAlgError where the step there went too far."""
+    if np.abs(point.linear.e).max() > AWAY:
+        raise np.linalg.LinAlgError("the path diverged")
+    if steady and lately is not None:
+        base = trial.fit(point, included, lately)
+    else:
+        base, _ = trial.scan(point, (), included, lately)
+    if base.evidence < lowest:
+        raise np.linalg.LinAlgError("a step too far")
+    return base
+
+
+def _half_way(
+    numbers: Mapping[str, np.ndarray], stood: Mapping[str, np.ndarray] | None, last: str
+) -> dict[str, np.ndarray]:
+    """Half a step: back towards where the fit held; before it ever did, half of the last cause."""
+    if stood is None:
+        return {**numbers, last: 0.5 * numbers[last]}
+    return {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
 
 
 def _within_bounds(

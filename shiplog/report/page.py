@@ -11,41 +11,8 @@ def markdown(verdict: Verdict) -> str:
     lines = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
     lines += [f"Model: {verdict.run}, {verdict.made}.", ""]
     for cause in verdict.causes:
-        lines += [
-            f"## {cause['name']} (probability {cause['probability']:.2f})", "",
-            cause["sentence"], "", f"    {cause['equation']}", "",
-            "| parameter | value | 90 % interval | unit |", "| --- | ---: | --- | --- |",
-        ]  # fmt: skip
-        for name, p in cause["parameters"].items():
-            if isinstance(p["value"], str):
-                lines.append(f"| {name} | {p['value']} | | |")
-            else:
-                lines.append(
-                    f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} "
-                    f"| {p['unit']} |"
-                )
-        if cause["indistinguishable_from"]:
-            lines += [
-                "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}. "
-                f"A test that can: {cause['next_test']}.",
-            ]  # fmt: skip
-        if (expected := cause.get("next_test_expected")) is not None:
-            lines += [
-                f"Of the simulated manoeuvres, {expected['manoeuvre']} separates them best: "
-                f"{expected['nats']:.3g} nats in {expected['seconds']:.0f} s.",
-            ]  # fmt: skip
-        lines.append("")
-    if verdict.gain is not None:
-        g = verdict.gain
-        lines += [
-            "## Gain on held-out windows", "",
-            f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
-            f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
-            f"fitted without {verdict.without}).", "",
-            "By channel: " + ", ".join(
-                f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items()
-            ) + ".", "",
-        ]  # fmt: skip
+        lines += _cause(cause)
+    lines += _gain(verdict)
     if verdict.ranking:
         lines += ["## Ranking", "", "| hypothesis | probability |", "| --- | ---: |"]
         lines += [f"| {r['name']} | {r['probability']:.3f} |" for r in verdict.ranking]
@@ -55,22 +22,75 @@ def markdown(verdict: Verdict) -> str:
             lines += [f"## {title}", ""]
             lines += [f"- {r['name']}: {r.get('reason') or r.get('sentence')}" for r in rows]
             lines.append("")
-    if verdict.limits:
-        lines += [
-            "## Smallest detectable sizes", "",
-            "A cause below this size may be present and not found: each number alone, and all "
-            "numbers together as a share of the realistic size.", "",
-            "| cause | detectable from | of realistic size |", "| --- | --- | ---: |",
-        ]  # fmt: skip
-        for one in verdict.limits:
-            numbers = ", ".join(
-                f"{k.replace('_', ' ')} {v['value']:.2g} {v['unit']}".removesuffix(" 1")
-                for k, v in one["parameters"].items()
+    lines += [*_limits(verdict), *_errors(verdict)]
+    if verdict.notes:
+        lines += ["## Notes", "", *[f"- {note}" for note in verdict.notes], ""]
+    return "\n".join(lines)
+
+
+def _cause(cause: dict) -> list[str]:
+    lines = [
+        f"## {cause['name']} (probability {cause['probability']:.2f})", "",
+        cause["sentence"], "", f"    {cause['equation']}", "",
+        "| parameter | value | 90 % interval | unit |", "| --- | ---: | --- | --- |",
+    ]  # fmt: skip
+    for name, p in cause["parameters"].items():
+        if isinstance(p["value"], str):
+            lines.append(f"| {name} | {p['value']} | | |")
+        else:
+            lines.append(
+                f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} |"
             )
-            label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
-            share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
-            lines.append(f"| {label} | {numbers} | {share} |")
-        lines.append("")
+    if cause["indistinguishable_from"]:
+        lines += [
+            "", f"These data cannot tell it from {listed(cause['indistinguishable_from'])}. "
+            f"A test that can: {cause['next_test']}.",
+        ]  # fmt: skip
+    if (expected := cause.get("next_test_expected")) is not None:
+        lines += [
+            f"Of the simulated manoeuvres, {expected['manoeuvre']} separates them best: "
+            f"{expected['nats']:.3g} nats in {expected['seconds']:.0f} s.",
+        ]  # fmt: skip
+    return [*lines, ""]
+
+
+def _gain(verdict: Verdict) -> list[str]:
+    if verdict.gain is None:
+        return []
+    g = verdict.gain
+    channels = (f"{c.replace('_', ' ')} {round(100.0 * v):d}%" for c, v in g.channels.items())
+    return [
+        "## Gain on held-out windows", "",
+        f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
+        f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
+        f"fitted without {verdict.without}).", "",
+        "By channel: " + ", ".join(channels) + ".", "",
+    ]  # fmt: skip
+
+
+def _limits(verdict: Verdict) -> list[str]:
+    if not verdict.limits:
+        return []
+    lines = [
+        "## Smallest detectable sizes", "",
+        "A cause below this size may be present and not found: each number alone, and all "
+        "numbers together as a share of the realistic size.", "",
+        "| cause | detectable from | of realistic size |", "| --- | --- | ---: |",
+    ]  # fmt: skip
+    for one in verdict.limits:
+        numbers = ", ".join(
+            f"{k.replace('_', ' ')} {v['value']:.2g} {v['unit']}".removesuffix(" 1")
+            for k, v in one["parameters"].items()
+        )
+        label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
+        share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
+        lines.append(f"| {label} | {numbers} | {share} |")
+    return [*lines, ""]
+
+
+def _errors(verdict: Verdict) -> list[str]:
+    """Where the errors are, what they depend on, and what was left out."""
+    lines: list[str] = []
     if verdict.wrong:
         lines += ["## Where the errors are", ""]
         lines += [
@@ -92,6 +112,4 @@ def markdown(verdict: Verdict) -> str:
             for i in verdict.intervals
         ]
         lines.append("")
-    if verdict.notes:
-        lines += ["## Notes", "", *[f"- {note}" for note in verdict.notes], ""]
-    return "\n".join(lines)
+    return lines

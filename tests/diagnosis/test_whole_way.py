@@ -641,7 +641,7 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, low
     monkeypatch.setattr(trial, "scan", told)
     monkeypatch.setattr(trial, "rested", {})
     begin = {"heading_offset": np.array([0.16])}
-    _, found = settle(trial, ("heading_offset",), begin, None, -np.inf, lowest)
+    _, found = settle(trial, ("heading_offset",), begin, None, lowest)
     assert found.evidence == (rests if holds else -np.inf)
 
 
@@ -684,5 +684,5 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     low = decision.nothing.evidence + 900.0  # nothing at rest is so high: each step went too far
     begin = {"heading_offset": np.array([0.01])}
-    _, found = settle(trial, ("heading_offset",), begin, path, -np.inf, low)
+    _, found = settle(trial, ("heading_offset",), begin, path, low)
     assert found.evidence == -np.inf

@@ -1,9 +1,8 @@
 """Blind cases: a sister ship, a campaign of it as it is, and one with something hidden in it.
 
 All of a case follows from its seed. What is hidden is drawn apart from ship, laws, weather, helm
-and noise: the same seed with another cause is the same campaign with another cause. The logs do
-not say which; the key does, and lies elsewhere. The laws are the seed's own, and so share no form
-and no number with the catalogue of causes.
+and noise: the same seed with another cause is the same campaign with it. Only the key, which lies
+elsewhere, says which. The laws are the seed's own, and share no form with the catalogue of causes.
 """
 
 from __future__ import annotations
@@ -26,16 +25,15 @@ from pipelines.experiments.simulated_ship.ship import Effects, Ship, varied
 from pipelines.experiments.simulated_ship.voyage import Voyage, sail
 from pipelines.experiments.simulated_ship.weather import Wind
 
-DURATIONS = {  # s, of the trial
+DURATIONS = {  # s, of the trial; the last, one to fit and one to hold out
     7000: (500.5, 1801.8, 500.5, 1801.8, 1201.2, 1201.2),  # the paper's
     3000: (500.5, 900.9, 700.7, 900.9),
-    500: (250.0, 250.0),  # one to fit and one to hold out
+    500: (250.0, 250.0),
 }
 NOMINAL = {7000: 7000, 3000: 3000, 500: 7000}  # s of a trial → of the nominal campaign
 SHARES = {"none": 0.2, "one": 0.6, "two": 0.1, "outside": 0.1}
 SMALLEST = 0.1  # of the realistic size
-NOMINAL_DAY = datetime(2025, 6, 3, 1, 0, tzinfo=UTC)
-TRIAL_DAY = datetime(2025, 11, 11, 1, 0, tzinfo=UTC)
+NOMINAL_DAY, TRIAL_DAY = (datetime(2025, *day, 1, 0, tzinfo=UTC) for day in ((6, 3), (11, 11)))
 
 Parameters = dict[str, dict[str, Any]]  # name -> value and unit
 Drawn = tuple[dict[str, Any], Parameters]  # fields of `Effects`, and what the key says of them

@@ -115,14 +115,21 @@ def _send_wind(
     tall, wide = picture.shape[:2]
     path = entity("hist", "wind", of, "picture")
     recording.log(path, rr.Image(picture, color_model="RGB", draw_order=1.0), static=True)
+    _send_axes(recording, of, count.shape[1], (tall, wide, high), most)
 
+
+def _send_axes(
+    recording: rr.RecordingStream, of: str, speeds: int, size: tuple[int, int, int], most: float
+) -> None:
+    """Ticks, their numbers and the key of a picture of `size`: tall, wide, and high a speed."""
+    tall, wide, high = size
     ticks, names, marks = [], [], []
     for degrees in range(0, 361, 90):
         x = degrees / ANGLE_BIN * CELL
         ticks.append([(x, 0.0), (x, tall + 2.0)])
         marks.append((x, tall + 10.0))
         names.append(f"{degrees}°")
-    fastest = count.shape[1] * SPEED_BIN
+    fastest = speeds * SPEED_BIN
     step = next(s for s in (1.0, 2.0, 5.0, 10.0, 20.0) if fastest / s <= 6.5 or s == 20.0)
     for speed in np.arange(0.0, fastest + 1e-9, step):
         y = tall - speed / SPEED_BIN * high
