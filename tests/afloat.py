@@ -11,7 +11,7 @@ import numpy as np
 from pipelines.experiments import simulated_ship
 from shiplog import profile_file as profiles
 from shiplog.diagnosis import linearisation, residual_acceleration, segments
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Wide
 from shiplog.models import mmg
 from shiplog.models.extended import Extended
@@ -30,11 +30,13 @@ WIDE = Wide(
     np.array([1.0, 0.3, 1.0, 0.3, 0.2, 0.1]),
     np.array([0.02, 0.02, 0.02]),
 )
-UNREST = Unrest(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes it
-    np.array([0.007, 0.0076, 0.0066, 0.0073, 0.0006, 0.0013]),
-    np.array([7e-4, 7e-4, 5e-4]),
-    4.0,
-    WIDE.start,
+PROCESS_NOISE = (
+    ProcessNoise(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes it
+        np.array([0.007, 0.0076, 0.0066, 0.0073, 0.0006, 0.0013]),
+        np.array([7e-4, 7e-4, 5e-4]),
+        4.0,
+        WIDE.start,
+    )
 )
 
 

@@ -22,7 +22,7 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.fitted import Point
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_campaign import Campaign, prior
 from shiplog.diagnosis.nominal_reference import Reference
@@ -36,7 +36,7 @@ from shiplog.voyages.timescale import KNOT, SEGMENT_S
 
 PROFILE = profiles.load("esso-vectwin")
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
-UNREST = Unrest(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
+PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
 SETTING = Setting(PROFILE, {"speed": 0.5, "length": 3.0, "mass": 245.0}, np.zeros((1, 2)), 1.0)
 COEFFICIENTS = 2  # of the base model
 STEP = 0.5  # s between rows
@@ -131,8 +131,8 @@ def passed(
         drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * told
         j[..., at] = drawn / columns.unit[at]
     d = np.zeros(count) if numbers is None else numbers
-    kernel = np.linalg.cholesky(UNREST.kernel(knots))
-    start = UNREST.start * rng.standard_normal((len(cut), 6))
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(knots))
+    start = PROCESS_NOISE.start * rng.standard_normal((len(cut), 6))
     push = noise * rng.standard_normal((len(cut), 3 * knots)) @ kernel.T
     if pushed is not None:
         push = push + pushed
@@ -151,12 +151,12 @@ def campaign(
     g = segments.grid(nominal)
     knots = segment_nodes.at_knots(given.cut, g)
     first = columns.linearised
-    seen = discrepancy.of(PROFILE, UNREST.push, first, names, knots) if names else \
-        Discrepancy((), UNREST.push)  # fmt: skip
+    seen = discrepancy.of(PROFILE, PROCESS_NOISE.push, first, names, knots) if names else \
+        Discrepancy((), PROCESS_NOISE.push)  # fmt: skip
     columns = columns.with_misfit(seen.count)
     count = len(columns.unit)
-    unseen = discrepancy.of(PROFILE, UNREST.push, count, discrepancy.UNSEEN, knots)
-    modes = likelihood.modes(likelihood.weighed(given, UNREST), UNREST)
+    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.push, count, discrepancy.UNSEEN, knots)
+    modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     if seen.families:
         modes = modes.beside(seen.pushed(given.cut, g))
     whole = modes.beside(unseen.pushed(given.cut, g))
@@ -175,9 +175,9 @@ def campaign(
     information, pull = prior(kept, sizes**-2.0, anchor, spread, share)
     model = SimpleNamespace(causes=columns.causes, base=None, bends=False)
     made = Reference(
-        model, SETTING, np.zeros(COEFFICIENTS), columns, UNREST,  # type: ignore[arg-type]
-        linear_segments.Wide(NOISE, UNREST.start, UNREST.push), information, pull, anchor,
-        1.0 / share, given, modes, nominal_reference.freedom(parts),
+        model, SETTING, np.zeros(COEFFICIENTS), columns, PROCESS_NOISE,  # type: ignore[arg-type]
+        linear_segments.Wide(NOISE, PROCESS_NOISE.start, PROCESS_NOISE.push), information, pull,
+        anchor, 1.0 / share, given, modes, nominal_reference.freedom(parts),
         misfit=seen if seen.families else None,  # type: ignore[arg-type]
         counts=share,
     )  # fmt: skip
@@ -194,11 +194,13 @@ class Straight(Trial):
         super().__init__(made, record, fixed)
         self.given = given
 
-    def at(self, numbers, near=None, louder=None) -> Point:
+    def at(self, numbers, near=None, noise_factor=None) -> Point:
         columns = self.reference.columns
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
         linear = replace(self.given, e=self.given.e - self.given.j @ d)
-        point = Point(dict(numbers), linear.path, linear, likelihood.weighed(linear, self.unrest))
+        point = Point(
+            dict(numbers), linear.path, linear, likelihood.weighed(linear, self.process_noise)
+        )
         if self.first is None:
             self.first = point
         return point
@@ -208,18 +210,18 @@ class Straight(Trial):
         return Pulses(0.0, -1.0, 0.0, 1.0, np.zeros(3))
 
 
-def dense(given: Linear, unrest: Unrest, rows: np.ndarray | None = None):
+def dense(given: Linear, process_noise: ProcessNoise, rows: np.ndarray | None = None):
     """Of each segment e [N], J [N, C], Z [N, 3J] by the knots and its covariance C [N, N]: start
     and acceleration in it, explicitly."""
     knots = (given.z.shape[-1] - 6) // 3
     at = KNOT * np.arange(knots)
-    stays = np.exp(-np.abs(at[:, None] - at) / unrest.time)
+    stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
     kernel = np.zeros((6 + 3 * knots,) * 2)
-    kernel[:6, :6] = np.diag(unrest.start**2)
-    kernel[6:, 6:] = np.kron(np.diag(unrest.push**2), stays)
+    kernel[:6, :6] = np.diag(process_noise.start**2)
+    kernel[6:, 6:] = np.kron(np.diag(process_noise.push**2), stays)
     for s in range(len(given.e)) if rows is None else rows:
         z = given.z[s].reshape(-1, given.z.shape[-1])
-        r = np.diag(np.tile(unrest.noise**2, given.e.shape[1]))
+        r = np.diag(np.tile(process_noise.noise**2, given.e.shape[1]))
         yield (
             given.e[s].ravel(),
             given.j[s].reshape(len(z), -1),

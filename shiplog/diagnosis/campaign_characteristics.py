@@ -21,7 +21,7 @@ from shiplog.diagnosis import (
 from shiplog.diagnosis.campaign_parts import parts_of, picked, products, robust_weights, squares
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.likelihood import Modes, Unrest
+from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_reference import Settled
@@ -48,7 +48,7 @@ class Characteristics:
     weight      [S] of each segment
     """
 
-    unrest: Unrest
+    process_noise: ProcessNoise
     deviation: Mapping[str, float]
     size: Mapping[str, float]
     apart: float
@@ -84,7 +84,7 @@ def nominal_pass(
     linear = linearisation.linear(model, whole, cut, g, path, moved, shown, wide)
     held = nominal_reference.anchored(start, at.theta, columns)
     families = discrepancy.of(
-        record.profile, at.unrest.push, len(columns.unit), discrepancy.SEEN,
+        record.profile, at.process_noise.push, len(columns.unit), discrepancy.SEEN,
         segment_nodes.at_knots(linear.cut, g),
     )  # fmt: skip
     pushed = families.pushed(linear.cut, g)
@@ -100,25 +100,25 @@ def characteristics(
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers)
     columns, held, known = made.columns, made.held, made.columns.known
-    unrest = noise_time(made.linear, made.pushed, columns, held, at.unrest)
+    process_noise = noise_time(made.linear, made.pushed, columns, held, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
     for last in (False, False, True):
-        modes = likelihood.modes(likelihood.weighed(made.linear, unrest), unrest).beside(
-            made.pushed
-        )
+        modes = likelihood.modes(
+            likelihood.weighed(made.linear, process_noise), process_noise
+        ).beside(made.pushed)
         each = products(modes, made.rows, columns.unit, weight)
         effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
         if not last:  # what the parts disagree in is no noise, nor what a few segments are off by
             weight = _weights(modes, made, effects)
-            unrest = _noise_of_parts(made, effects, unrest, weight >= 1.0)
+            process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
     parts = [reduced(one, effects.deviation)[0] for one in each]
     voyages = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
     apart, share = campaign_prior.learn(parts, voyages, effects, held)
     information, pull = prior(parts, effects.size**-2.0, held, apart * effects.deviation, share)
     return Characteristics(
-        unrest,
+        process_noise,
         {name: float(effects.deviation[at[0]]) for name, at in groups.items()},
         {f.name: float(effects.size[f.columns[0]]) for f in made.families.families},
         apart,
@@ -137,27 +137,31 @@ def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndar
 
 
 def _noise_of_parts(
-    made: NominalPass, effects: VoyageEffects, unrest: Unrest, kept: np.ndarray
-) -> Unrest:
+    made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
+) -> ProcessNoise:
     """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
     assert effects.numbers is not None
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
     left = made.linear.less_numbers(own, made.pushed).pick(kept)
-    return likelihood.learnt(left, np.zeros(made.columns.linearised), unrest, rounds=3)
+    return likelihood.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
 def noise_time(
-    linear: Linear, pushed: np.ndarray, columns: Columns, held: np.ndarray, unrest: Unrest
-) -> Unrest:
+    linear: Linear,
+    pushed: np.ndarray,
+    columns: Columns,
+    held: np.ndarray,
+    process_noise: ProcessNoise,
+) -> ProcessNoise:
     """Sizes and correlation time of the process noise that make the nominal campaign likeliest,
     the model's discrepancy aside."""
-    best, found = -math.inf, unrest
+    best, found = -math.inf, process_noise
     middle = NOISE_TIMES.index(1.0)
     for way in (NOISE_TIMES[middle:], NOISE_TIMES[:middle][::-1]):
         for factor in way:
-            tried = replace(found, time=factor * unrest.time)
+            tried = replace(found, time=factor * process_noise.time)
             for _ in range(2 if factor == 1.0 else 1):
                 numbers, _ = _solved(linear, pushed, tried, columns, held)
                 left = linear.less(pushed @ numbers[columns.linearised :])
@@ -170,10 +174,16 @@ def noise_time(
 
 
 def _solved(
-    linear: Linear, pushed: np.ndarray, unrest: Unrest, columns: Columns, held: np.ndarray
+    linear: Linear,
+    pushed: np.ndarray,
+    process_noise: ProcessNoise,
+    columns: Columns,
+    held: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
-    modes = likelihood.modes(likelihood.weighed(linear, unrest), unrest).beside(pushed)
+    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).beside(
+        pushed
+    )
     by = np.concatenate(([1.0], columns.unit))
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     both = total[1:, 1:] + np.diag(columns.known)

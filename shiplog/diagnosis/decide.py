@@ -10,7 +10,7 @@ import numpy as np
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.result import Decision, Named, Structure
 from shiplog.diagnosis.search import Search
@@ -23,7 +23,7 @@ EVERYWHERE = ("surge", "sway", "yaw_rate")
 def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[Decision, Posterior]:
     """The verdict, some names refuted by held-out data (with the reason)."""
     refuted, trial = dict(refuted or {}), search.trial
-    trial.unrest = trial.reference.unrest  # without an earlier intermittent force
+    trial.process_noise = trial.reference.process_noise  # without an earlier intermittent force
     found = posteriors.posterior(search, tuple(refuted))
     names = found.stated
     kind = found.remainder
@@ -49,10 +49,10 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     shown = best if verdict in ("named", "unknown") else search.nothing
     trial.remainder = shown.remainder
     if pulses is not None:  # its force and times are taken from this trial later
-        trial.unrest = _with_pulses(search, best)
+        trial.process_noise = _with_pulses(search, best)
     return Decision(
         verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
-        found.ranking(), shown.found.louder, search.point(shown), shown.found, search.first,
+        found.ranking(), shown.found.noise_factor, search.point(shown), shown.found, search.first,
         search.nothing.found, search.told,
     ), found  # fmt: skip
 
@@ -119,19 +119,19 @@ def _structure(search: Search, best: Hypothesis) -> Structure:
 def is_device(search: Search, best: Hypothesis) -> bool:
     assert best.pulses is not None
     trial = search.trial
-    kept = trial.unrest
-    trial.unrest = _with_pulses(search, best)
+    kept = trial.process_noise
+    trial.process_noise = _with_pulses(search, best)
     try:
         force, deviation = pulse_force(trial, search.point(best), best.found, best.pulses)
     finally:
-        trial.unrest = kept
+        trial.process_noise = kept
     return posteriors.of_one_device(force, deviation)
 
 
-def _with_pulses(search: Search, best: Hypothesis) -> Unrest:
+def _with_pulses(search: Search, best: Hypothesis) -> ProcessNoise:
     """The trial's process noise with the hypothesis' intermittent force in it."""
     assert best.pulses is not None
-    return replace(search.trial.reference.unrest, pulse=best.pulses.unit * best.pulses.force)
+    return replace(search.trial.reference.process_noise, pulse=best.pulses.unit * best.pulses.force)
 
 
 def _reasons(

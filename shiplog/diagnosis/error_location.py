@@ -44,8 +44,8 @@ def pushed(trial: TrialEvidence, point: Point, whole: Linear) -> list[Interval]:
     if isinstance(trial, diagnosis_trial.Trial):
         whole = trial.of_parts(whole, point, base)
     found = external_forces.find(
-        *trial.left(whole, trial.solved(point, base)), trial.unrest.louder(base.louder),
-        trial.record,
+        *trial.left(whole, trial.solved(point, base)),
+        trial.process_noise.times(base.noise_factor), trial.record,
         ref.model.stand_in, np.array(list(ref.coefficients.values())),
     )  # fmt: skip
     out = np.zeros(len(trial.rows), dtype=bool)
@@ -72,7 +72,7 @@ def depends_on(trial: TrialEvidence, decision: Decision, whole: Linear) -> tuple
     """What the model cannot see and the residual depends on."""
     found = residual_acceleration.posterior(
         *trial.left(whole, trial.solved(decision.first, decision.nothing)),
-        trial.unrest.louder(decision.nothing.louder), trial.record,
+        trial.process_noise.times(decision.nothing.noise_factor), trial.record,
     )  # fmt: skip
     knots = residual_acceleration.table(found, trial.record)
     return omitted_inputs.table(

@@ -21,7 +21,7 @@ from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.models.causes import Cause
 from shiplog.voyages.recording import Record
 
-LOUDER = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ, factors of process noise
+NOISE_FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # λ, factors of process noise
 QUIETER = (0.7, 0.5, 0.35, 0.25)
 FINER = 1.08  # step of λ about the best one
 ROBUST = 6.0  # segments beyond this many medians count less
@@ -40,7 +40,7 @@ class TrialEvidence:
     def __init__(self, reference: Reference, record: Record, fixed: Sequence[str] = ()) -> None:
         """`fixed`: labels of causes that the model has already, with numbers that stay."""
         self.reference, self.record, self.fixed = reference, record, tuple(fixed)
-        self.unrest = reference.unrest
+        self.process_noise = reference.process_noise
         self.grid = segments.grid(record)
         self.rows = segments.begins(record)
         self._known: list[tuple[dict[str, np.ndarray], Read]] = []
@@ -53,7 +53,7 @@ class TrialEvidence:
     @property
     def pulse(self) -> bytes:
         """Identifies a process noise of this trial."""
-        return b"" if self.unrest.pulse is None else self.unrest.pulse.tobytes()
+        return b"" if self.process_noise.pulse is None else self.process_noise.pulse.tobytes()
 
     # --- linearisation ---
 
@@ -61,16 +61,18 @@ class TrialEvidence:
         self,
         numbers: Mapping[str, np.ndarray],
         near: Path | Point | None = None,
-        louder: float | None = None,
+        noise_factor: float | None = None,
     ) -> Point:
         """Linearised with these numbers, around a path pulled onto what was then measured.
 
-        near     a path to pull from, or a point that expects what these numbers do to its own
-        louder   λ that holds the path: one that follows every wave of the noise is as far from
-                 the likely one as a free rollout, and what is not linear then looks like evidence
+        near          a path to pull from, or a point that expects what these numbers do to its own
+        noise_factor  λ that holds the path: one that follows every wave of the noise is as far from
+                      the likely one as a free rollout, and what is not linear then looks like evidence
         """
         ref = self.reference
-        wide = ref.wide if louder is None else ref.held(louder, self.unrest.pulse)
+        wide = (
+            ref.wide if noise_factor is None else ref.held(noise_factor, self.process_noise.pulse)
+        )
         cut, moved, shown = self._read(numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         if isinstance(near, Point):
@@ -83,7 +85,7 @@ class TrialEvidence:
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, shown, ref.wide
         )
-        point = Point(numbers, path, linear, likelihood.weighed(linear, self.unrest))
+        point = Point(numbers, path, linear, likelihood.weighed(linear, self.process_noise))
         if self.first is None:
             self.first = point
         return point
@@ -121,7 +123,7 @@ class TrialEvidence:
         point = self.at(numbers)
         self.robust(point)
         base, _ = self.scan(point, (), self.fixed)
-        return self.at(numbers, point, base.louder)
+        return self.at(numbers, point, base.noise_factor)
 
     def covering(self, point: Point) -> Linear:
         """The point's segments and those between them: residuals of the same accuracy
@@ -143,27 +145,27 @@ class TrialEvidence:
         level = self.level(point, self.quietest(point), ())
         unit = ref.columns.unit
         weighed, d = self.left_of(point, level.solution[: len(unit)] * unit)
-        modes = likelihood.modes(weighed, self.unrest)
-        gram = modes.gram(level.louder).scaled(unit[: len(d)])
+        modes = likelihood.modes(weighed, self.process_noise)
+        gram = modes.gram(level.noise_factor).scaled(unit[: len(d)])
         d = np.concatenate(([-1.0], d / unit[: len(d)]))
         chi2 = np.einsum("i,sij,j->s", d, gram.each, d)
         self.weight = np.minimum(1.0, ROBUST * np.median(chi2) / np.maximum(chi2, 1e-9))
 
     # --- algebra ---
 
-    def modes(self, point: Point, louder: float) -> tuple[Modes, float]:
+    def modes(self, point: Point, noise_factor: float) -> tuple[Modes, float]:
         """Products of the point, and the wanted factors λ: one pass serves every λ, but that of a
         pulse together with the process noise, whose axes turn with it."""
-        if self.unrest.pulse is not None:
-            found = likelihood.modes(point.weighed, self.unrest.louder(louder))
+        if self.process_noise.pulse is not None:
+            found = likelihood.modes(point.weighed, self.process_noise.times(noise_factor))
             return self._misfitting(found, point), 1.0
         for of, found in self.kept_modes:
             if of is point.weighed:
-                return found, louder
-        found = self._misfitting(likelihood.modes(point.weighed, self.unrest), point)
+                return found, noise_factor
+        found = self._misfitting(likelihood.modes(point.weighed, self.process_noise), point)
         # the first point's, for `volume`, and the last two
         self.kept_modes = [*self.kept_modes[:1], *self.kept_modes[1:][-1:], (point.weighed, found)]
-        return found, louder
+        return found, noise_factor
 
     def _misfitting(self, modes: Modes, point: Point) -> Modes:
         misfit = self.reference.misfit
@@ -184,34 +186,35 @@ class TrialEvidence:
         linear, own = self.left(point.linear, d)
         if linear is point.linear:
             return point.weighed, own
-        return likelihood.weighed(linear, self.unrest), own
+        return likelihood.weighed(linear, self.process_noise), own
 
-    def volume(self, louder: float) -> float:
+    def volume(self, noise_factor: float) -> float:
         """log |C| at one λ, the same for every hypothesis: that of the first point. How far a
         model lets process noise be felt is no evidence of a cause, and where the process noise is a
         model's own misfit it would count as such."""
         assert self.first is not None
-        key = (louder, self.pulse)
+        key = (noise_factor, self.pulse)
         if key not in self._volumes:
-            modes, louder_by = self.modes(self.first, louder)
-            self._volumes[key] = modes.log_volume(louder_by)
+            modes, factor_by = self.modes(self.first, noise_factor)
+            self._volumes[key] = modes.log_volume(factor_by)
         return self._volumes[key]
 
-    def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
+    def level(self, point: Point, noise_factor: float, included: Sequence[str]) -> Level:
         """The base hypothesis at one λ: nominal numbers, and the included causes free."""
         ref = self.reference
         by = np.concatenate(([1.0], ref.columns.unit))
-        modes, louder_by = self.modes(point, louder)
-        total = modes.total(self.weight, louder_by) * np.outer(by, by)
+        modes, factor_by = self.modes(point, noise_factor)
+        total = modes.total(self.weight, factor_by) * np.outer(by, by)
+        volume = self.volume(noise_factor)
         return self.solve(
-            total, self.volume(louder), louder, point, included, ref.information, ref.pull
-        )
+            total, volume, noise_factor, point, included, ref.information, ref.pull
+        )  # fmt: skip
 
     def solve(
         self,
         total: np.ndarray,
         logdet: float,
-        louder: float,
+        noise_factor: float,
         point: Point,
         included: Sequence[str],
         information: np.ndarray,
@@ -259,12 +262,12 @@ class TrialEvidence:
         value = -0.5 * float(
             square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(known)[1] + logdet
         )
-        return Level(louder, gram, logdet, inverse, solution, value)
+        return Level(noise_factor, gram, logdet, inverse, solution, value)
 
     def quietest(self, point: Point, included: Sequence[str] = ()) -> float:
         """λ at which the base hypothesis is best, alone."""
         levels = self.levels(point, included)
-        return max(levels, key=lambda level: level.value).louder
+        return max(levels, key=lambda level: level.value).noise_factor
 
     def levels(
         self, point: Point, included: Sequence[str] = (), near: float | None = None
@@ -276,8 +279,8 @@ class TrialEvidence:
         if near is not None:
             found.append(self.level(point, near, included))
         else:
-            for louder in LOUDER:
-                found.append(self.level(point, louder, included))
+            for noise_factor in NOISE_FACTORS:
+                found.append(self.level(point, noise_factor, included))
                 if len(found) > 1 and found[-1].value < found[-2].value:
                     break
             for quieter in QUIETER if len(found) == 2 else ():
@@ -285,13 +288,13 @@ class TrialEvidence:
                 if found[-1].value < max(level.value for level in found[:-1]):
                     break
         best = max(found, key=lambda level: level.value)
-        sides = [self.level(point, best.louder * by, included) for by in (1.0 / FINER, FINER)]
+        sides = [self.level(point, best.noise_factor * by, included) for by in (1.0 / FINER, FINER)]
         found += sides
         below, here, above = sides[0].value, best.value, sides[1].value
         bend = below - 2.0 * here + above
         if bend < 0.0:  # the top of the parabola through them
             off = np.clip(0.5 * (below - above) / bend, -2.0, 2.0)
-            found.append(self.level(point, best.louder * FINER**off, included))
+            found.append(self.level(point, best.noise_factor * FINER**off, included))
         return found
 
     def scan(
@@ -309,16 +312,16 @@ class TrialEvidence:
             tried = [self._with(level, cause.label) for level in levels]
             found.append(max(tried, key=lambda f: f.evidence))
         base = Found(
-            "nothing", 0.0, best.louder,
+            "nothing", 0.0, best.noise_factor,
             *self.numbers_of(best, point, included),
         )  # fmt: skip
         moved = [replace(f, evidence=f.evidence - best.value) for f in found]
         return replace(base, evidence=best.value), sorted(moved, key=lambda f: -f.evidence)
 
-    def fit(self, point: Point, included: Sequence[str], louder: float) -> Found:
+    def fit(self, point: Point, included: Sequence[str], noise_factor: float) -> Found:
         """The base hypothesis at one level of process noise."""
-        level = self.level(point, louder, included)
-        return Found("nothing", level.value, louder, *self.numbers_of(level, point, included))
+        level = self.level(point, noise_factor, included)
+        return Found("nothing", level.value, noise_factor, *self.numbers_of(level, point, included))
 
     def _with(self, level: Level, label: str) -> Found:
         """One cause more, its change from the nominal with a prior of its size."""
@@ -335,7 +338,7 @@ class TrialEvidence:
         shrunk = information @ left
         told = Told(np.diagonal(shrunk @ information).copy(), cost - 0.5 * float(np.trace(shrunk)))
         return Found(
-            label, level.value + gained, level.louder, {label: value * unit},
+            label, level.value + gained, level.noise_factor, {label: value * unit},
             left * np.outer(unit, unit), told,
         )  # fmt: skip
 
@@ -356,14 +359,14 @@ class TrialEvidence:
         return found, level.inverse[start:, start:] * np.outer(whole, whole)
 
     def without(
-        self, point: Point, included: Sequence[str], louder: float, left_out: np.ndarray
+        self, point: Point, included: Sequence[str], noise_factor: float, left_out: np.ndarray
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Numbers of the included causes, and the coefficients [P] together with them, from the
         other segments alone; `left_out` [S] bool."""
         kept = self.weight
         self.weight = np.where(left_out, 0.0, kept)
         try:
-            level = self.level(point, louder, included)
+            level = self.level(point, noise_factor, included)
         finally:
             self.weight = kept
         return self.numbers_of(level, point, included)[0], self._coefficients(level)
@@ -371,7 +374,7 @@ class TrialEvidence:
     def coefficients(self, point: Point, base: Found) -> np.ndarray:
         """[P] of the base, together with a hypothesis of that point; of a network its bends [F,
         3]."""
-        return self._coefficients(self.level(point, base.louder, tuple(base.numbers)))
+        return self._coefficients(self.level(point, base.noise_factor, tuple(base.numbers)))
 
     def _coefficients(self, level: Level) -> np.ndarray:
         ref, count = self.reference, self.reference.columns.base
@@ -385,7 +388,7 @@ class TrialEvidence:
         """[C] numbers about the point under a hypothesis of that point: nominal coefficients on
         these voyages, and the change by its causes."""
         ref = self.reference
-        level = self.level(point, base.louder, tuple(base.numbers))
+        level = self.level(point, base.noise_factor, tuple(base.numbers))
         d = level.solution[: len(ref.columns.unit)] * ref.columns.unit
         for name, values in base.numbers.items():
             d[ref.columns.of[name]] += values - point.numbers.get(name, 0.0)

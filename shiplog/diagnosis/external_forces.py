@@ -17,7 +17,7 @@ import numpy as np
 
 from shiplog import channels, frames
 from shiplog.diagnosis import residual_acceleration
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.residual_acceleration import Unexplained
 from shiplog.jit_cache import traced
@@ -100,7 +100,12 @@ class Balance:
 
 
 def find(
-    linear: Linear, d: np.ndarray, unrest: Unrest, record: Record, physics: MMG, values: np.ndarray
+    linear: Linear,
+    d: np.ndarray,
+    process_noise: ProcessNoise,
+    record: Record,
+    physics: MMG,
+    values: np.ndarray,
 ) -> tuple[Stretch, ...]:
     """All events, in order of voyage and time.
 
@@ -110,7 +115,7 @@ def find(
     """
     if not physics.geometry.propellers and not physics.geometry.thrusters:
         return ()  # who knows what drives it
-    weighed = balance(linear, d, unrest, record, physics, values)
+    weighed = balance(linear, d, process_noise, record, physics, values)
     beyond = np.abs(weighed.force) > weighed.limit + SURE_SPREADS * weighed.sd
     beyond &= ~_contradicted(record, weighed.rows)[:, None]
     found = []
@@ -122,13 +127,18 @@ def find(
 
 
 def balance(
-    linear: Linear, d: np.ndarray, unrest: Unrest, record: Record, physics: MMG, values: np.ndarray
+    linear: Linear,
+    d: np.ndarray,
+    process_noise: ProcessNoise,
+    record: Record,
+    physics: MMG,
+    values: np.ndarray,
 ) -> Balance:
     """The forces behind `find`, for a plot of them."""
     weigh = masses(physics, values).T
     full = means(record, physics, values)
     reach = np.abs(np.linalg.solve(weigh, full))
-    loose = replace(unrest, push=np.maximum(unrest.push, LOOSE * reach))
+    loose = replace(process_noise, push=np.maximum(process_noise.push, LOOSE * reach))
     rows, acceleration, sd = _knots(residual_acceleration.posterior(linear, d, loose, record))
     force = acceleration @ weigh.T
     doubt = np.sqrt(sd**2 @ weigh.T**2)

@@ -15,16 +15,16 @@ from shiplog.diagnosis.linear_segments import Linear, Path
 class Found:
     """One hypothesis.
 
-    evidence   of a base hypothesis its log marginal likelihood [nats]; of a candidate or a
-               structure its log Bayes factor over the base hypothesis
-    louder     λ, the most probable factor of the process noise
-    numbers    of each cause, as a change from nominal, with their covariance
-    told       of a candidate: the information of these data about it
+    evidence       of a base hypothesis its log marginal likelihood [nats]; of a candidate or a
+                   structure its log Bayes factor over the base hypothesis
+    noise_factor   λ, the most probable factor of the process noise
+    numbers        of each cause, as a change from nominal, with their covariance
+    told           of a candidate: the information of these data about it
     """
 
     name: str
     evidence: float
-    louder: float
+    noise_factor: float
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
     covariance: np.ndarray | None = None
     told: Told | None = None
@@ -64,7 +64,7 @@ class Level:
     The base hypothesis holds the named causes, free, and all nominal numbers.
     """
 
-    louder: float
+    noise_factor: float
     gram: np.ndarray  # [1 + C, 1 + C]
     logdet: float
     inverse: np.ndarray  # of information and data together, base's own numbers last

@@ -183,9 +183,13 @@ class HeldOut(Rollouts):
         included = tuple(decision.base.numbers)
         numbers, coefficients = {}, None
         if included or decision.adapted:
-            numbers, beside = self.trial.without(decision.point, included, decision.louder, out)
+            numbers, beside = self.trial.without(
+                decision.point, included, decision.noise_factor, out
+            )
             if self.own is not None and decision.adapted:
                 trial, seen = self.own.beside(decision)
-                _, beside = trial.without(seen.point, tuple(seen.base.numbers), seen.louder, out)
+                _, beside = trial.without(
+                    seen.point, tuple(seen.base.numbers), seen.noise_factor, out
+                )
             coefficients = beside if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

@@ -33,5 +33,7 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
         own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
     left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
-    found = unrecorded_thruster.pulses_of(left, none, reference, reference.unrest, campaign.weight)
+    found = unrecorded_thruster.pulses_of(
+        left, none, reference, reference.process_noise, campaign.weight
+    )
     return found.unit * found.force if found.gain > 0.0 else None

@@ -26,7 +26,7 @@ LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m,
 
 
 @dataclass(frozen=True)
-class Unrest:
+class ProcessNoise:
     """Standard deviations and correlation times of instrument noise and process noise.
 
     noise   [6]  of one observation (a mean over `bin` s), channels.STATE; of its variance a share
@@ -57,7 +57,7 @@ class Unrest:
             whole += np.kron(np.outer(self.pulse, self.pulse), _decay(apart, self.pulse_time))
         return whole
 
-    def louder(self, factor: float) -> Unrest:
+    def times(self, factor: float) -> ProcessNoise:
         return replace(self, push=self.push * factor)
 
     def precision(self, knots: int) -> np.ndarray:
@@ -84,15 +84,17 @@ def _correlation(share: float, fade: float, at: np.ndarray) -> np.ndarray:
 class _Whitening:
     """Observations in units in which their noise is white and of unit size."""
 
-    def __init__(self, used: np.ndarray, unrest: Unrest) -> None:
+    def __init__(self, used: np.ndarray, process_noise: ProcessNoise) -> None:
         """used   [S, B, 6] bool: rows without a measurement do not count"""
         bins = used.shape[1]
-        at = unrest.bin * np.arange(bins)
+        at = process_noise.bin * np.arange(bins)
         self.by: list[np.ndarray] = []  # [S, B, B] of each channel
-        self.logdet = 2.0 * float((used * np.log(unrest.noise)).sum())
+        self.logdet = 2.0 * float((used * np.log(process_noise.noise)).sum())
         for channel in range(6):
             patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
-            correlation = _correlation(unrest.coloured[channel], unrest.fade[channel], at)
+            correlation = _correlation(
+                process_noise.coloured[channel], process_noise.fade[channel], at
+            )
             roots = np.zeros((len(patterns), bins, bins))
             for root, pattern in zip(roots, patterns, strict=True):
                 seen = np.ix_(pattern, pattern)
@@ -100,7 +102,7 @@ class _Whitening:
             each = roots[of.reshape(-1)]
             seen = np.diagonal(each, axis1=1, axis2=2)[used[..., channel]]
             self.logdet -= 2.0 * float(np.log(seen).sum())
-            self.by.append(each / unrest.noise[channel])
+            self.by.append(each / process_noise.noise[channel])
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """[S, B, 6, n] → [S, 6 B, n]"""
@@ -124,8 +126,8 @@ class Weighed:
     knots: int
 
 
-def weighed(linear: Linear, unrest: Unrest) -> Weighed:
-    white = _Whitening(linear.cut.used, unrest)
+def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
+    white = _Whitening(linear.cut.used, process_noise)
     d = white(np.concatenate((linear.e[..., None], linear.j), -1))
     z = white(linear.z)
     zt = np.swapaxes(z, 1, 2)
@@ -171,21 +173,21 @@ class Modes:
         """With W columns more, of accelerations [S, 3J, W] at the knots."""
         return replace(self, pushed=np.concatenate((self.pushed, self.axes @ pushed), -1))
 
-    def total(self, weight: np.ndarray, louder: float = 1.0) -> np.ndarray:
+    def total(self, weight: np.ndarray, noise_factor: float = 1.0) -> np.ndarray:
         """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
         them."""
-        part = np.sqrt(weight[:, None] / (self.felt + louder**-2.0))[..., None]
+        part = np.sqrt(weight[:, None] / (self.felt + noise_factor**-2.0))[..., None]
         flat = (self.md * part).reshape(-1, self.md.shape[-1])
         total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
         if not self.pushed.shape[-1]:
             return total
         # the effect of such a column, less the part that process noise explains
         more = (self.pushed * part).reshape(-1, self.pushed.shape[-1])
-        across = louder**-2.0 * (more.T @ flat)
-        more *= np.sqrt(self.felt).reshape(-1, 1) / louder
+        across = noise_factor**-2.0 * (more.T @ flat)
+        more *= np.sqrt(self.felt).reshape(-1, 1) / noise_factor
         return np.block([[total, across.T], [across, more.T @ more]])
 
-    def gram(self, louder: float = 1.0) -> Gram:
+    def gram(self, noise_factor: float = 1.0) -> Gram:
         bent = self.felt[..., None] * self.pushed
         across = np.swapaxes(self.md, 1, 2) @ self.pushed
         dd = np.block([
@@ -193,12 +195,12 @@ class Modes:
             [np.swapaxes(across, 1, 2), np.swapaxes(self.pushed, 1, 2) @ bent],
         ])  # fmt: skip
         md = np.concatenate((self.md, bent), -1)
-        part = md / (self.felt + louder**-2.0)[..., None]
-        return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(louder))
+        part = md / (self.felt + noise_factor**-2.0)[..., None]
+        return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(noise_factor))
 
-    def log_volume(self, louder: float = 1.0) -> float:
+    def log_volume(self, noise_factor: float = 1.0) -> float:
         """log |C| of all segments, by itself."""
-        return self.logdet + float(np.log1p(louder**2 * self.felt).sum())
+        return self.logdet + float(np.log1p(noise_factor**2 * self.felt).sum())
 
 
 @dataclass(frozen=True)
@@ -216,11 +218,11 @@ class Startless:
     kk: np.ndarray
     logdet: float
 
-    def square(self, unrest: Unrest) -> tuple[np.ndarray, float]:
+    def square(self, process_noise: ProcessNoise) -> tuple[np.ndarray, float]:
         """Of a pass of e alone eᵀ C⁻¹ e of every segment [S], and log |C| of all: a Cholesky root
         ends with the one, and the rest of its diagonal is the other."""
         knots = self.kk.shape[-1]
-        kernel = unrest.kernel(knots // 3)
+        kernel = process_noise.kernel(knots // 3)
         bordered = np.empty((len(self.kk), knots + 1, knots + 1))
         bordered[:, :knots, :knots] = self.kk + np.linalg.inv(kernel)
         bordered[:, :knots, knots:], bordered[:, knots:, knots:] = self.kd, self.dd
@@ -231,11 +233,11 @@ class Startless:
         return root[:, knots] ** 2, self.logdet + volume
 
 
-def startless(weighed: Weighed, unrest: Unrest) -> Startless:
+def startless(weighed: Weighed, process_noise: ProcessNoise) -> Startless:
     """Start eliminated. Raises np.linalg.LinAlgError where the path diverged."""
     if not (np.isfinite(weighed.zz).all() and np.isfinite(weighed.dd).all()):
         raise np.linalg.LinAlgError("the path diverged: it has no products")
-    known = np.diag(unrest.start**-2.0)
+    known = np.diag(process_noise.start**-2.0)
     start = weighed.zz[:, :6, :6] + known
     # in units of each number of the start, or its columns are too unlike to invert
     unit = np.diagonal(start, axis1=1, axis2=2) ** -0.5
@@ -252,11 +254,11 @@ def startless(weighed: Weighed, unrest: Unrest) -> Startless:
     )
 
 
-def modes(weighed: Weighed, unrest: Unrest) -> Modes:
+def modes(weighed: Weighed, process_noise: ProcessNoise) -> Modes:
     """Start eliminated, acceleration along its principal axes (Woodbury). Raises
     np.linalg.LinAlgError where the path diverged."""
-    left = startless(weighed, unrest)
-    root = np.linalg.cholesky(unrest.kernel(weighed.knots))
+    left = startless(weighed, process_noise)
+    root = np.linalg.cholesky(process_noise.kernel(weighed.knots))
     felt, axes = np.linalg.eigh(root.T @ left.kk @ root)
     across = np.swapaxes(axes, 1, 2)
     return Modes(
@@ -273,7 +275,9 @@ def _of_start(weighed: Weighed, known: np.ndarray) -> float:
     return float(of.sum())
 
 
-def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Unrest:
+def learnt(
+    linear: Linear, d: np.ndarray, process_noise: ProcessNoise, rounds: int = 4
+) -> ProcessNoise:
     """Instrument and process noise that fit the residuals of d, by expectation-maximisation
     (Dempster et al. 1977). Of three steps a round, the first two give the length of the third
     (SQUAREM, Varadhan & Roland 2008). The colour of the noise is estimated once, at the end.
@@ -281,14 +285,14 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
     d   [C] the numbers of the columns
     """
     left = (linear.e - linear.j @ d)[..., None]
-    products = _by_channel(linear, left, unrest)
+    products = _by_channel(linear, left, process_noise)
     seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
     knots = (linear.z.shape[-1] - 6) // 3
-    inverse = np.linalg.inv(_decay(unrest.knot * np.arange(knots), unrest.time))
+    inverse = np.linalg.inv(_decay(process_noise.knot * np.arange(knots), process_noise.time))
     least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
 
-    def at(sizes: np.ndarray) -> Unrest:
-        return replace(unrest, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
+    def at(sizes: np.ndarray) -> ProcessNoise:
+        return replace(process_noise, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
 
     def step(sizes: np.ndarray) -> np.ndarray:
         """Logarithms of instrument and process noise [9] after one step."""
@@ -304,7 +308,7 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
         push = np.einsum("ij,cicj->c", inverse, pushed) / knots
         return np.maximum(0.5 * np.log(np.concatenate((noise, push))), least)
 
-    sizes = np.log(np.concatenate((unrest.noise, unrest.push)))
+    sizes = np.log(np.concatenate((process_noise.noise, process_noise.push)))
     for _ in range(rounds):
         one = step(sizes)
         two = step(one)
@@ -315,34 +319,40 @@ def learnt(linear: Linear, d: np.ndarray, unrest: Unrest, rounds: int = 4) -> Un
     return _coloured(linear, left, at(sizes))
 
 
-def _by_channel(linear: Linear, left: np.ndarray, unrest: Unrest) -> np.ndarray:
+def _by_channel(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> np.ndarray:
     """Products [6, S, 1 + Z, 1 + Z] of [error | Z] in each channel alone, were its noise of unit
     size: what its size is changes but their weight."""
-    by = _Whitening(linear.cut.used, replace(unrest, noise=np.ones(6))).by
+    by = _Whitening(linear.cut.used, replace(process_noise, noise=np.ones(6))).by
     both = np.concatenate((left, linear.z), -1)
     white = (each @ both[:, :, channel] for channel, each in enumerate(by))
     return np.stack([np.swapaxes(values, 1, 2) @ values for values in white])
 
 
-def _posterior(z: np.ndarray, left: np.ndarray, unrest: Unrest) -> tuple[np.ndarray, np.ndarray]:
+def _posterior(
+    z: np.ndarray, left: np.ndarray, process_noise: ProcessNoise
+) -> tuple[np.ndarray, np.ndarray]:
     """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
     zt = np.swapaxes(z, 1, 2)
-    covariance = np.linalg.inv(zt @ z + unrest.precision((z.shape[-1] - 6) // 3))
+    covariance = np.linalg.inv(zt @ z + process_noise.precision((z.shape[-1] - 6) // 3))
     return covariance @ (zt @ left), covariance
 
 
-def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
+def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> ProcessNoise:
     """With the most probable colour of each channel's noise, from the second moments of complete
     stretches; its standard deviation follows."""
     used = linear.cut.used
     whole = used.all((1, 2))
     if whole.sum() < ENOUGH_SEGMENTS:
-        return unrest
+        return process_noise
     z, error = linear.z[whole], left[whole]
-    white = _Whitening(used[whole], unrest)
-    mean, covariance = _posterior(white(z), white(error), unrest)
+    white = _Whitening(used[whole], process_noise)
+    mean, covariance = _posterior(white(z), white(error), process_noise)
     bins = used.shape[1]
-    noise, coloured, fade = unrest.noise.copy(), unrest.coloured.copy(), unrest.fade.copy()
+    noise, coloured, fade = (
+        process_noise.noise.copy(),
+        process_noise.coloured.copy(),
+        process_noise.fade.copy(),
+    )
     for channel in range(6):
         columns = z[:, :, channel]
         gap = error[:, :, channel] - columns @ mean
@@ -351,20 +361,22 @@ def _coloured(linear: Linear, left: np.ndarray, unrest: Unrest) -> Unrest:
         best = np.inf
         for share in SHARES:
             for time in FADES if share > 0.0 else FADES[:1]:
-                correlation = _correlation(share, time, unrest.bin * np.arange(bins))
+                correlation = _correlation(share, time, process_noise.bin * np.arange(bins))
                 variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))
                 cost = np.linalg.slogdet(correlation)[1] + bins * np.log(variance)
                 if cost < best:
                     best, coloured[channel], fade[channel] = cost, share, time
                     noise[channel] = np.sqrt(variance)
-    return replace(unrest, noise=np.maximum(noise, LEAST_NOISE), coloured=coloured, fade=fade)
+    return replace(
+        process_noise, noise=np.maximum(noise, LEAST_NOISE), coloured=coloured, fade=fade
+    )
 
 
 def starts_and_knots(
-    linear: Linear, d: np.ndarray, unrest: Unrest
+    linear: Linear, d: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
     """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
-    white = _Whitening(linear.cut.used, unrest)
+    white = _Whitening(linear.cut.used, process_noise)
     left = white((linear.e - linear.j @ d)[..., None])
-    z, covariance = _posterior(white(linear.z), left, unrest)
+    z, covariance = _posterior(white(linear.z), left, process_noise)
     return z[..., 0], covariance

@@ -37,7 +37,7 @@ class Own:
             decision,
             point=seen.point,
             base=seen.base,
-            louder=seen.louder,
+            noise_factor=seen.noise_factor,
             first=seen.first,
             nothing=seen.nothing,
         )
@@ -55,8 +55,13 @@ class Own:
         point, base = first, nothing
         if decision.named:
             numbers = {n.cause.label: n.numbers for n in decision.named}
-            point = trial.at({**self.numbers, **numbers}, first, nothing.louder)
+            point = trial.at({**self.numbers, **numbers}, first, nothing.noise_factor)
             base, _ = trial.scan(point, (), trial.fixed)
         return trial, replace(
-            decision, point=point, base=base, louder=base.louder, first=first, nothing=nothing
+            decision,
+            point=point,
+            base=base,
+            noise_factor=base.noise_factor,
+            first=first,
+            nothing=nothing,
         )

@@ -135,7 +135,7 @@ def sailed(trial: TrialEvidence, fixed: Mapping[str, np.ndarray]) -> list[np.nda
     grid = segments.grid(recorded)
     path = linearisation.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
     linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, shown)
-    modes = likelihood.modes(likelihood.weighed(linear, ref.unrest), ref.unrest)
+    modes = likelihood.modes(likelihood.weighed(linear, ref.process_noise), ref.process_noise)
     if ref.misfit is not None:
         modes = modes.beside(ref.misfit.pushed(cut, grid))
     each = modes.gram().scaled(ref.columns.unit).each

@@ -18,7 +18,7 @@ import numpy as np
 from shiplog import disk_cache, files
 from shiplog.diagnosis import campaign_characteristics, nominal_reference
 from shiplog.diagnosis.campaign_characteristics import Characteristics
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.nominal_reference import Settled
 from shiplog.models.causes import Setting
@@ -26,7 +26,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-UNREST = ("noise", "push", "start", "coloured", "fade")
+PROCESS_NOISE = ("noise", "push", "start", "coloured", "fade")
 TIMES = ("time", "bin", "knot")
 
 log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ def settled(model: Extended, setting: Setting, start: Start, record: Record) -> 
     log.info("the nominal voyages are fitted once for a model, and kept")
     found = nominal_reference.settled(model, setting, start, record)
     _keep(kept, {"theta": found.theta, "start": found.path.start, "push": found.path.push}
-          | _unrest(found.unrest))  # fmt: skip
+          | _process_noise(found.process_noise))  # fmt: skip
     return found
 
 
@@ -56,11 +56,11 @@ def characteristics(
         given = {k: dict(zip(known[f"{k}_names"].tolist(), known[f"{k}_values"].tolist(),
                              strict=True)) for k in ("deviation", "size")}  # fmt: skip
         return Characteristics(
-            _known_unrest(known), given["deviation"], given["size"],
+            _known_process_noise(known), given["deviation"], given["size"],
             float(known["apart"]), float(known["share"]), float(known["noise"]), known["weight"],
         )  # fmt: skip
     found = campaign_characteristics.characteristics(model, setting, start, record, at)
-    arrays = _unrest(found.unrest) | {
+    arrays = _process_noise(found.process_noise) | {
         "apart": found.apart, "share": found.share, "noise": found.noise, "weight": found.weight,
     }  # fmt: skip
     for name in ("deviation", "size"):
@@ -80,18 +80,20 @@ def _read(kept: File) -> dict | None:
         return None
 
 
-def _unrest(unrest: Unrest) -> dict:
-    whole = {f"unrest_{name}": getattr(unrest, name) for name in UNREST}
-    return whole | {name: getattr(unrest, name) for name in TIMES}
+def _process_noise(process_noise: ProcessNoise) -> dict:
+    whole = {f"unrest_{name}": getattr(process_noise, name) for name in PROCESS_NOISE}
+    return whole | {name: getattr(process_noise, name) for name in TIMES}
 
 
-def _known_unrest(arrays: dict) -> Unrest:
+def _known_process_noise(arrays: dict) -> ProcessNoise:
     times = {n: float(arrays[n]) for n in TIMES}
-    return Unrest(**times, **{n: arrays[f"unrest_{n}"] for n in UNREST})
+    return ProcessNoise(**times, **{n: arrays[f"unrest_{n}"] for n in PROCESS_NOISE})
 
 
 def _settled(arrays: dict) -> Settled:
-    return Settled(arrays["theta"], Path(arrays["start"], arrays["push"]), _known_unrest(arrays))
+    return Settled(
+        arrays["theta"], Path(arrays["start"], arrays["push"]), _known_process_noise(arrays)
+    )
 
 
 def _keep(kept: File, arrays: dict) -> None:

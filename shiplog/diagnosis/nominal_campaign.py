@@ -102,10 +102,12 @@ def learn(
     """The campaign as a trial's causes see it, which depend on where the trial was."""
     made = nominal_pass(model, setting, start, record, at)
     columns, held, families = made.columns, made.held, made.families
-    unrest, known = found.unrest, made.columns.known
-    modes = likelihood.modes(likelihood.weighed(made.linear, unrest), unrest).beside(made.pushed)
+    process_noise, known = found.process_noise, made.columns.known
+    modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).beside(
+        made.pushed
+    )
     unseen = discrepancy.of(
-        record.profile, at.unrest.push, len(columns.unit), discrepancy.UNSEEN,
+        record.profile, at.process_noise.push, len(columns.unit), discrepancy.UNSEEN,
         segment_nodes.at_knots(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
     whole = modes.beside(unseen.pushed(made.linear.cut, segments.grid(record)))
@@ -126,8 +128,8 @@ def learn(
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
     information, pull = prior(voyages, size**-2.0, held, np.zeros(len(known)), found.share)
     reference_made = Reference(
-        model, setting, at.theta, columns, unrest, nominal_reference.wide_of(setting), information,
-        pull, held, 1.0 / found.share, made.linear, modes,
+        model, setting, at.theta, columns, process_noise, nominal_reference.wide_of(setting),
+        information, pull, held, 1.0 / found.share, made.linear, modes,
         nominal_reference.freedom(len(made.rows)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
@@ -169,7 +171,7 @@ def assumed(
     """
     if inputs is not None:
         made = nominal_reference.assume(model, setting, start, record, given, inputs)
-        none = Discrepancy((), made.unrest.push)
+        none = Discrepancy((), made.process_noise.push)
         effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
         return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
     start = widened(model, setting, start)

@@ -16,7 +16,7 @@ import numpy as np
 
 from shiplog.diagnosis import input_misfit, likelihood, linearisation, segments
 from shiplog.diagnosis.input_misfit import Misfit
-from shiplog.diagnosis.likelihood import Modes, Unrest
+from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
@@ -59,7 +59,7 @@ class Reference:
     setting: Setting
     theta: np.ndarray
     columns: Columns
-    unrest: Unrest
+    process_noise: ProcessNoise
     wide: Wide
     information: np.ndarray
     pull: np.ndarray
@@ -84,13 +84,13 @@ class Reference:
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
 
-    def held(self, louder: float, pulse: np.ndarray | None = None) -> Wide:
+    def held(self, noise_factor: float, pulse: np.ndarray | None = None) -> Wide:
         """Allowed distance of a path where the process noise has this factor, and with an
         intermittent force."""
-        push = louder * self.unrest.push
+        push = noise_factor * self.process_noise.push
         if pulse is not None:
             push = np.hypot(push, pulse)
-        return Wide(self.unrest.noise, self.wide.start, FREE * push)
+        return Wide(self.process_noise.noise, self.wide.start, FREE * push)
 
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
@@ -126,7 +126,7 @@ class Settled:
 
     theta: np.ndarray
     path: Path
-    unrest: Unrest
+    process_noise: ProcessNoise
 
 
 def settled(
@@ -140,7 +140,7 @@ def settled(
     base, unit = columns.base, columns.unit
     theta = np.clip(start.values, start.low, start.high)
     of = record.timescale
-    unrest = Unrest(
+    process_noise = ProcessNoise(
         wide.noise, 0.04 * wide.push, UNREST_TIME * of.factor, wide.start, bin=of.bin, knot=of.knot
     )
     path = linear = None
@@ -153,20 +153,20 @@ def settled(
             path = linearisation.ahead(linear, whole - before, hold)
         held = anchored(start, theta, columns)
         linear = linearisation.linear(model, whole, cut, g, path, moved, shown)
-        found, _ = solved(linear, unrest, columns, held)
-        unrest = likelihood.learnt(linear, found * unit, unrest, rounds=ON_THE_WAY)
-        hold = Wide(unrest.noise, wide.start, FREE * unrest.push)
-        found, gain = solved(linear, unrest, columns, held)
+        found, _ = solved(linear, process_noise, columns, held)
+        process_noise = likelihood.learnt(linear, found * unit, process_noise, rounds=ON_THE_WAY)
+        hold = Wide(process_noise.noise, wide.start, FREE * process_noise.push)
+        found, gain = solved(linear, process_noise, columns, held)
         far = float(np.abs(found[:base]).max(initial=0.0))
         if round_ == rounds or (gain < NEAR and far < LONGEST_MOVE):
-            unrest = likelihood.learnt(linear, found * unit, unrest, rounds=AT_REST)
+            process_noise = likelihood.learnt(linear, found * unit, process_noise, rounds=AT_REST)
             break
         moved_to = theta + (found * unit)[:base] * min(1.0, LONGEST_MOVE / far)
         edge = 1e-6 * (start.high - start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         theta = np.clip(moved_to, start.low + edge, start.high - edge)
     assert path is not None
-    return Settled(theta, path, unrest)
+    return Settled(theta, path, process_noise)
 
 
 def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
@@ -181,12 +181,12 @@ def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
 
 
 def solved(
-    linear: Linear, unrest: Unrest, columns: Columns, held: np.ndarray
+    linear: Linear, process_noise: ProcessNoise, columns: Columns, held: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """[C] most probable numbers of the campaign, in units; and the log Bayes factor, in nats, of
     moving the base's there in the linear model (half a Newton decrement)."""
     base, by = columns.base, np.concatenate(([1.0], columns.unit))
-    modes = likelihood.modes(likelihood.weighed(linear, unrest), unrest)
+    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise)
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     inverse = np.linalg.inv(total[1:, 1:] + np.diag(columns.known))
     found = inverse @ (total[1:, 0] + held)
@@ -212,12 +212,12 @@ def learn(
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
     linear = linearisation.linear(model, whole, cut, g, at.path, moved, shown)
-    modes = likelihood.modes(likelihood.weighed(linear, at.unrest), at.unrest)
+    modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
     held = anchored(start, at.theta, columns)
     wrong = None
     if inputs is not None:
         wrong = input_misfit.of(
-            inputs, linear.cut, g, modes, columns.known, columns.unit, at.unrest.push
+            inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.push
         )  # fmt: skip
         modes = modes.beside(wrong.pushed(linear.cut, g))
         columns = columns.with_misfit(wrong.count)
@@ -229,8 +229,8 @@ def learn(
     chosen = kappa or inflation(each, columns.known, held, least)
     information, pull = usual(each.sum(0), chosen, columns.known, held)
     return Reference(
-        model, setting, at.theta, columns, at.unrest, wide_of(setting), information, pull, held,
-        chosen, linear, modes, freedom(len(names)), misfit=wrong,
+        model, setting, at.theta, columns, at.process_noise, wide_of(setting), information, pull,
+        held, chosen, linear, modes, freedom(len(names)), misfit=wrong,
     )  # fmt: skip
 
 

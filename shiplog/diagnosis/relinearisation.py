@@ -31,31 +31,34 @@ def settle(
     """These causes together, linearised at their numbers until these converge (from where they did
     before, if they have). A step goes too far if the evidence is then below the `lowest` that is
     possible, where that is known, or falls far."""
-    point, louder, lately = None, 1.0, None
+    point, noise_factor, lately = None, 1.0, None
     near: Path | Point | None = path
     key = (tuple(included), trial.pulse)
     if key in trial.rested:
-        numbers, near, louder = trial.rested[key]
-        lately = louder
+        numbers, near, noise_factor = trial.rested[key]
+        lately = noise_factor
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
     steady = False  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
-            point = trial.at(numbers, near, louder)
+            point = trial.at(numbers, near, noise_factor)
             base = _fitted(trial, point, included, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
             if shorter == SHORTER:
                 assert trial.first is not None
-                return trial.first, Found("+".join(included), -np.inf, louder, numbers)
+                return trial.first, Found("+".join(included), -np.inf, noise_factor, numbers)
             shorter += 1
             numbers = _half_way(numbers, stood, included[-1])
             continue
         near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
             lowest = max(lowest, base.evidence - STEP_NATS)
-        kept, steady = steady, lately is not None and abs(math.log(base.louder / lately)) < STEADY
-        louder = lately = base.louder
+        kept, steady = (
+            steady,
+            lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY,
+        )
+        noise_factor = lately = base.noise_factor
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit diverged
             break
@@ -65,8 +68,11 @@ def settle(
         if far < AT_REST:
             if kept:
                 base, _ = trial.scan(point, (), included, lately)
-                numbers, louder = _within_bounds(trial, base.numbers, base.covariance), base.louder
-            trial.rested[key] = (numbers, point.path, louder)
+                numbers, noise_factor = (
+                    _within_bounds(trial, base.numbers, base.covariance),
+                    base.noise_factor,
+                )
+            trial.rested[key] = (numbers, point.path, noise_factor)
             break
     assert point is not None
     return point, replace(base, name="+".join(included), numbers=numbers)

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.diagnosis import segments
-from shiplog.diagnosis.likelihood import Unrest, starts_and_knots
+from shiplog.diagnosis.likelihood import ProcessNoise, starts_and_knots
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.recording import Record
 
@@ -55,14 +55,16 @@ def covering(record: Record) -> np.ndarray:
     return np.unique(np.concatenate((begins, between, lasts)))
 
 
-def posterior(linear: Linear, d: np.ndarray, unrest: Unrest, record: Record) -> Unexplained:
+def posterior(
+    linear: Linear, d: np.ndarray, process_noise: ProcessNoise, record: Record
+) -> Unexplained:
     """Residual acceleration at the nodes, for numbers d [C] of the columns.
 
     record   the one that `linear.cut` was cut from
     """
     count, size = len(linear.e), linear.z.shape[-1]
     knots = (size - 6) // 3
-    z, covariance = starts_and_knots(linear, d, unrest)
+    z, covariance = starts_and_knots(linear, d, process_noise)
     mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
     rows = linear.cut.rows[:, None] + round(record.timescale.knot / record.step) * np.arange(knots)

@@ -60,7 +60,7 @@ class Decision:
     rejected   label → why not
     traces     causes below their practical size
     ranking    label or family → probability, of the first step
-    louder     λ, factor of the process noise, of the remainder
+    noise_factor   λ, factor of the process noise, of the remainder
     point, base      the trial linearised with what is named, and that hypothesis
     first, nothing   the same without any cause
     told       label → information of these data about each cause
@@ -74,7 +74,7 @@ class Decision:
     traces: tuple[Named, ...]
     rejected: Mapping[str, str]
     ranking: Mapping[str, float]
-    louder: float
+    noise_factor: float
     point: Point
     base: Found
     first: Point
@@ -111,7 +111,12 @@ def without(trial: TrialEvidence, decision: Decision, one: Named) -> Decision:
             )
     verdict = "named" if again or decision.pulses else "none"
     return replace(
-        decision, named=tuple(again), verdict=verdict, point=point, base=base, louder=base.louder
+        decision,
+        named=tuple(again),
+        verdict=verdict,
+        point=point,
+        base=base,
+        noise_factor=base.noise_factor,
     )
 
 

@@ -82,7 +82,7 @@ class Search:
     def without(self, name: str) -> None:
         """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
         self.banned.add(name)
-        self.trial.unrest = self.trial.reference.unrest  # without an earlier force
+        self.trial.process_noise = self.trial.reference.process_noise  # without an earlier force
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
         self.run()
@@ -155,7 +155,7 @@ class Search:
         ]  # fmt: skip
         self.trial.remainder = one.remainder
         _, found = self.trial.scan(
-            self.point(one), candidates, self._included(one.causes), one.found.louder
+            self.point(one), candidates, self._included(one.causes), one.found.noise_factor
         )
         if not one.causes and one.kind == NOMINAL:
             self.alone |= {f.name: f.evidence for f in found}
@@ -201,12 +201,12 @@ class Search:
             point, base = settle(trial, self._included(labels), both, at.path, lowest=lowest)
             if not math.isfinite(base.evidence):
                 return
-            near = base.louder
+            near = base.noise_factor
         included = self._included(labels)
         levels = trial.levels(point, included, near)
         if near is not None and near > RAISED_FROM:  # the noise may be nominal again
             levels.append(trial.level(point, 1.0, included))
-        usual = self._best(levels, NOMINAL).louder
+        usual = self._best(levels, NOMINAL).noise_factor
         if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # its prior favours the nominal noise
             levels += self.levels_of(point, included, usual)
         for kind in (NOMINAL, RAISED):
@@ -220,7 +220,7 @@ class Search:
         near = max((best.score, *(score - SEARCH_NATS for score in scores)))
         for one, score in zip(changed, scores, strict=True):
             self._change(point, labels, one, best, score >= near)
-        if self._best(levels, RAISED).louder > RAISED_FROM:
+        if self._best(levels, RAISED).noise_factor > RAISED_FROM:
             self._pulses(point, labels)
         self._forget()
 
@@ -231,7 +231,7 @@ class Search:
         levels = trial.levels(point, included, usual)
         trial.remainder = Remainder(RAISED)
         return [
-            replace(level, value=level.value + self._more(level.louder))
+            replace(level, value=level.value + self._more(level.noise_factor))
             for level in levels
         ]  # fmt: skip
 
@@ -239,7 +239,7 @@ class Search:
         """Of levels made under RAISED the best under a kind of remainder."""
         if kind == RAISED:
             return max(levels, key=lambda level: level.value)
-        usual = [replace(one, value=one.value - self._more(one.louder)) for one in levels]
+        usual = [replace(one, value=one.value - self._more(one.noise_factor)) for one in levels]
         return max(usual, key=lambda level: level.value)
 
     def _more(self, noise: float) -> float:
@@ -260,7 +260,7 @@ class Search:
         usual, raised = [], []
         for level in levels:  # made under RAISED
             gained, size = self.trial.changed(point, level, included, family)
-            value, noise = level.value + gained, level.louder
+            value, noise = level.value + gained, level.noise_factor
             usual.append((value - self._more(noise), size, noise))
             raised.append((value, size, noise))
         noisy = max(usual)[0] > max(level.value for level in levels)
@@ -300,7 +300,7 @@ class Search:
         self, point: Point, labels: tuple[str, ...], remainder: Remainder, level: Level
     ) -> None:
         numbers, covariance = self.trial.numbers_of(level, point, self._included(labels))
-        found = Found("+".join(labels), level.value, level.louder, numbers, covariance)
+        found = Found("+".join(labels), level.value, level.noise_factor, numbers, covariance)
         self._put(labels, remainder, level.value, point, found)
 
     def _put(self, labels, remainder, value, point, found, pulses=None) -> None:

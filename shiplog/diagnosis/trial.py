@@ -66,7 +66,7 @@ class Trial(evidence.TrialEvidence):
         knots = segment_nodes.at_knots(segments.cut(record, self.rows), self.grid)
         known = len(campaign.reference.columns.unit)
         self.unseen = discrepancy.of(
-            record.profile, campaign.reference.unrest.push, known, discrepancy.UNSEEN, knots
+            record.profile, campaign.reference.process_noise.push, known, discrepancy.UNSEEN, knots
         )
         both = (*campaign.discrepancy.families, *self.unseen.families)
         self.families = {family.name: family.columns for family in both}
@@ -84,10 +84,10 @@ class Trial(evidence.TrialEvidence):
 
     # --- linearisation ---
 
-    def at(self, numbers, near=None, louder=None) -> Point:
+    def at(self, numbers, near=None, noise_factor=None) -> Point:
         """Segments on which the model diverges carry no information. Where only a hypothesis makes
         it diverge it is that hypothesis that fails: raises np.linalg.LinAlgError."""
-        point = super().at(numbers, near, louder)
+        point = super().at(numbers, near, noise_factor)
         lost = point.linear.lost
         if lost is not None and (lost & (self.weight > 0.0)).any():
             if point is not self.first and self.begun:
@@ -107,7 +107,7 @@ class Trial(evidence.TrialEvidence):
         none = np.zeros(self.unseen.count)
         unit = np.append(self.reference.columns.unit, none)
         d = np.append(level.solution[: len(self.reference.pull)], none)
-        modes, noise = self.modes(point, level.louder)
+        modes, noise = self.modes(point, level.noise_factor)
         self.weight = robust_weights(squares(modes, d * unit, noise), self.weight > 0.0)
 
     # --- products ---
@@ -136,23 +136,29 @@ class Trial(evidence.TrialEvidence):
         self._totals = [*self._totals[-40:], (weakref.ref(point.weighed), key, total, volume)]
         return total, volume
 
-    def volume(self, louder: float) -> float:
+    def volume(self, noise_factor: float) -> float:
         """log |C| at one level of process noise, the same for every hypothesis: that of the first
         point. How far a model lets noise be felt is no evidence of a cause."""
         assert self.first is not None
-        key = (louder, super().pulse + self.weight.tobytes())
+        key = (noise_factor, super().pulse + self.weight.tobytes())
         if key not in self._volumes:
-            modes, by = self.modes(self.first, louder)
-            self._volumes[key] = modes.log_volume(by) + self.total(self.first, louder)[1]
+            modes, by = self.modes(self.first, noise_factor)
+            self._volumes[key] = modes.log_volume(by) + self.total(self.first, noise_factor)[1]
         return self._volumes[key]
 
-    def level(self, point: Point, louder: float, included: Sequence[str]) -> Level:
-        total, _ = self.total(point, louder)
+    def level(self, point: Point, noise_factor: float, included: Sequence[str]) -> Level:
+        total, _ = self.total(point, noise_factor)
         ref = self.reference
         level = self.solve(
-            total, self.volume(louder), louder, point, included, ref.information, ref.pull
+            total,
+            self.volume(noise_factor),
+            noise_factor,
+            point,
+            included,
+            ref.information,
+            ref.pull,
         )
-        return replace(level, value=level.value + self.expected(louder, self.remainder))
+        return replace(level, value=level.value + self.expected(noise_factor, self.remainder))
 
     @property
     def usual_spread(self) -> float:
@@ -166,7 +172,7 @@ class Trial(evidence.TrialEvidence):
         spread = RAISED_SPREAD if beside.raises else usual
         return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
 
-    def solve(self, total, logdet, louder, point, included, information, pull) -> Level:
+    def solve(self, total, logdet, noise_factor, point, included, information, pull) -> Level:
         """The base hypothesis of a trial's products [1 + C, 1 + C]: nominal numbers, the included
         causes, and the remainder's change of weights."""
         columns, share = self.reference.columns, self.reference.counts
@@ -198,7 +204,7 @@ class Trial(evidence.TrialEvidence):
         square -= (gram[1:, 0] + towards) @ solution
         volume = np.linalg.slogdet(both)[1] - self._volume_of_prior(held, information)
         value = -0.5 * float(square + volume + logdet)
-        return Level(louder, gram, logdet, inverse, solution, value)
+        return Level(noise_factor, gram, logdet, inverse, solution, value)
 
     def _square_of_prior(self, towards, count, held, information) -> float:
         own = np.concatenate([*held, np.zeros(0)])
@@ -255,15 +261,15 @@ class Trial(evidence.TrialEvidence):
         whole = np.concatenate(units or [np.zeros(0)])
         return found, level.inverse[first:at, first:at] * np.outer(whole, whole)
 
-    def without(self, point, included, louder, left_out):
+    def without(self, point, included, noise_factor, left_out):
         """Numbers of the included causes and coefficients [P], from the other segments alone."""
         kept, ref = self.weight, self.reference
         self.weight = np.where(left_out, 0.0, kept)
         try:
-            total, _ = self.total(point, louder)
+            total, _ = self.total(point, noise_factor)
         finally:
             self.weight = kept
-        level = self.solve(total, 0.0, louder, point, included, ref.information, ref.pull)
+        level = self.solve(total, 0.0, noise_factor, point, included, ref.information, ref.pull)
         return self.numbers_of(level, point, included)[0], self._coefficients(level)
 
     def of_parts(self, linear: Linear, point: Point, base: Found) -> Linear:
@@ -272,7 +278,7 @@ class Trial(evidence.TrialEvidence):
         columns = self.reference.columns
         unit = np.append(columns.unit, np.ones(self.unseen.count))
         common = self.solved(point, base) / columns.unit
-        modes, noise = self.modes(point, base.louder)
+        modes, noise = self.modes(point, base.noise_factor)
         deviation = math.hypot(1.0, self.campaign.apart) * self.campaign.effects.deviation
         free = np.flatnonzero(deviation > 0.0)
         pushed = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
@@ -294,7 +300,7 @@ class Trial(evidence.TrialEvidence):
         """Log Bayes factor, in nats, of a change of one family's weights over a level without it,
         at its most probable size; and that size."""
         columns, share = self.families[family], self.reference.counts
-        total, _ = self.total(point, level.louder)
+        total, _ = self.total(point, level.noise_factor)
         more = [self.reference.columns.of[n] for n in included]
         rows = 1 + np.concatenate([np.arange(len(self.reference.pull)), *more])
         joined = share * total[np.ix_(rows, 1 + columns)]
@@ -315,7 +321,7 @@ class Trial(evidence.TrialEvidence):
             return 0.0
         columns, ref = self.reference.columns, self.reference
         of, count = columns.of[label], len(ref.pull)
-        total = self.reference.counts * self.total(point, base.louder)[0][1:, 1:]
+        total = self.reference.counts * self.total(point, base.noise_factor)[0][1:, 1:]
         both = np.concatenate((of, family)).astype(int)
         joined = total[np.ix_(np.arange(count), both)]
         known = total[:count, :count] + ref.information
@@ -340,7 +346,7 @@ class Trial(evidence.TrialEvidence):
         """Channels in which the acceleration of a family exceeds a third of its largest."""
         kept, self.remainder = self.remainder, Remainder(family, SIZES[1])
         try:
-            level = self.level(point, base.louder, tuple(base.numbers))
+            level = self.level(point, base.noise_factor, tuple(base.numbers))
         finally:
             self.remainder = kept
         of = self.unseen if family in discrepancy.UNSEEN else self.campaign.discrepancy
@@ -348,6 +354,6 @@ class Trial(evidence.TrialEvidence):
         weights = np.zeros(of.count)
         weights[columns - of.families[0].columns[0]] = level.solution[-len(columns) :]
         pushed = of.pushed(point.linear.cut, self.grid) @ weights
-        size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / self.reference.unrest.push
+        size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / self.reference.process_noise.push
         names = np.array(["surge", "sway", "yaw_rate"])
         return tuple(str(n) for n in names[size > size.max() / 3.0])

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from shiplog.diagnosis import likelihood
-from shiplog.diagnosis.evidence import LOUDER, TrialEvidence
+from shiplog.diagnosis.evidence import NOISE_FACTORS, TrialEvidence
 from shiplog.diagnosis.fitted import Found, Point
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.jit_cache import traced
@@ -45,11 +45,11 @@ def pulses(
     usual    acceleration [3] of nominal process noise at one place; None without any
     """
     left, d = trial.left(point.linear, trial.solved(point, base))
-    return pulses_of(left, d, trial.reference, trial.unrest, trial.weight, usual)
+    return pulses_of(left, d, trial.reference, trial.process_noise, trial.weight, usual)
 
 
 def pulses_of(
-    linear: Linear, d: np.ndarray, ref: Reference, unrest: Unrest, weight: np.ndarray,
+    linear: Linear, d: np.ndarray, ref: Reference, process_noise: ProcessNoise, weight: np.ndarray,
     usual: np.ndarray | None = None,
 ) -> Pulses:  # fmt: skip
     """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
@@ -57,11 +57,11 @@ def pulses_of(
     linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
     alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
-    startless = likelihood.startless(likelihood.weighed(alone, unrest), unrest)
-    plain = replace(unrest, pulse=None)
+    startless = likelihood.startless(likelihood.weighed(alone, process_noise), process_noise)
+    plain = replace(process_noise, pulse=None)
 
-    def value(unrest: Unrest) -> float:
-        each, volume = startless.square(unrest)
+    def value(process_noise: ProcessNoise) -> float:
+        each, volume = startless.square(process_noise)
         return -0.5 * ref.counts * (float(weight @ each) + volume)
 
     def raised(factors: np.ndarray) -> float:
@@ -71,7 +71,7 @@ def pulses_of(
 
     # from day to day one channel's noise is raised by more than another's, with no device at work,
     # and the nominal noise at one place is raised there
-    first = np.full(3, math.log(max(LOUDER, key=lambda v: value(plain.louder(v)))))
+    first = np.full(3, math.log(max(NOISE_FACTORS, key=lambda v: value(plain.times(v)))))
     about = {"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1}
     by_channel = -float(minimize(lambda at: -raised(at), first, method="Nelder-Mead",
                                  options=about).fun)  # fmt: skip
@@ -101,12 +101,12 @@ def pulse_force(
     trial: TrialEvidence, point: Point, base: Found, pulses: Pulses
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
-    unrest = trial.unrest.louder(base.louder)
+    process_noise = trial.process_noise.times(base.noise_factor)
     left = trial.left(point.linear, trial.solved(point, base))
-    z, covariance = likelihood.starts_and_knots(*left, unrest)
+    z, covariance = likelihood.starts_and_knots(*left, process_noise)
     knots = trial.grid.knots
-    kernel = unrest.kernel(knots)
-    pulse = replace(unrest, push=1e-9 * unrest.push).kernel(knots)
+    kernel = process_noise.kernel(knots)
+    pulse = replace(process_noise, push=1e-9 * process_noise.push).kernel(knots)
     share = pulse @ np.linalg.inv(kernel)
     pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
     sway = slice(knots, 2 * knots)

@@ -109,7 +109,8 @@ def verdict(
     sentence = f"{context.lost}: no cause can be named."
     if not context.lost:
         sentence = verdicts.sentence(
-            word, causes, structure, found, decision.louder, context.alone, ranking, context.wrong
+            word, causes, structure, found, decision.noise_factor, context.alone, ranking,
+            context.wrong,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(

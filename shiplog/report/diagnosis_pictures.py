@@ -72,8 +72,11 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     assert done.seen is not None and done.whole is not None
     (trial, decision), whole = done.seen, done.whole
     ref, record = trial.reference, trial.record
-    nominal, unrest = ref.mean * ref.columns.unit, trial.unrest.louder(decision.nothing.louder)
-    found = residual_acceleration.posterior(*trial.left(whole, nominal), unrest, record)
+    nominal, process_noise = (
+        ref.mean * ref.columns.unit,
+        trial.process_noise.times(decision.nothing.noise_factor),
+    )
+    found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
     keep = residual_acceleration.once(found)
     order = np.argsort(found.rows[keep])
     rows = found.rows[keep][order]

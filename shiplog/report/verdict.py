@@ -214,14 +214,14 @@ def sentence(
     causes: Sequence[dict],
     structure: dict | None,
     gain: Gain | None,
-    louder: float,
+    noise_factor: float,
     alone: float | None = None,
     ranking: Sequence[dict] = (),
     wrong: Sequence[dict] = (),
 ) -> str:
     """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
-    louder  factor of the process noise on its nominal standard deviation
+    noise_factor  factor of the process noise on its nominal standard deviation
     alone   share of the error that a second fit without any cause removes; None without that fit
     wrong   share of the error in each channel, before any cause is included
     """
@@ -255,8 +255,8 @@ def sentence(
             )
         if structure["family"] == "stochastic":
             return (
-                f"Outside the catalogue: process noise is {louder:.1f} times its nominal standard "
-                "deviation, and no cause explains that."
+                f"Outside the catalogue: process noise is {noise_factor:.1f} times its nominal "
+                "standard deviation, and no cause explains that."
             )
         return (
             f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "

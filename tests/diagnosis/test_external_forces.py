@@ -20,7 +20,9 @@ def sailed():
 
 def found(record) -> tuple[Stretch, ...]:
     linear = afloat.linear(record)
-    return external_forces.find(linear, NONE, afloat.UNREST, record, afloat.MODEL, afloat.THETA)
+    return external_forces.find(
+        linear, NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA
+    )
 
 
 def under(sailed, force, noise=1.0):

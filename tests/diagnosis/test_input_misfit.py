@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shiplog.diagnosis import input_misfit, likelihood
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.segment_nodes import at_knots
@@ -18,7 +18,7 @@ KNOTS, BINS, STEP = 6, 5, 0.2
 ROWS = round((KNOTS - 1) * KNOT / STEP)
 GRID = SegmentGrid(STEP, ROWS, ROWS // NODE_ROWS + 1, BINS, KNOTS)
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
-UNREST = Unrest(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
+PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.08, 0.05, 0.03]), 4.0, np.full(6, 1.7))
 
 
 def network(features: int = 300) -> Network:
@@ -61,7 +61,7 @@ def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) ->
 
 def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
     """Of the column, above nothing; of usual process noise."""
-    modes = likelihood.modes(likelihood.weighed(linear, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     if own is not None:
         modes = modes.beside(own.pushed(linear.cut, GRID))
     total = modes.total(np.ones(len(linear.cut)))
@@ -73,9 +73,9 @@ def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
 
 
 def learned(linear: Linear) -> input_misfit.Misfit:
-    modes = likelihood.modes(likelihood.weighed(linear, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     one = np.ones(1)
-    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, UNREST.push)
+    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.push)
 
 
 def test_what_it_bends_the_network_by_is_what_it_pushes():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import straight
-from straight import CAUSES, SETTING, UNREST
+from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis import intermittent, likelihood, segments, unrecorded_thruster
 from shiplog.diagnosis.unrecorded_thruster import Pulses
@@ -38,10 +38,10 @@ def passed(force: float):
 def test_pushes_at_one_place_are_found_there(reference):
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight)
+    found = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight)
     assert found.gain > 30.0
     assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.05)
-    quiet = unrecorded_thruster.pulses_of(passed(0.0), none, reference, UNREST, weight)
+    quiet = unrecorded_thruster.pulses_of(passed(0.0), none, reference, PROCESS_NOISE, weight)
     assert quiet.gain < 3.0
 
 
@@ -49,12 +49,12 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
     """Sway and yaw pushed more than usual, apart from each other, and surge as usual."""
     record = straight.sailed(COUNT)
     knots = segments.grid(record).knots
-    more = replace(UNREST, push=UNREST.push * np.array([1e-3, 2.0, 2.0]))
+    more = replace(PROCESS_NOISE, push=PROCESS_NOISE.push * np.array([1e-3, 2.0, 2.0]))
     drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
     pushed = drawn @ np.linalg.cholesky(more.kernel(knots)).T
     linear = straight.passed(record, straight.columns_of(()), pushed=pushed, seed=5)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    assert unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight).gain < 0.0
+    assert unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight).gain < 0.0
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
@@ -67,9 +67,11 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
               for v in (linear.e, linear.z, linear.j)]  # fmt: skip
     away = replace(linear, cut=replace(linear.cut, used=used), lost=lost,
                    e=zeroed[0], z=zeroed[1], j=zeroed[2])  # fmt: skip
-    found = unrecorded_thruster.pulses_of(away, none, reference, UNREST, np.where(lost, 0.0, 1.0))
+    found = unrecorded_thruster.pulses_of(
+        away, none, reference, PROCESS_NOISE, np.where(lost, 0.0, 1.0)
+    )
     without = unrecorded_thruster.pulses_of(
-        linear.pick(~lost), none, reference, UNREST, np.ones(COUNT - 1)
+        linear.pick(~lost), none, reference, PROCESS_NOISE, np.ones(COUNT - 1)
     )
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
 
@@ -78,14 +80,14 @@ def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
     """Bursts at one place: a force at that place unless they are usual there."""
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight)
+    found = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight)
     usual = found.force * found.unit
-    again = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight, usual)
+    again = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight, usual)
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
     # beside a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
-    other = unrecorded_thruster.pulses_of(linear, none, reference, UNREST, weight, elsewhere)
+    other = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight, elsewhere)
     assert other.gain > 20.0
 
 
@@ -99,8 +101,8 @@ def asked(monkeypatch):
     """What is left of the nominal campaign when the force is asked for, and the weights."""
     said = {}
 
-    def pulses_of(linear, d, reference, unrest, weight):
-        left = likelihood.weighed(linear, unrest).dd[:, 0, 0]
+    def pulses_of(linear, d, reference, process_noise, weight):
+        left = likelihood.weighed(linear, process_noise).dd[:, 0, 0]
         said.update(left=left, weight=weight)
         assert not d.any()
         return Pulses(0.0, said.get("gain", 7.0), 0.3, 2.0, UNIT)
@@ -132,6 +134,6 @@ def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
         made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
         intermittent.usual_push(made, segments.grid(record))
         left[bool(own.any())] = asked["left"]
-        before = likelihood.weighed(given, straight.UNREST).dd[:, 0, 0]
+        before = likelihood.weighed(given, straight.PROCESS_NOISE).dd[:, 0, 0]
         assert not own.any() or before.min() > 3.0 * left[True].max()
     assert left[True] == pytest.approx(left[False], rel=0.1)

@@ -7,14 +7,14 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from shiplog.diagnosis import likelihood
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_reference import inflation, marginal, usual
 from shiplog.diagnosis.segments import Cut
 from shiplog.voyages.timescale import KNOT
 
 NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
-UNREST = Unrest(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))
+PROCESS_NOISE = ProcessNoise(NOISE, np.array([0.8, 0.5, 0.3]), 5.0, np.full(6, 1.7))
 
 
 def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed: int = 0) -> Linear:
@@ -32,106 +32,110 @@ def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed:
     return Linear(cut, path, rng.standard_normal(shape) * NOISE, z, j)
 
 
-def covariance(unrest: Unrest, knots: int) -> np.ndarray:
+def covariance(process_noise: ProcessNoise, knots: int) -> np.ndarray:
     """Of z, written out: free start, and accelerations that stay for `time` seconds."""
     at = KNOT * np.arange(knots)
-    stays = np.exp(-np.abs(at[:, None] - at) / unrest.time)
+    stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
     whole = np.zeros((6 + 3 * knots,) * 2)
-    whole[:6, :6] = np.diag(unrest.start**2)
+    whole[:6, :6] = np.diag(process_noise.start**2)
     for channel in range(3):
         part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
-        whole[part, part] = unrest.push[channel] ** 2 * stays
-    if unrest.pulse is not None:
-        stays = np.exp(-np.abs(at[:, None] - at) / unrest.pulse_time)
-        whole[6:, 6:] += np.kron(np.outer(unrest.pulse, unrest.pulse), stays)
+        whole[part, part] = process_noise.push[channel] ** 2 * stays
+    if process_noise.pulse is not None:
+        stays = np.exp(-np.abs(at[:, None] - at) / process_noise.pulse_time)
+        whole[6:, 6:] += np.kron(np.outer(process_noise.pulse, process_noise.pulse), stays)
     return whole
 
 
-def observed(unrest: Unrest, bins: int) -> np.ndarray:
+def observed(process_noise: ProcessNoise, bins: int) -> np.ndarray:
     """R of one segment [6B, 6B], bin by bin: a share of each channel's noise lasts into the next
     observations, 2 s apart."""
     whole = np.zeros((6 * bins, 6 * bins))
     for i in range(bins):
         for k in range(bins):
-            lasts = unrest.coloured * np.exp(-2.0 * abs(i - k) / unrest.fade)
-            both = unrest.noise**2 * (lasts + (1.0 - unrest.coloured) * (i == k))
+            lasts = process_noise.coloured * np.exp(-2.0 * abs(i - k) / process_noise.fade)
+            both = process_noise.noise**2 * (lasts + (1.0 - process_noise.coloured) * (i == k))
             whole[6 * i : 6 * i + 6, 6 * k : 6 * k + 6] = np.diag(both)
     return whole
 
 
-def _gram(weighed: likelihood.Weighed, unrest: Unrest) -> likelihood.Gram:
-    return likelihood.modes(weighed, unrest).gram()
+def _gram(weighed: likelihood.Weighed, process_noise: ProcessNoise) -> likelihood.Gram:
+    return likelihood.modes(weighed, process_noise).gram()
 
 
-def dense(given: Linear, unrest: Unrest, fitted: bool = False):
+def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
     """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
     `fitted`: without what the start adds to it."""
     knots = (given.z.shape[-1] - 6) // 3
-    kernel = covariance(unrest, knots)
+    kernel = covariance(process_noise, knots)
     if fitted:
         kernel[:6] = 0.0
     for s in range(len(given.e)):
         used = given.cut.used[s].ravel()
         z = given.z[s].reshape(-1, given.z.shape[-1])[used]
-        r = observed(unrest, given.e.shape[1])[np.ix_(used, used)]
+        r = observed(process_noise, given.e.shape[1])[np.ix_(used, used)]
         c = r + z @ kernel @ z.T
         j = given.j[s].reshape(-1, given.j.shape[-1])[used]
         yield given.e[s].ravel()[used], j, c
 
 
-PULSED = replace(UNREST, pulse=np.array([0.0, 0.9, -0.4]), pulse_time=12.0)
+PULSED = replace(PROCESS_NOISE, pulse=np.array([0.0, 0.9, -0.4]), pulse_time=12.0)
 COLOURED = replace(
-    UNREST, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
+    PROCESS_NOISE, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
 )  # fmt: skip
 EACH = pytest.mark.parametrize(
-    "unrest", (UNREST, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
+    "unrest", (PROCESS_NOISE, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
 )
 
 
 @EACH
-def test_gram_is_the_dense_gaussian(unrest):
+def test_gram_is_the_dense_gaussian(process_noise):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
     restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
     given = linear(3)
-    found = _gram(likelihood.weighed(given, unrest), unrest)
-    for s, (e, j, c) in enumerate(dense(given, unrest)):
+    found = _gram(likelihood.weighed(given, process_noise), process_noise)
+    for s, (e, j, c) in enumerate(dense(given, process_noise)):
         block = np.concatenate((e[:, None], j), 1)
         assert found.each[s] == pytest.approx(block.T @ np.linalg.solve(c, block), rel=1e-6)
     logdet = 0.0
-    for s, (_, _, v) in enumerate(dense(given, unrest, fitted=True)):
+    for s, (_, _, v) in enumerate(dense(given, process_noise, fitted=True)):
         used = given.cut.used[s].ravel()
         start = given.z[s].reshape(-1, 15)[used, :6]
-        r = observed(unrest, given.e.shape[1])[np.ix_(used, used)]
-        felt = start.T @ np.linalg.solve(v, start) + np.diag(unrest.start**-2.0)
+        r = observed(process_noise, given.e.shape[1])[np.ix_(used, used)]
+        felt = start.T @ np.linalg.solve(v, start) + np.diag(process_noise.start**-2.0)
         logdet += np.linalg.slogdet(v)[1] + np.linalg.slogdet(felt)[1]
         logdet -= np.linalg.slogdet(start.T @ np.linalg.solve(r, start))[1]
     assert found.logdet == pytest.approx(logdet, rel=1e-5)
 
 
 @EACH
-def test_a_square_of_errors_alone_is_that_of_their_gram(unrest):
+def test_a_square_of_errors_alone_is_that_of_their_gram(process_noise):
     """Of one pass under each size of process noise, with a pulse and without."""
     given = linear(3)
     alone = replace(given, j=given.j[..., :0])
-    weighed = likelihood.weighed(alone, unrest)
-    for other in (unrest, unrest.louder(3.0), replace(unrest, pulse=np.array([0.1, 2.0, 0.7]))):
-        each, volume = likelihood.startless(weighed, unrest).square(other)
+    weighed = likelihood.weighed(alone, process_noise)
+    for other in (
+        process_noise,
+        process_noise.times(3.0),
+        replace(process_noise, pulse=np.array([0.1, 2.0, 0.7])),
+    ):
+        each, volume = likelihood.startless(weighed, process_noise).square(other)
         wanted = _gram(weighed, other)
         assert each == pytest.approx(wanted.each[:, 0, 0], rel=1e-9)
         assert volume == pytest.approx(wanted.logdet, rel=1e-9)
 
 
 def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
-    """With a start that is nearly known, log N(e; Jd, C) itself: louder against quieter."""
+    """With a start that is nearly known, log N(e; Jd, C) itself: more noise against less."""
     given, d = linear(3), np.array([0.3, -0.7])
-    sure = replace(UNREST, start=np.full(6, 1e-4))
+    sure = replace(PROCESS_NOISE, start=np.full(6, 1e-4))
     towards = np.concatenate(([1.0], -d))
     found, wanted = [], []
-    for unrest in (sure, sure.louder(3.0)):
-        gram = _gram(likelihood.weighed(given, UNREST), unrest)
+    for process_noise in (sure, sure.times(3.0)):
+        gram = _gram(likelihood.weighed(given, PROCESS_NOISE), process_noise)
         found.append(-0.5 * (towards @ gram.each.sum(0) @ towards + gram.logdet))
-        every = dense(given, unrest)
+        every = dense(given, process_noise)
         wanted.append(sum(multivariate_normal(mean=j @ d, cov=c).logpdf(e) for e, j, c in every))
     assert abs(wanted[1] - wanted[0]) > 10.0
     assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=0.01)
@@ -139,10 +143,10 @@ def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
 
 def test_units_scale_columns_and_not_the_error():
     given = linear(2)
-    found = _gram(likelihood.weighed(given, UNREST), UNREST)
+    found = _gram(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     unit = np.array([1e-3, 40.0])
     bent = replace(given, j=given.j * unit)
-    direct = _gram(likelihood.weighed(bent, UNREST), UNREST)
+    direct = _gram(likelihood.weighed(bent, PROCESS_NOISE), PROCESS_NOISE)
     assert found.scaled(unit).each == pytest.approx(direct.each, rel=1e-9)
     assert found.scaled(unit).logdet == found.logdet
 
@@ -150,18 +154,24 @@ def test_units_scale_columns_and_not_the_error():
 def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     given = linear(3)
     pushed = np.random.default_rng(9).standard_normal((3, 9, 4))
-    found = likelihood.modes(likelihood.weighed(given, UNREST), UNREST).beside(pushed).gram()
+    found = (
+        likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
+        .beside(pushed)
+        .gram()
+    )
     columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
-    direct = _gram(likelihood.weighed(written_out, UNREST), UNREST)
+    direct = _gram(likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
     modes, weight = (
-        likelihood.modes(likelihood.weighed(given, UNREST), UNREST),
+        likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE),
         np.array([1, 0, 0.4]),
     )
-    for louder in (0.5, 2.0):
-        each = _gram(likelihood.weighed(written_out, UNREST), UNREST.louder(louder)).each
-        whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, louder)
+    for noise_factor in (0.5, 2.0):
+        each = _gram(
+            likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE.times(noise_factor)
+        ).each
+        whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, noise_factor)
         wanted = np.einsum("s,sij->ij", weight, each)
         assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
 
@@ -175,31 +185,34 @@ def test_less_an_acceleration_is_less_what_it_does():
 
 def test_the_total_is_the_weighted_sum():
     given, weight = linear(3), np.array([1.0, 0.0, 0.4])
-    weighed = likelihood.weighed(given, UNREST)
-    each = _gram(weighed, UNREST.louder(2.0)).each
-    whole = likelihood.modes(weighed, UNREST.louder(2.0)).total(weight)
+    weighed = likelihood.weighed(given, PROCESS_NOISE)
+    each = _gram(weighed, PROCESS_NOISE.times(2.0)).each
+    whole = likelihood.modes(weighed, PROCESS_NOISE.times(2.0)).total(weight)
     assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
 
 
 def test_one_pass_serves_every_size_of_unrest():
     given = linear(3)
-    weighed, weight = likelihood.weighed(given, UNREST), np.array([1.0, 0.0, 0.4])
-    modes = likelihood.modes(weighed, UNREST)
-    for louder in (0.5, 2.0, 5.0):
-        found, wanted = modes.gram(louder), _gram(weighed, UNREST.louder(louder))
+    weighed, weight = likelihood.weighed(given, PROCESS_NOISE), np.array([1.0, 0.0, 0.4])
+    modes = likelihood.modes(weighed, PROCESS_NOISE)
+    for noise_factor in (0.5, 2.0, 5.0):
+        found, wanted = (
+            modes.gram(noise_factor),
+            _gram(weighed, PROCESS_NOISE.times(noise_factor)),
+        )
         assert found.each == pytest.approx(wanted.each, rel=1e-6)
         assert found.logdet == pytest.approx(wanted.logdet, rel=1e-9)
         whole = np.einsum("s,sij->ij", weight, wanted.each)
-        assert modes.total(weight, louder) == pytest.approx(whole, rel=1e-6)
+        assert modes.total(weight, noise_factor) == pytest.approx(whole, rel=1e-6)
 
 
 @EACH
-def test_start_and_knots_are_the_posterior_mean(unrest):
+def test_start_and_knots_are_the_posterior_mean(process_noise):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
-    found, _ = likelihood.starts_and_knots(given, d, unrest)
-    kernel = covariance(unrest, 3)
-    for s, (e, j, c) in enumerate(dense(given, unrest)):
+    found, _ = likelihood.starts_and_knots(given, d, process_noise)
+    kernel = covariance(process_noise, 3)
+    for s, (e, j, c) in enumerate(dense(given, process_noise)):
         z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
         mean = kernel @ z.T @ np.linalg.solve(c, e - j @ d)
         assert found[s] == pytest.approx(mean, rel=1e-5, abs=1e-7)
@@ -208,13 +221,16 @@ def test_start_and_knots_are_the_posterior_mean(unrest):
 def test_marginal_is_the_dense_gaussian():
     """Numbers d ~ N(m, Λ⁻¹) integrated out, up to what no prior changes: priors compared."""
     given = linear(3)
-    total = likelihood.modes(likelihood.weighed(given, UNREST), UNREST).total(np.ones(len(given.e)))
+    total = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE).total(
+        np.ones(len(given.e))
+    )
     found, wanted = [], []
     for mean, sure in (((0.0, 0.0), (1.0, 4.0)), ((0.5, -1.0), (0.1, 30.0))):
         information = np.diag(sure)
         found.append(marginal(total, information, information @ np.array(mean)))
         e, j, c = (np.concatenate(parts) if i < 2 else parts
-                   for i, parts in enumerate(zip(*dense(given, UNREST), strict=True)))  # fmt: skip
+                   for i, parts in enumerate(
+                       zip(*dense(given, PROCESS_NOISE), strict=True)))  # fmt: skip
         whole = np.zeros((len(e), len(e)))
         at = 0
         for block in c:
@@ -238,9 +254,9 @@ def test_a_pulse_pushes_all_channels_together():
                 if a == b:
                     value += push[a] ** 2 * np.exp(-far / 5.0)
                 assert kernel[4 * a + i, 4 * b + k] == pytest.approx(value, abs=1e-7)
-    louder = PULSED.louder(3.0).kernel(4) - PULSED.kernel(4)
-    assert louder[0, 0] == pytest.approx(8.0 * push[0] ** 2)  # the pulse does not get louder
-    assert abs(louder[0, 4]) < 1e-12
+    noise_factor = PULSED.times(3.0).kernel(4) - PULSED.kernel(4)
+    assert noise_factor[0, 0] == pytest.approx(8.0 * push[0] ** 2)  # the pulse stays
+    assert abs(noise_factor[0, 4]) < 1e-12
 
 
 def test_precision_is_the_inverse():
@@ -252,17 +268,17 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     """Noise and push as drawn, from a beginning that is wrong by a factor of three."""
     rng = np.random.default_rng(11)
     given = linear(250, bins=10, knots=5)
-    kernel = covariance(UNREST, 5)
+    kernel = covariance(PROCESS_NOISE, 5)
     z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
     d = np.array([0.3, -0.7])
     noise = NOISE * rng.standard_normal(given.e.shape)
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
     e[~given.cut.used] = 1e3  # nobody looks there
-    begin = replace(UNREST, noise=NOISE * 3.0, push=UNREST.push / 3.0)
+    begin = replace(PROCESS_NOISE, noise=NOISE * 3.0, push=PROCESS_NOISE.push / 3.0)
     found = likelihood.learnt(replace(given, e=e), d, begin, rounds=25)
     assert found.noise == pytest.approx(NOISE, rel=0.15)
-    assert found.push == pytest.approx(UNREST.push, rel=0.15)
-    assert found.time == UNREST.time and (found.start == UNREST.start).all()
+    assert found.push == pytest.approx(PROCESS_NOISE.push, rel=0.15)
+    assert found.time == PROCESS_NOISE.time and (found.start == PROCESS_NOISE.start).all()
     assert (found.coloured <= 0.2).all()
 
 
@@ -273,11 +289,11 @@ def test_sizes_learnt_are_the_likeliest():
     given = linear(20, bins=10, knots=5)
     used = rng.random(given.e.shape[:2]) > 0.3  # hardly ever whole
     given = replace(given, cut=replace(given.cut, used=np.repeat(used[..., None], 6, -1)))
-    kernel = covariance(UNREST, 5)
+    kernel = covariance(PROCESS_NOISE, 5)
     z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
     noise = NOISE * rng.standard_normal(given.e.shape)
     given = replace(given, e=np.einsum("sbcz,sz->sbc", given.z, z) + noise)
-    begin = replace(UNREST, noise=NOISE * 10.0, push=UNREST.push / 10.0)
+    begin = replace(PROCESS_NOISE, noise=NOISE * 10.0, push=PROCESS_NOISE.push / 10.0)
     found = likelihood.learnt(given, np.zeros(2), begin, rounds=5)
 
     def log_density(sizes):
@@ -299,12 +315,12 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     rng = np.random.default_rng(12)
     given = linear(400, bins=15, knots=5)
     share = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.8])
-    true = replace(UNREST, coloured=share, fade=np.full(6, 4.0))
+    true = replace(PROCESS_NOISE, coloured=share, fade=np.full(6, 4.0))
     kernel, d = covariance(true, 5), np.array([0.3, -0.7])
     z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
     noise = rng.multivariate_normal(np.zeros(90), observed(true, 15), len(given.e))
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise.reshape(given.e.shape)
-    drawn, found = replace(given, e=e), UNREST
+    drawn, found = replace(given, e=e), PROCESS_NOISE
     for _ in range(4):
         found = likelihood.learnt(drawn, d, found, rounds=6)
     assert found.coloured[5] == pytest.approx(0.8, abs=0.1) and found.fade[5] == 4.0
@@ -313,7 +329,7 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     holes = replace(
         drawn, cut=replace(drawn.cut, used=drawn.cut.used & (np.arange(15) != 7)[:, None])
     )
-    assert (likelihood.learnt(holes, d, UNREST, rounds=1).coloured == 0.0).all()
+    assert (likelihood.learnt(holes, d, PROCESS_NOISE, rounds=1).coloured == 0.0).all()
 
 
 def test_one_campaign_is_believed_less_where_voyages_disagree():

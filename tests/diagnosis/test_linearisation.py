@@ -514,9 +514,9 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
 def test_what_was_left_out_carries_no_information():
     cut, at, _ = coasting(segments_on=(2,))
     found = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
-    unrest = likelihood.Unrest(WIDE.noise, WIDE.push, WIDE.start, 4.0)
-    whole = likelihood.weighed(found, unrest)
-    part = likelihood.weighed(found.pick(np.array([True, True, False, True])), unrest)
+    process_noise = likelihood.ProcessNoise(WIDE.noise, WIDE.push, WIDE.start, 4.0)
+    whole = likelihood.weighed(found, process_noise)
+    part = likelihood.weighed(found.pick(np.array([True, True, False, True])), process_noise)
     assert not whole.dd[2].any() and not whole.zd[2].any() and not whole.zz[2].any()
     assert whole.dd.sum(0) == pytest.approx(part.dd.sum(0), rel=1e-12)
     assert whole.logdet == pytest.approx(part.logdet, rel=1e-12)

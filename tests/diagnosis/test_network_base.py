@@ -115,7 +115,7 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     assert seen.base.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
     assert seen.first.numbers == {} and seen.nothing.numbers == {}
     ref, base = trial.reference, trial.reference.model.base
-    d = trial.level(seen.point, seen.louder, ("current",)).solution
+    d = trial.level(seen.point, seen.noise_factor, ("current",)).solution
     weights = d[ref.columns.linearised : len(ref.columns.unit)]
     assert trial.coefficients(seen.point, seen.base) == pytest.approx(ref.misfit.bends(weights))
     assert np.abs(weights).max() > 0.0 and base.bent is None
@@ -144,7 +144,7 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
     assert np.abs(bends - bent).max() > 1e-3 * np.abs(whole).max()
     assert not np.allclose(numbers["current"], others["current"], rtol=1e-6)
     alone, _ = afloat.trial.without(
-        decision.point, ("current",), decision.louder, decision.point.linear.cut.voyage == 0
+        decision.point, ("current",), decision.noise_factor, decision.point.linear.cut.voyage == 0
     )
     assert numbers["current"] == pytest.approx(alone["current"])
 

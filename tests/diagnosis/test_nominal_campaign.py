@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import straight
-from straight import CAUSES, SETTING, UNREST
+from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis import (
     campaign_characteristics,
@@ -65,13 +65,13 @@ def test_products_of_parts_are_those_of_the_whole():
     columns = straight.columns_of(CAUSES[:2])
     record = straight.sailed(6)
     given = straight.passed(record, columns)
-    modes = likelihood.modes(likelihood.weighed(given, UNREST), UNREST)
+    modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
     weight = np.linspace(0.2, 1.0, 6)
     unit = columns.unit
     rows = [np.arange(2), np.arange(2, 6)]
     found = campaign_parts.products(modes, rows, unit, weight, 1.3)
     wanted = np.zeros((1 + len(unit),) * 2)
-    for s, (e, j, _, c) in enumerate(straight.dense(given, UNREST.louder(1.3))):
+    for s, (e, j, _, c) in enumerate(straight.dense(given, PROCESS_NOISE.times(1.3))):
         both = np.concatenate((e[:, None], j * unit), 1)
         wanted += weight[s] * both.T @ np.linalg.solve(c, both)
     assert sum(found) == pytest.approx(wanted, rel=1e-6)
@@ -115,7 +115,7 @@ def learned(model):
     numbers = np.zeros(len(columns.unit))
     numbers[columns.of["drag"]] = 0.5
     given = straight.passed(record, columns, numbers, told=0.3)
-    at = Settled(np.zeros(2), given.path, UNREST)
+    at = Settled(np.zeros(2), given.path, PROCESS_NOISE)
     patch = pytest.MonkeyPatch()
     patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
     patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
@@ -193,7 +193,7 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     monkeypatch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
     monkeypatch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
     less = replace(found, deviation={n: v for n, v in found.deviation.items() if n != "drag"})
-    at = Settled(np.zeros(2), given.path, UNREST)
+    at = Settled(np.zeros(2), given.path, PROCESS_NOISE)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)
     own = made.effects.deviation[columns.of["drag"]]
     assert own == pytest.approx([voyage_effects.LEAST_DEVIATION])

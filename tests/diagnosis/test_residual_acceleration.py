@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from shiplog.diagnosis import residual_acceleration, segments
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.segments import Cut
 from shiplog.models.mmg import body
 from shiplog.voyages.recording import Record
 
-UNREST = Unrest(
+PROCESS_NOISE = ProcessNoise(
     noise=np.full(6, 3e-4), push=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)
 )
 
@@ -54,11 +54,13 @@ def test_the_posterior_is_kriging():
     rng = np.random.default_rng(0)
     y = 1e-3 * rng.standard_normal((2, 3, 16))
     found = residual_acceleration.posterior(
-        seen_directly(y, np.array([0, 300])), np.array([4e-4]), UNREST, rested((700,), (0,))
+        seen_directly(y, np.array([0, 300])), np.array([4e-4]), PROCESS_NOISE, rested((700,), (0,))
     )
     t = 2.0 * np.arange(16)
     for channel in range(3):
-        prior = UNREST.push[channel] ** 2 * np.exp(-np.abs(t[:, None] - t) / UNREST.time)
+        prior = PROCESS_NOISE.push[channel] ** 2 * np.exp(
+            -np.abs(t[:, None] - t) / PROCESS_NOISE.time
+        )
         gain = prior[:, :15] @ np.linalg.inv(prior[:15, :15] + 3e-4**2 * np.eye(15))
         shifted = y[:, channel, :15] - (4e-4 if channel == 0 else 0.0)
         assert found.mean[:, channel] == pytest.approx(shifted @ gain.T, abs=1e-9)
@@ -79,7 +81,7 @@ def test_segments_cover_every_stretch_twice_and_to_its_end():
 def test_each_instant_counts_once_and_by_the_better_known():
     y = np.zeros((3, 3, 16))
     found = residual_acceleration.posterior(
-        seen_directly(y, np.array([0, 300, 399])), np.zeros(1), UNREST, rested((700,), (0,))
+        seen_directly(y, np.array([0, 300, 399])), np.zeros(1), PROCESS_NOISE, rested((700,), (0,))
     )
     keep = residual_acceleration.once(found)
     rows = np.sort(found.rows[keep])
@@ -99,7 +101,7 @@ def test_the_table_tells_what_went_with_it():
     record = replace(record, state=state, wind=wind)
     linear = seen_directly(np.ones((2, 3, 16)) * 1e-3, np.array([0, 300]))
     table = residual_acceleration.table(
-        residual_acceleration.posterior(linear, np.zeros(1), UNREST, record), record
+        residual_acceleration.posterior(linear, np.zeros(1), PROCESS_NOISE, record), record
     )
     assert table["time_s"].to_list() == pytest.approx([2.0 * i for i in range(31)])
     assert table["x0"][5] == pytest.approx(105.0)
@@ -115,7 +117,7 @@ def test_a_force_that_no_model_has_is_found_with_its_uncertainty():
     sailed = afloat.voyage(150.0)
     swell = np.sin(2.0 * np.pi * sailed.time / 50.0)[:, None] * np.array([3.0, -2.0, 1.0])
     record = afloat.record(sailed, afloat.pushed(sailed, swell))
-    white = replace(afloat.UNREST.louder(10.0), noise=afloat.NOISE / np.sqrt(20.0))  # of 2 s
+    white = replace(afloat.PROCESS_NOISE.times(10.0), noise=afloat.NOISE / np.sqrt(20.0))  # of 2 s
     found = residual_acceleration.posterior(afloat.linear(record), np.zeros(0), white, record)
     zero = np.zeros(1)
     added = body.accelerations(afloat.COEFFICIENTS, afloat.SHIP, zero, zero, zero, swell)

@@ -155,7 +155,7 @@ def test_what_a_model_has_already_stays_beside_what_is_found():
 def pushes() -> np.ndarray:
     """[S, 3J] three times the nominal process noise."""
     plain, _ = trial_with({})
-    kernel = np.linalg.cholesky(straight.UNREST.kernel(plain.grid.knots))
+    kernel = np.linalg.cholesky(straight.PROCESS_NOISE.kernel(plain.grid.knots))
     return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
 
 
@@ -178,7 +178,7 @@ def test_an_intermittent_force_is_asked_for_beside_no_family():
         )
         found = Search(trial, point, {})
         found.weigh((), {}, point)
-        assert found.found[(), "raised"].found.louder > 1.5
+        assert found.found[(), "raised"].found.noise_factor > 1.5
         assert asked == [Remainder(INTERMITTENT)]
         assert ((), INTERMITTENT) not in found.found  # it gains nothing: it is raised noise
 
@@ -209,8 +209,8 @@ def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the
     raised = max(level.value for level in levels)
     usual = max(
         level.value
-        - trial.expected(level.louder, Remainder("raised"))
-        + trial.expected(level.louder, Remainder())
+        - trial.expected(level.noise_factor, Remainder("raised"))
+        + trial.expected(level.noise_factor, Remainder())
         for level in levels
     )
     assert usual + 2.0 < raised < usual + 60.0
@@ -255,10 +255,10 @@ def test_without_a_cause_the_process_noise_is_the_usual_one_again():
     """A verdict leaves its pulses in the trial's process noise; the next search begins without."""
     found = searched({"drag": [1.2]})
     trial = found.trial
-    usual = trial.unrest
-    trial.unrest = replace(usual, pulse=np.array([0.0, 0.02, 0.0]))
+    usual = trial.process_noise
+    trial.process_noise = replace(usual, pulse=np.array([0.0, 0.02, 0.0]))
     found.without("load")
-    assert trial.unrest is trial.reference.unrest is usual
+    assert trial.process_noise is trial.reference.process_noise is usual
     again = searched({"drag": [1.2]})
     again.without("load")
     assert {key: h.score for key, h in found.found.items()} == pytest.approx(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import straight
 from scipy.stats import multivariate_normal, norm
-from straight import CAUSES, UNREST
+from straight import CAUSES, PROCESS_NOISE
 
 from shiplog.diagnosis import campaign_parts
 from shiplog.diagnosis import trial as trials
@@ -52,7 +52,7 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
     cut, linear = point.linear.cut, point.linear
     seen = ref.misfit.pushed(cut, trial.grid)
     unseen = trial.unseen.pushed(cut, trial.grid)
-    for s, (error, j, z, c) in enumerate(straight.dense(linear, UNREST.louder(noise))):
+    for s, (error, j, z, c) in enumerate(straight.dense(linear, PROCESS_NOISE.times(noise))):
         unit = columns.unit[: j.shape[1]]
         both = np.concatenate((j * unit, z @ seen[s]), 1)
         every = np.concatenate((both, z @ unseen[s]), 1)
@@ -269,8 +269,8 @@ def test_campaigns_are_never_quite_alike(made):
 def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     """With starts that are known, since what a start is felt by is restricted likelihood."""
     usual, record, given = made
-    sure = replace(UNREST, start=np.full(6, 1e-5))
-    ref = replace(usual.reference, unrest=sure)
+    sure = replace(PROCESS_NOISE, start=np.full(6, 1e-5))
+    ref = replace(usual.reference, process_noise=sure)
     trial = straight.Straight(replace(usual, reference=ref), record, given)
     point = trial.at({})
     found, wanted = [], []
@@ -286,10 +286,10 @@ def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=0.05)
 
 
-def gaussian_of(trial, point, noise, unrest):
+def gaussian_of(trial, point, noise, process_noise):
     kept = straight.dense
     try:
-        straight.dense = lambda linear, _: kept(linear, unrest.louder(noise))
+        straight.dense = lambda linear, _: kept(linear, process_noise.times(noise))
         return gaussian(trial, point, noise)
     finally:
         straight.dense = kept
@@ -300,16 +300,16 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
     usual, record, _ = made
     rng = np.random.default_rng(8)
     plain = straight.Straight(*made)
-    kernel = np.linalg.cholesky(UNREST.kernel(plain.grid.knots))
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.knots))
     more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.knots)) @ kernel.T
     given = straight.passed(record, straight.columns_of(CAUSES), seed=2, told=0.3, pushed=more)
     trial = straight.Straight(usual, record, given)
     trial.remainder = Remainder(RAISED)
     levels = trial.levels(trial.at({}))
     best = max(levels, key=lambda one: one.value)
-    assert best.louder == pytest.approx(2.0, rel=0.12)
-    near = max(trial.levels(trial.at({}), (), best.louder), key=lambda one: one.value)
-    assert near.louder == pytest.approx(best.louder, rel=0.02)
+    assert best.noise_factor == pytest.approx(2.0, rel=0.12)
+    near = max(trial.levels(trial.at({}), (), best.noise_factor), key=lambda one: one.value)
+    assert near.noise_factor == pytest.approx(best.noise_factor, rel=0.02)
 
 
 # --- segments
@@ -358,7 +358,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
     left = best.solution[: len(trial.reference.pull)]
     ref, chi2 = trial.reference, []
     seen = ref.misfit.pushed(given.cut, trial.grid)
-    for s, (e, j, z, c) in enumerate(straight.dense(given, UNREST.louder(best.louder))):
+    for s, (e, j, z, c) in enumerate(straight.dense(given, PROCESS_NOISE.times(best.noise_factor))):
         both = np.concatenate((j * ref.columns.unit[: j.shape[1]], z @ seen[s]), 1)
         r = e - both @ left
         chi2.append(r @ np.linalg.solve(c, r))
@@ -393,8 +393,8 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made, monkeypatch
     trial = straight.Straight(usual, record, given)
     lost = np.zeros(8, dtype=bool)
 
-    def at(self, numbers, near=None, louder=None):
-        point = straight.Straight.at(self, numbers, near, louder)
+    def at(self, numbers, near=None, noise_factor=None):
+        point = straight.Straight.at(self, numbers, near, noise_factor)
         return replace(point, linear=replace(point.linear, lost=lost.copy()))
 
     monkeypatch.setattr(Former, "at", at)

@@ -371,10 +371,12 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
     unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
     knots, count = 16, 300
-    unrest = replace(afloat.UNREST, pulse=1.7 * unit)
+    process_noise = replace(afloat.PROCESS_NOISE, pulse=1.7 * unit)
     z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it seen, as well as a knot can be
     drawn = np.zeros((count, 6 + 3 * knots, 1))
-    drawn[:, 6:, 0] = rng.multivariate_normal(np.zeros(3 * knots), unrest.kernel(knots), count)
+    drawn[:, 6:, 0] = rng.multivariate_normal(
+        np.zeros(3 * knots), process_noise.kernel(knots), count
+    )
     sure = 1e12
     weighed = likelihood.Weighed(
         sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
@@ -384,7 +386,8 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
             model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
             setting=SimpleNamespace(scale={"length": 3.0}), counts=1.0,
         ),
-        unrest=replace(unrest, pulse=np.array([9.0, 9.0, 9.0])),  # an earlier one is no matter
+        # an earlier one is no matter
+        process_noise=replace(process_noise, pulse=np.array([9.0, 9.0, 9.0])),
         weight=np.ones(count),
         left=lambda *_: (linear, np.zeros(0)),
         solved=lambda *_: np.zeros(0),

@@ -30,7 +30,7 @@ from scipy.special import chdtri  # scipy.stats takes a second to load
 from shiplog.diagnosis import likelihood, measurement_correction, segments
 from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.fitted import Point
-from shiplog.diagnosis.likelihood import Unrest
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.result import SHOWS_NATS
@@ -243,8 +243,8 @@ def _white(linear: Linear) -> Linear:
     return replace(linear, z=linear.z[..., :6])
 
 
-def _quiet(noise: np.ndarray, start: np.ndarray) -> Unrest:
-    return Unrest(noise, np.zeros(3), 1.0, start)
+def _quiet(noise: np.ndarray, start: np.ndarray) -> ProcessNoise:
+    return ProcessNoise(noise, np.zeros(3), 1.0, start)
 
 
 def ratios(
