@@ -66,8 +66,8 @@ class TrialEvidence:
         """Linearised with these numbers, around a path pulled onto what was then measured.
 
         near          a path to pull from, or a point that expects what these numbers do to its own
-        noise_factor  λ that holds the path: one that follows every wave of the noise is as far from
-                      the likely one as a free rollout, and what is not linear then looks like evidence
+        noise_factor  λ that holds the path: one that follows every wave of the noise is as far
+                      from the likely one as a free rollout, and its nonlinearity imitates evidence
         """
         ref = self.reference
         wide = (
