@@ -191,5 +191,9 @@ def assumed(
         nominal=None, modes=None, adapts=not given,
     )  # fmt: skip
     return replace(
-        whole, reference=made, effects=VoyageEffects(whole.effects.deviation, known**-0.5), each=()
+        whole,
+        reference=made,
+        effects=VoyageEffects(whole.effects.deviation, known**-0.5),
+        each=(),
+        voyage=np.zeros(0),
     )
