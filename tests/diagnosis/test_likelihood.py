@@ -85,7 +85,7 @@ COLOURED = replace(
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
 )  # fmt: skip
 EACH = pytest.mark.parametrize(
-    "unrest", (PROCESS_NOISE, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
+    "process_noise", (PROCESS_NOISE, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
 )
 
 
