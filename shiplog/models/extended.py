@@ -23,8 +23,8 @@ from shiplog.models.mmg.model import MMG, named, total
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["base", "constants", "stand_in_values"],
-    meta_fields=["causes", "stand_in"],
+    data_fields=["base", "constants", "stand_in", "stand_in_values"],
+    meta_fields=["causes"],
 )
 @dataclass(frozen=True)
 class Extended:

@@ -70,7 +70,7 @@ class Residual:
         return sum(int(np.prod(shape)) for shape in self.shapes.values())
 
 
-@partial(jax.tree_util.register_dataclass, data_fields=["residual"], meta_fields=["physics"])
+@partial(jax.tree_util.register_dataclass, data_fields=["physics", "residual"], meta_fields=[])
 @dataclass(frozen=True)
 class Hybrid:
     """The MMG and a residual network in one rollout; θ is the MMG's, then the weights."""

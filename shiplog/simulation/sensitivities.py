@@ -29,7 +29,8 @@ class Physical(Protocol):
     """Equations of motion that can be compiled, their numbers in a vector of their own. Those that
     a run is made of also have `fixed`, arrays to keep with the numbers, and `forces` by part.
 
-    A JAX pytree: `jax.tree_util.register_static` for what is hashable and never changes shape.
+    A JAX pytree: `jax.tree_util.register_static` for what is hashable and is compiled anew for
+    every ship.
     """
 
     @property

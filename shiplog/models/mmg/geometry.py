@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
@@ -12,6 +13,7 @@ from shiplog.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
 WIDE = math.radians(45.0)
+UNITS = ("propellers", "rudders", "thrusters")
 PARTS = ("hull", "propeller", "rudder", "thruster", "wind")  # forces that can be asked for
 
 
@@ -55,7 +57,8 @@ class Thruster:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Everything SI; hashable, so that a compiled rollout is made once for each ship."""
+    """Everything SI. Which actuator drives what is hashable by `split`, so that a rollout is
+    compiled once for all ships that are alike in it."""
 
     length: float
     draught: float
@@ -81,6 +84,32 @@ class Geometry:
             "wind": self.wind,
         }
         return tuple(name for name in PARTS if has[name])
+
+
+def split(one: Any) -> tuple[list[Any], Any]:
+    """The sizes and places of a geometry or of one of its units, and the same without them."""
+    found, left = [], {}
+    for field in fields(one):
+        value = getattr(one, field.name)
+        if field.type == "float":
+            found.append(value)
+            left[field.name] = 0.0
+        elif field.name in UNITS:
+            each = [split(unit) for unit in value]
+            found += [number for numbers, _ in each for number in numbers]
+            left[field.name] = tuple(unit for _, unit in each)
+    return found, replace(one, **left)
+
+
+def joined(one: Any, numbers: Iterator[Any]) -> Any:
+    """What `split` took apart."""
+    found = {}
+    for field in fields(one):
+        if field.type == "float":
+            found[field.name] = next(numbers)
+        elif field.name in UNITS:
+            found[field.name] = tuple(joined(unit, numbers) for unit in getattr(one, field.name))
+    return replace(one, **found)
 
 
 def geometry_of(

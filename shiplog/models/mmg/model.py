@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,13 +13,15 @@ import numpy as np
 from jax import Array
 
 from shiplog.models.mmg import body, hull, parameters, propeller, rudder, thruster, wind
-from shiplog.models.mmg.geometry import Geometry
+from shiplog.models.mmg.geometry import Geometry, joined, split
 
 
-@jax.tree_util.register_static
 @dataclass(frozen=True, slots=True)
 class MMG:
-    """A ship's equations of motion; hashable, its numbers come as a vector θ in order of `names`.
+    """A ship's equations of motion; its numbers come as a vector θ in order of `names`.
+
+    A JAX pytree of the geometry's sizes and places: what is compiled for one ship serves another
+    with the same actuators.
 
     The assembly is Miyauchi et al. 2022; each force names its own authors.
     """
@@ -82,6 +85,19 @@ class MMG:
         force = total(self.forces_of(p, state, actuator, true_wind).values())
         u, v, r = state[..., 1], state[..., 3], state[..., 5]
         return body.accelerations(p, self.geometry, u, v, r, force)
+
+
+def _flat(model: MMG) -> tuple[list[Any], tuple[Geometry, int]]:
+    numbers, left = split(model.geometry)
+    return numbers, (left, model.substeps)
+
+
+def _whole(fixed: tuple[Geometry, int], numbers: Iterable[Any]) -> MMG:
+    geometry, substeps = fixed
+    return MMG(joined(geometry, iter(numbers)), substeps)
+
+
+jax.tree_util.register_pytree_node(MMG, _flat, _whole)
 
 
 def named(names: Sequence[str], theta: Array) -> dict[str, Array]:

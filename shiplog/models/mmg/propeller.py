@@ -76,7 +76,7 @@ def propeller(
         braking = PITCH_RATIO**2 * (c[5] * advance**2 + c[6] * advance + c[7])
         return jnp.where(n < 0.0, astern, jnp.where((n > 0.0) & (u < 0.0), braking, 0.0))
 
-    hand = -1.0 if screw.starboard < 0.0 else 1.0  # screws of a pair turn against each other
+    hand = jnp.where(screw.starboard < 0.0, -1.0, 1.0)  # screws of a pair turn against each other
     y = hand * q * nd**2 * side("a")
     turning = hand * q * g.length * nd**2 * side("b") - screw.starboard * x
     return jnp.stack((x, y, turning), axis=-1)

@@ -31,7 +31,7 @@ def ahead_inflow(
     eps = p["rudder.eps"]
     if screw is None:
         return jnp.where(u >= 0.0, eps * arriving * u, u)
-    eta = min(screw.diameter / blade.span, 1.0)
+    eta = jnp.minimum(screw.diameter / blade.span, 1.0)
     u_p = u * arriving
     jet = slipstream(screw, k_t, n)
     far = root(u_p**2 + jnp.maximum(jet, 0.0))
