@@ -116,7 +116,7 @@ def learn(
     every = products(whole, made.rows, unit, weight)
     deviation, size = np.zeros(len(known)), known**-0.5
     for name, where in groups_of(model, columns, families).items():
-        deviation[where] = found.deviation.get(name, voyage_effects.LEAST_DEVIATION)
+        deviation[where] = found.deviation.get(name, voyage_effects.UNSEEN_DEVIATION)
     for family in families.families:
         size[family.columns] = found.size[family.name]
     effects = VoyageEffects(deviation, size)

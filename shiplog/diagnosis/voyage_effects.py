@@ -15,13 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, lapack, solve_triangular
 
-EM_ROUNDS = 6  # of three steps of expectation-maximisation each
+EM_ROUNDS = 15  # of three steps of expectation-maximisation each, at most
+CONVERGED = 0.1  # of the logarithm of a variance: a round that moves none by more is the last
 LEAP = 16.0  # steps at once, at most
-BOUNDS = (-16.0, 10.0)  # of the logarithm of a variance: 3e-4 to 150 plausible sizes
+BOUNDS = (-20.0, 10.0)  # of the logarithm of a variance: 5e-5 to 150 plausible sizes
 FIRST_DEVIATION = 0.1  # at which it begins, in units of a number's plausible size
-LEAST_DEVIATION = 0.02  # of one pseudo-part: no two voyages are alike to better than that
+LEAST_DEVIATION = 0.001  # of one pseudo-part, so that a variance cannot become zero
+UNSEEN_DEVIATION = 0.02  # of numbers that the nominal campaign says nothing of
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,9 @@ def learn(
     groups   columns that share one variance; other columns have none
     sized    columns whose prior size (the same in every part) is learned too
     """
+    free = np.sort(np.concatenate([np.zeros(0, int), *groups]))
     problem = _EffectsProblem(
-        [(g[1:, 1:], g[1:, 0]) for g in each], known, pull, list(groups), list(sized)
+        [_Part.of(gram, free) for gram in each], free, known, pull, list(groups), list(sized)
     )
     sizes = np.log(np.full(len(problem.groups) + len(problem.sized), FIRST_DEVIATION**2))
     for at, columns in enumerate(problem.sized, len(problem.groups)):
@@ -78,16 +81,37 @@ def learn(
         first, second = one - sizes, two - one
         bend = float(np.linalg.norm(second - first))
         leap = float(np.clip(np.linalg.norm(first) / max(bend, 1e-12), 1.0, LEAP))
+        before = sizes
         sizes, numbers = problem.step(sizes + 2.0 * leap * first + leap**2 * (second - first))
+        if np.abs(sizes - before).max(initial=0.0) < CONVERGED:
+            break
     variance, information = problem.spread(sizes)
     return VoyageEffects(np.sqrt(variance), information**-0.5, numbers)
 
 
 @dataclass(frozen=True)
-class _EffectsProblem:
-    """Parts (M, g) with what is known of θ, and which columns share one variance."""
+class _Part:
+    """Products M [C, C] and g [C] of a part, and the rows of both that have a b [F]."""
 
-    parts: list[tuple[np.ndarray, np.ndarray]]
+    m: np.ndarray
+    g: np.ndarray
+    own: np.ndarray
+    own_g: np.ndarray
+    both: np.ndarray
+
+    @classmethod
+    def of(cls, gram: np.ndarray, free: np.ndarray) -> _Part:
+        m, g = np.ascontiguousarray(gram[1:, 1:]), gram[1:, 0]
+        return cls(m, g, m[free], g[free], m[np.ix_(free, free)])
+
+
+@dataclass(frozen=True)
+class _EffectsProblem:
+    """Parts with what is known of θ, and which columns share one variance; `free` [F] are those
+    of all groups."""
+
+    parts: list[_Part]
+    free: np.ndarray
     known: np.ndarray
     pull: np.ndarray
     groups: list[np.ndarray]
@@ -105,31 +129,40 @@ class _EffectsProblem:
     def step(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """One step of expectation-maximisation: logarithms of the variances, and θ + b [V, C]."""
         variance, known = self.spread(np.clip(sizes, *BOUNDS))
-        free = np.flatnonzero(variance > 0.0)
+        free = self.free
         deviation = np.sqrt(variance[free])
         scale = np.outer(deviation, deviation)
         information, towards, inner = np.diag(known), self.pull.copy(), []
-        for m, g in self.parts:
-            own = np.eye(len(free)) + scale * m[np.ix_(free, free)]
-            spread = np.linalg.inv(own) * scale  # (D⁻¹ + M)⁻¹
-            gain = spread @ m[free]
-            information += m - m[:, free] @ gain
-            towards += g - gain.T @ g[free]
+        for part in self.parts:
+            spread = _inverse(np.eye(len(free)) + scale * part.both) * scale  # (D⁻¹ + M)⁻¹
+            gain = spread @ part.own
+            information += part.m - part.own.T @ gain
+            towards += part.g - gain.T @ part.own_g
             inner.append((spread, gain))
-        covariance = np.linalg.inv(information)
+        covariance = _inverse(information)
         mean = covariance @ towards
         second = np.zeros(len(variance))
         numbers = np.repeat(mean[None], len(self.parts), axis=0)
-        for own_numbers, (spread, gain), (_, g) in zip(numbers, inner, self.parts, strict=True):
-            found = spread @ g[free] - gain @ mean
+        for own_numbers, (spread, gain), part in zip(numbers, inner, self.parts, strict=True):
+            found = spread @ part.own_g - gain @ mean
             own_numbers[free] += found
             second[free] += found**2 + np.diagonal(spread)
-            second[free] += np.einsum("ij,ij->i", gain @ covariance, gain)
+            second[free] += ((gain @ covariance) * gain).sum(1)
         squares = mean**2 + np.diagonal(covariance)
         count = len(self.parts)
         moved = [_mean(second[c].sum(), count * len(c)) for c in self.groups]
         moved += [_mean(squares[c].sum(), len(c)) for c in self.sized]
         return np.log(np.array(moved)), numbers
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Of a positive definite matrix. Raises np.linalg.LinAlgError where it is not."""
+    if not len(matrix):
+        return matrix
+    lower, failed = lapack.dpotri(cholesky(matrix, lower=True, check_finite=False), lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("a matrix is singular")
+    return np.tril(lower) + np.tril(lower, -1).T
 
 
 def _mean(total: float, count: int) -> float:

@@ -196,7 +196,7 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     at = Settled(np.zeros(2), given.path, PROCESS_NOISE)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)
     own = made.effects.deviation[columns.of["drag"]]
-    assert own == pytest.approx([voyage_effects.LEAST_DEVIATION])
+    assert own == pytest.approx([voyage_effects.UNSEEN_DEVIATION])
 
 
 def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):
