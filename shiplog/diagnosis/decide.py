@@ -20,12 +20,17 @@ from shiplog.diagnosis.unrecorded_thruster import pulse_force
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
 
-def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[Decision, Posterior]:
-    """The verdict, some names refuted by held-out data (with the reason)."""
+def decide(
+    search: Search,
+    refuted: Mapping[str, str] | None = None,
+    doubted: Mapping[str, str] | None = None,
+) -> tuple[Decision, Posterior]:
+    """The verdict, some names refuted by held-out data or all that would be named in doubt (with
+    the reasons)."""
     refuted, trial = dict(refuted or {}), search.trial
     trial.process_noise = trial.reference.process_noise  # without an earlier intermittent force
     found = posteriors.posterior(search, tuple(refuted))
-    names = found.stated
+    names = () if doubted else found.stated
     kind = found.remainder
     best = search.recalled(posteriors.best_with(found, names, kind if not names else None))
     mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
@@ -51,7 +56,8 @@ def decide(search: Search, refuted: Mapping[str, str] | None = None) -> tuple[De
     if pulses is not None:  # its force and times are taken from this trial later
         trial.process_noise = _with_pulses(search, best)
     return Decision(
-        verdict, named, structure, pulses, traces, _reasons(search, found, refuted, named),
+        verdict, named, structure, pulses, traces, 
+        _reasons(search, found, refuted | dict(doubted or {}), named),
         found.ranking(), shown.found.noise_factor, search.point(shown), shown.found, search.first,
         search.nothing.found, search.told,
     ), found  # fmt: skip

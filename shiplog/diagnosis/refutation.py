@@ -1,8 +1,11 @@
-"""Held-out voyages may refute a cause: one rule for all causes.
+"""Held-out voyages may refute a cause, or leave it in doubt: two rules for all causes.
 
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it.
+
+Where something acts that no cause explains, noise is not what the likelihood takes it for, and a
+log Bayes factor proves nothing: causes are named there only if the whole interval is a gain.
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ def judged(
     search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
     """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.
+    Causes in doubt are not named: the decision is that of their remainder.
 
     Of several causes the one that takes most off the held-out error comes first.
     """
@@ -49,6 +53,13 @@ def judged(
             worths = [held.worth(rest, decision) for rest in rests]
         asked = list(zip(decision.named, worths, strict=True))
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
+        if not worse and found.remainder is not None and not gain.real:
+            why = (
+                "beside something that no cause explains, a cause has to reduce the held-out error "
+                f"for certain: it does by {gain.low:.1%} to {gain.high:.1%}"
+            )
+            doubted = {one.cause.name: why for one in decision.named}
+            return *decide(search, refuted, doubted), None, refuted
         if not worse:
             order = sorted(asked, key=lambda pair: -pair[1].reduction)
             ordered = replace(decision, named=tuple(one for one, _ in order))

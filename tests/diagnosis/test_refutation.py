@@ -6,7 +6,7 @@ import pytest
 import weighed
 
 from shiplog.diagnosis.refutation import judged
-from shiplog.diagnosis.trial import NOMINAL
+from shiplog.diagnosis.trial import NOMINAL, RAISED
 from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
@@ -62,6 +62,24 @@ def test_what_is_not_surely_worse_stays(trial, interval):
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert (gained.low, gained.high) == interval
     assert refuted == {}
+
+
+@pytest.mark.parametrize("interval", (UNSURE, HARDLY))
+def test_beside_a_remainder_an_unsure_gain_names_nothing(trial, interval):
+    """The verdict is the remainder's; the cause keeps its probability, and the reason is told."""
+    made = weighed.search(trial, {(DRAG, RAISED): 1.0})
+    decision, found, gained, refuted = judged(made, HeldOut({DRAG: interval}))
+    assert (decision.verdict, decision.named, gained, refuted) == ("unknown", (), None, {})
+    assert decision.structure.family == "stochastic"
+    assert found.names["drag"] == pytest.approx(1.0)
+    assert f"by {interval[0]:.1%} to {interval[1]:.1%}" in decision.rejected["drag"]
+
+
+def test_beside_a_remainder_a_sure_gain_names_the_cause(trial):
+    held = HeldOut({DRAG: BETTER})
+    decision, _, gained, _ = judged(weighed.search(trial, {(DRAG, RAISED): 1.0}), held)
+    assert (decision.verdict, gained.low) == ("named", BETTER[0])
+    assert [one.cause.label for one in decision.named] == ["drag"]
 
 
 def test_what_is_surely_worse_is_dropped_and_the_next_is_judged(trial):
