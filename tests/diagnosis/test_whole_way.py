@@ -218,7 +218,9 @@ def test_the_answer_has_the_shape_of_the_contract(sea):
     assert told["causes"][0]["name"] == "current"
     assert set(told["causes"][0]["parameters"]) == {"speed", "direction"}
     assert told["base"] == {"run": "mmg", "before_effect": True}
-    assert sum(one["probability"] for one in told["ranking"]) == pytest.approx(1.0, abs=0.05)
+    said = [one["probability"] for one in told["ranking"]]  # of each answer, whatever else is true
+    assert told["ranking"][0]["name"] == "current" and said[0] > 0.9
+    assert said == sorted(said, reverse=True) and 0.0 <= min(said) and max(said) <= 1.0
     report = (sea.work / "out" / "report.md").read_text("utf-8")
     assert "steady current" in report and "Gain" in report
 
@@ -607,7 +609,7 @@ def test_one_wild_segment_does_not_decide(sea):
     state = seen.state.copy()
     state[row : row + 300, 3] += 0.3 * np.exp(-0.5 * ((t - 15.0) / 2.0) ** 2)
     shoved, decision = judged(sea.campaign, replace(seen, state=state))
-    assert shoved.weight[5] < 0.3
+    assert shoved.weight[5] < 0.5 * trial.weight[5]
     assert np.median(shoved.weight) == 1.0
     assert "current" in labels(decision)
     (current,) = (n for n in decision.named if n.cause.label == "current")
