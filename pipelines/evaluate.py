@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
-import torch
 
 from pipelines.bars import reach, staged
 from shiplog.channels import STATE
@@ -276,7 +275,7 @@ def _numbered(cut: Windows) -> pl.DataFrame:
         "elapsed",
     ).with_columns(
         wind_speed=pl.Series(
-            values=cut.wind[..., 0].mean(1).numpy() if cut.wind.shape[-1] else [None] * len(cut),
+            values=cut.wind[..., 0].mean(1) if cut.wind.shape[-1] else [None] * len(cut),
             dtype=pl.Float64,
         )
     )
@@ -300,7 +299,7 @@ def _half_widths(
     learnt = run.band()
     if learnt is None or len(learnt.growth) != cut.state.shape[1]:
         return None
-    simulated = [one.simulated.numpy() for one in scores.values()]
+    simulated = [one.simulated for one in scores.values()]
     return learnt.half_width(run.spread(models, simulated, cut))
 
 
@@ -313,7 +312,7 @@ def _inside(scored: list, bands: dict[str, np.ndarray | None], cut: Windows) -> 
             continue
         shares = np.mean(
             [
-                prediction_interval.coverage((s.simulated - cut.state).numpy(), half)
+                prediction_interval.coverage(s.simulated - cut.state, half)
                 for r, _, s in scored
                 if r.name == run
             ],
@@ -340,16 +339,16 @@ def _rollout(
     half: np.ndarray | None,
 ) -> pl.DataFrame:
     count, size, _ = scores.simulated.shape
-    since = torch.cat((torch.zeros(count, 1, dtype=torch.float64), cut.dt.cumsum(1)), 1)
+    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt, 1)), 1)
     every = pl.Series("row", range(count)).repeat_by(size).explode()
     index = _labelled(numbered, run, seed)[every.to_list()]
-    states = scores.simulated.reshape(-1, len(STATE)).numpy()
+    states = scores.simulated.reshape(-1, len(STATE))
     return index.select("run", "seed", "voyage", "window").hstack(
         pl.DataFrame(
-            {"time": index["elapsed"].to_numpy() + since.flatten().numpy()}
+            {"time": index["elapsed"].to_numpy() + since.ravel()}
             | {c.name: states[:, j] for j, c in enumerate(STATE)}
             | _edges(states, half)
-            | {"d": scores.d.flatten().numpy()}
+            | {"d": scores.d.ravel()}
         )
     )
 

@@ -258,7 +258,7 @@ def _band(run: RunFolder, ready: Prepared, validated: CrossValidated | None) -> 
         groups += len(set(ready.voyages))
     if ready.unseen is not None:
         simulator = load_model.of_folder(run).simulator(run.config.seeds[0])
-        errors.append((simulator.simulate(ready.unseen) - ready.unseen.state).numpy())
+        errors.append(simulator.simulate(ready.unseen) - ready.unseen.state)
         spreads.append(simulator.spread(ready.unseen))
         groups += ready.unseen.plan["voyage"].n_unique()
     if errors:

@@ -15,7 +15,6 @@ import torch
 
 from pipelines.bars import Bars
 from pipelines.identify import identify_command
-from shiplog import random_streams
 from shiplog.exceptions import RunError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models import MODELS, NETWORK, PHYSICS
@@ -23,7 +22,8 @@ from shiplog.models.feedforward import scaling
 from shiplog.paths import refuse_taken
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
-from shiplog.training import load_model, network_gradient, run_folder, seed_files
+from shiplog.training import load_model, network_gradient, random_streams, run_folder, seed_files
+from shiplog.training.jittering import jittered
 from shiplog.training.job import Training
 from shiplog.training.load_model import NetworkRun, Run
 from shiplog.training.network_training import Progress
@@ -130,8 +130,8 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
 def _band(run: NetworkRun, held: pl.DataFrame) -> prediction_interval.Band:
     """How far off its seeds were on the validation voyages, which they did not learn from."""
     unseen = _cut(run, held, plan(held, "ref", run.config.window))
-    simulated = [simulate(model, unseen).numpy() for model in run.models().values()]
-    error = np.concatenate([states - unseen.state.numpy() for states in simulated])
+    simulated = [simulate(model, unseen) for model in run.models().values()]
+    error = np.concatenate([states - unseen.state for states in simulated])
     spread = np.concatenate([prediction_interval.seeds_spread(simulated)] * len(simulated))
     return prediction_interval.calibrate(error, spread, len(run.config.split.validation))
 
@@ -141,7 +141,7 @@ def training_of(run: NetworkRun, seed: int) -> Training:
     config = run.config
     scale, shape = run.scaling(), run.shape
     learnt = _cut(run, run.training(), run.windows())
-    learnt = windows.jittered(learnt, random_streams.generator(seed, "jitter"))
+    learnt = jittered(learnt, random_streams.generator(seed, "jitter"))
     held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
     training, validation = (
         network_gradient.batch(w, scale, shape, torch.float32) for w in (learnt, held)

@@ -5,7 +5,7 @@ import math
 import polars as pl
 import torch
 
-from shiplog.models.feedforward import FeedForward, exogenous, scaling
+from shiplog.models.feedforward import FeedForward, driven_by, scaling
 from shiplog.voyages.windows import Windows
 
 
@@ -15,11 +15,12 @@ def windows(count=5, size=20, actuators=3, wind=2, seed=0):
     def random(*shape):
         return torch.randn(*shape, generator=g, dtype=torch.float64)
 
-    return Windows(
-        pl.DataFrame({"copy": [0] * count}), 0.3 * random(count, size, 6),
-        random(count, size, actuators), random(count, size, wind).abs() * 2,
+    parts = (
+        0.3 * random(count, size, 6), random(count, size, actuators),
+        random(count, size, wind).abs() * 2,
         0.5 + torch.rand(count, size - 1, generator=g, dtype=torch.float64),
     )  # fmt: skip
+    return Windows(pl.DataFrame({"copy": [0] * count}), *(t.numpy() for t in parts))
 
 
 def network(shape, data, seed=0):
@@ -29,12 +30,13 @@ def network(shape, data, seed=0):
 
 def by_autograd(model, data):
     """Eqs. 6, 8 and 9 word by word, with velocities only."""
-    driven = exogenous(data.actuator, data.wind, model.shape.wind_input)
-    velocity, errors = data.velocity[:, 0], []
-    for i in range(data.dt.shape[1] + 1):
-        errors.append(velocity - data.velocity[:, i])
-        if i < data.dt.shape[1]:
-            velocity = velocity + data.dt[:, i, None] * model.acceleration(velocity, driven[:, i])
+    driven = driven_by(data, model.shape.wind_input)
+    measured, dt = torch.from_numpy(data.velocity), torch.from_numpy(data.dt)
+    velocity, errors = measured[:, 0], []
+    for i in range(dt.shape[1] + 1):
+        errors.append(velocity - measured[:, i])
+        if i < dt.shape[1]:
+            velocity = velocity + dt[:, i, None] * model.acceleration(velocity, driven[:, i])
     w = torch.tensor([100.0, 100.0, 10.0 * 180.0 / math.pi], dtype=torch.float64)
     d = ((torch.stack(errors, 1) * w) ** 2).sum(-1)
-    return ((d[:, 1:] + d[:, :-1]) / 2 * data.dt).sum(1).mean()
+    return ((d[:, 1:] + d[:, :-1]) / 2 * dt).sum(1).mean()

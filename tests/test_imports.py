@@ -24,10 +24,11 @@ ROWS = {
 }
 LEVEL = {name: level for level, name in enumerate(ROWS)}
 SOURCES = sorted((ROOT / "shiplog").rglob("*.py"))
-ONLY = {  # a library, and the packages that may import it
+ONLY = {  # a library, and the packages and modules that may import it
     "mcap": {"logs"}, "mcap_protobuf": {"logs"}, "mcap_ros2": {"logs"}, "pynmea2": {"logs"},
     "rosbags": {"logs"}, "rerun": {"logs", "report"}, "ray": {"training"},
     "matplotlib": {"report"}, "typer": {"cli"}, "pickle": set(),
+    "torch": {"training", "shiplog.models.feedforward"},
 }  # fmt: skip
 
 
@@ -76,7 +77,7 @@ def test_imports_go_one_way(path):
         if top == "shiplog" and (of := package_of(module)):
             assert LEVEL[of] <= LEVEL[own], where
         if top in ONLY:
-            assert own in ONLY[top], where
+            assert ONLY[top] & {own, dotted(path)}, where
 
 
 @pytest.mark.parametrize("name", ROWS)
@@ -103,6 +104,12 @@ def test_pipelines_call_no_experiment():
     for path in (ROOT / "pipelines").glob("*.py"):
         for line, module in imported(path):
             assert not module.startswith("pipelines.experiments"), f"{path.name}:{line}"
+
+
+def test_of_pipelines_the_training_of_networks_alone_imports_torch():
+    paths = (ROOT / "pipelines").glob("*.py")
+    using = {p.name for p in paths if any(m.split(".")[0] == "torch" for _, m in imported(p))}
+    assert using == {"train.py"}
 
 
 def test_commands_that_need_no_network_do_not_load_torch():

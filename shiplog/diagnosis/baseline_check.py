@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.trial_voyages import windows_of
 from shiplog.profile import Profile
 from shiplog.simulation import baselines
 from shiplog.simulation.error_reduction import parts
-from shiplog.simulation.rollout import rollout
-from shiplog.simulation.sensitivities import series
+from shiplog.simulation.rollout import simulate
 from shiplog.training.load_model import Run
 from shiplog.voyages.store import Store
 
@@ -32,15 +30,13 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
     if cut is None or len(names) < 2:
         return ""
     simulator = run.extended(run.config.seeds[0])
-    measured, steps = cut.state.double().numpy(), series(cut).steps
-    own = parts(simulator.states(cut, simulator.theta) - measured, steps)
+    own = parts(simulator.states(cut, simulator.theta) - cut.state, cut.dt)
     plain = np.empty_like(own)
     for name in names:
-        out = torch.tensor([v == name for v in voyages])
-        fitted = baselines.least_squares(cut.pick(torch.nonzero(~out)[:, 0]))
-        left = cut.pick(torch.nonzero(out)[:, 0])
-        states = rollout(fitted, left.state[:, 0], left.actuator, left.wind, left.dt)
-        plain[out.numpy()] = parts((states - left.state).double().numpy(), series(left).steps)
+        out = np.array([v == name for v in voyages])
+        fitted = baselines.least_squares(cut.pick(np.flatnonzero(~out)))
+        left = cut.pick(np.flatnonzero(out))
+        plain[out] = parts(simulate(fitted, left) - left.state, left.dt)
     share = plain.sum(1).mean() / max(own.sum(1).mean(), 1e-12)
     if share >= thresholds.BASELINE:
         return ""

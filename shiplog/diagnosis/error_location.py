@@ -63,7 +63,7 @@ def by_channel(held: HeldOut) -> list[dict]:
     shares, _ = campaign(held.trial.record)
     share = [shares.get(v, (1.0, 1.0))[0] for v in held.voyages]
     plan = held.cut.plan.with_columns(share=pl.Series(share))
-    error = held.states_before - held.measured
+    error = held.states_before - held.cut.state
     found = error_breakdown.explain(error, series(held.cut), plan, held.trial.record.profile)
     return [c.as_json() for c in found.channels]
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import torch
 
 from shiplog.diagnosis import sign_conventions
 from shiplog.diagnosis.evidence import TrialEvidence
@@ -16,7 +15,6 @@ from shiplog.diagnosis.result import Decision
 from shiplog.models.causes import constants_of
 from shiplog.simulation.error_reduction import Gain, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
-from shiplog.simulation.sensitivities import series
 from shiplog.voyages.windows import Windows
 
 SIMULATES_NOTHING = 2.0  # times the L of keeping all velocities
@@ -33,14 +31,6 @@ class Rollouts:
     before: ExtendedSimulator
 
     @cached_property
-    def measured(self) -> np.ndarray:
-        return self.cut.state.double().numpy()
-
-    @cached_property
-    def steps(self) -> np.ndarray:
-        return series(self.cut).steps
-
-    @cached_property
     def voyages(self) -> list[str]:
         """Of each window."""
         return self.cut.plan["voyage"].to_list()
@@ -51,7 +41,7 @@ class Rollouts:
 
     def parts(self, states: np.ndarray) -> np.ndarray:
         """L of each window by channel [N, 3]."""
-        return parts(states - self.measured, self.steps)
+        return parts(states - self.cut.state, self.cut.dt)
 
     @cached_property
     def losses_before(self) -> np.ndarray:
@@ -69,14 +59,14 @@ class HeldOut(Rollouts):
 
     def states_after(self, decision: Decision) -> np.ndarray:
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
-        states = np.empty(tuple(self.cut.state.shape))
+        states = np.empty(self.cut.state.shape)
         needed = self._constants(decision)
         for voyage, half, rows in self.folds():
             numbers, coefficients = self.without(decision, voyage, half)
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
             )
-            states[rows.numpy()] = simulator.states(self.cut.pick(rows), simulator.theta)
+            states[rows] = simulator.states(self.cut.pick(rows), simulator.theta)
         return states
 
     def gain(self, decision: Decision) -> Gain:
@@ -130,7 +120,7 @@ class HeldOut(Rollouts):
         named in them too. Empty where neither holds."""
         own = float(self.losses_before.sum(1).mean())
         after = own if found is None else min(own, found.after)
-        hold = float(self.parts(self.measured[:, :1]).sum(1).mean())
+        hold = float(self.parts(self.cut.state[:, :1]).sum(1).mean())
         other, turned = sign_conventions.best(self.before, self.cut)
         if turned < min(TURNED * after, hold):
             return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
@@ -154,18 +144,18 @@ class HeldOut(Rollouts):
         """Whether halves of voyages are left out: of one alone."""
         return len(set(self.voyages)) == 1
 
-    def folds(self) -> Iterator[tuple[str, Half, torch.Tensor]]:
+    def folds(self) -> Iterator[tuple[str, Half, np.ndarray]]:
         """(voyage, half of it, window rows) that are left out: whole voyages, or halves of one."""
         elapsed = self.cut.plan["elapsed"].to_numpy()
         for name in dict.fromkeys(self.voyages):
             own = np.array([n == name for n in self.voyages])
             if not self._halved:
-                yield name, None, torch.tensor(np.flatnonzero(own))
+                yield name, None, np.flatnonzero(own)
                 continue
             first, last = elapsed[own].min(), elapsed[own].max()
             middle = 0.5 * (first + last + float(self.cut.dt[0].sum()))
             for late in (False, True):
-                rows = torch.tensor(np.flatnonzero(own & ((elapsed >= middle) == late)))
+                rows = np.flatnonzero(own & ((elapsed >= middle) == late))
                 if len(rows):
                     yield name, (middle, late), rows
 

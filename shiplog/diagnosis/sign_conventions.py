@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import torch
 
 from shiplog.profile import Profile
 from shiplog.simulation.error_reduction import RUNAWAY
@@ -34,15 +33,15 @@ def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
     actuators = profile.actuators
     for kind in dict.fromkeys(a.kind for a in actuators):
         columns = [i for i, a in enumerate(actuators) if a.kind == kind]
-        turned = cut.actuator.clone()
+        turned = cut.actuator.copy()
         turned[..., columns] *= -1.0
         yield f"the {kind}'s sign turned round", replace(cut, actuator=turned)
         if len(columns) == 2:
-            swapped = cut.actuator.clone()
+            swapped = cut.actuator.copy()
             swapped[..., columns] = cut.actuator[..., columns[::-1]]
             yield f"the two {kind}s exchanged", replace(cut, actuator=swapped)
     if cut.wind.shape[-1]:
-        ahead = cut.wind + torch.tensor([0.0, math.pi], dtype=cut.wind.dtype)
+        ahead = cut.wind + np.array([0.0, math.pi])
         yield (
             "the wind direction as the one that it blows towards",
             replace(cut, wind=ahead),

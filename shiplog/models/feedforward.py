@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -58,15 +59,22 @@ def exogenous(actuator: Tensor, wind: Tensor, wind_input: str) -> Tensor:
     return torch.cat((actuator, speed, torch.remainder(angle, 2.0 * math.pi)), -1)
 
 
+def driven_by(windows: Windows, wind_input: str) -> Tensor:
+    """The exogenous inputs of windows [N, I, A + 0|2]."""
+    actuator, wind = torch.from_numpy(windows.actuator), torch.from_numpy(windows.wind)
+    return exogenous(actuator, wind, wind_input)
+
+
 def scaling(reference: Windows, wind_input: str) -> Scaling:
     """Of the reference dataset, whatever the augmentation (Sec. 4.2).
 
     ν̇ is differentiated from ν, since it is not measured: forward, as Euler integrates. A channel
     that never changes gets a standard deviation of 1, so that it is passed on as zero.
     """
-    driven = exogenous(reference.actuator, reference.wind, wind_input)
-    inputs = torch.cat((reference.velocity, driven), -1).flatten(0, 1)
-    rate = (reference.velocity.diff(dim=1) / reference.dt[..., None]).flatten(0, 1)
+    velocity, dt = torch.from_numpy(reference.velocity), torch.from_numpy(reference.dt)
+    driven = driven_by(reference, wind_input)
+    inputs = torch.cat((velocity, driven), -1).flatten(0, 1)
+    rate = (velocity.diff(dim=1) / dt[..., None]).flatten(0, 1)
     return Scaling(inputs.mean(0), _spread(inputs), rate.mean(0), _spread(rate))
 
 
@@ -109,8 +117,15 @@ class FeedForward(nn.Module):
             hidden = torch.tanh(layer(hidden))
         return self.layers[-1](hidden) * scale.output_std + scale.output_mean
 
-    def forward(self, state: Tensor, actuator: Tensor, wind: Tensor) -> Tensor:
-        """ẋ [..., 6] of Eq. 2."""
-        velocity = state[..., list(VELOCITY_IN_STATE)]
-        driven = exogenous(actuator, wind, self.shape.wind_input)
-        return kinematics(state, self.acceleration(velocity, driven))
+    @torch.no_grad()
+    def simulate(self, windows: Windows) -> np.ndarray:
+        """States [N, I, 6] from the first measured ones, by explicit Euler (Eq. 9), in float64."""
+        driven = driven_by(windows, self.shape.wind_input)
+        states = [windows.state[:, 0]]
+        with np.errstate(over="ignore", invalid="ignore"):  # a rollout may diverge
+            for i in range(windows.dt.shape[1]):
+                velocity = torch.from_numpy(states[-1][:, list(VELOCITY_IN_STATE)])
+                acceleration = self.acceleration(velocity, driven[:, i]).numpy()
+                rate = kinematics(states[-1], acceleration)
+                states.append(states[-1] + windows.dt[:, i, None] * rate)
+        return np.stack(states, axis=1)

@@ -157,7 +157,7 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
         pl.col("elapsed").alias("time"),
     )  # fmt: skip
     errors = numbered.with_columns(
-        pl.Series("seconds", cut.dt.double().numpy().sum(1)),
+        pl.Series("seconds", cut.dt.sum(1)),
         *(pl.Series(k, held.parts(v).sum(1)) for k, v in states.items()),
     )
     if AFTER not in states:
@@ -169,7 +169,7 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
 def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:
     """A row a sample; what has left the pond is null."""
     count, size, _ = states.shape
-    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt.double().numpy(), 1)), 1)
+    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt, 1)), 1)
     gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < NOT_DRAWN), axis=1)
     states = np.where(gone[..., None], np.nan, states)
     index = numbered[np.repeat(np.arange(count), size)]

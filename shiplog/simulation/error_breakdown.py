@@ -13,6 +13,7 @@ import polars as pl
 
 from shiplog import channels
 from shiplog.profile import Profile
+from shiplog.simulation.scoring import loss_shares
 from shiplog.simulation.sensitivities import VELOCITY, WindowSeries, apparent_wind
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
@@ -74,7 +75,7 @@ def explain(
     finite = np.isfinite(error).all((1, 2))
     rows = timeline(error, data, windows)
     kept = WindowSeries(*(values[finite] for values in data))
-    cost = _cost(error[finite], kept)
+    cost = loss_shares(error[finite], kept.dt)
     total = cost.sum()
     if not total:
         return Wrong((), None, rows, int((~finite).sum()))
@@ -100,7 +101,7 @@ def timeline(error: np.ndarray, data: WindowSeries, windows: pl.DataFrame) -> pl
         "time_s": (windows["elapsed"].to_numpy()[:, None] + elapsed).ravel(),
     }
     with np.errstate(over="ignore", invalid="ignore"):
-        loss = _cost(error, data).sum(-1).ravel()
+        loss = loss_shares(error, data.dt).sum(-1).ravel()
     each = dict(zip(CHANNELS, error[..., VELOCITY].reshape(-1, 3).T, strict=True))
     return pl.DataFrame(columns | each | {"loss": loss})
 
@@ -127,12 +128,6 @@ def worst_minute(rows: pl.DataFrame) -> Minute | None:
         if total and (best is None or within[at] / total > best.share):
             best = Minute(str(voyage), float(time[at]), float(within[at] / total))
     return best
-
-
-def _cost(error: np.ndarray, data: WindowSeries) -> np.ndarray:
-    """[N, I, 3] of L."""
-    weighted = error[..., VELOCITY] * np.array(channels.VELOCITY_WEIGHTS)
-    return data.steps[..., None] * weighted**2
 
 
 # --- where: the regime that holds more of the error than of the time ------------------------------

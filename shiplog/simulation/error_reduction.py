@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.channels import VELOCITY, VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.channels import VELOCITY
+from shiplog.simulation.scoring import loss_shares
 
 BLOCK_WINDOWS = 2  # windows in a row that are drawn together: 200 s
 BOOTSTRAP_DRAWS = 4000
@@ -45,11 +46,10 @@ class Gain:
         }  # fmt: skip
 
 
-def parts(error: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """L of each window by channel [N, 3], of errors [N, I, 6] and trapezoidal weights [N, I]."""
+def parts(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
+    """L of each window by channel [N, 3], of errors [N, I, 6]; at most RUNAWAY."""
     with np.errstate(over="ignore", invalid="ignore"):
-        square = (error[..., list(VELOCITY_IN_STATE)] * np.array(VELOCITY_WEIGHTS)) ** 2
-        each = (steps[..., None] * square).sum(1)
+        each = loss_shares(error, dt).sum(1)
     return np.where(np.isfinite(each), np.minimum(each, RUNAWAY), RUNAWAY)
 
 

@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
-import torch
 
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.models.extended import Extended
 from shiplog.profile import Profile
-from shiplog.simulation.sensitivities import WindowSeries, rollout, series, state_losses
+from shiplog.simulation.scoring import window_loss
+from shiplog.simulation.sensitivities import WindowSeries, rollout
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 
@@ -43,9 +43,9 @@ class ExtendedSimulator:
     shares: Shares = field(default_factory=dict)
     lengths: Mapping[str, float] = field(default_factory=dict)
 
-    def simulate(self, windows: Windows) -> torch.Tensor:
+    def simulate(self, windows: Windows) -> np.ndarray:
         """States [N, I, 6] as the instruments would have measured them."""
-        return torch.from_numpy(self.states(windows, self.theta).copy())
+        return self.states(windows, self.theta)
 
     def states(self, windows: Windows, theta: np.ndarray) -> np.ndarray:
         recorded = as_record(windows, self.profile, self.shares, self.lengths)
@@ -60,7 +60,7 @@ class ExtendedSimulator:
             was.state.reshape(shape),
             driven.reshape(*shape[:2], -1),
             was.true_wind.reshape(*shape[:2], 2),
-            windows.dt.double().numpy(),
+            windows.dt,
             np.ones(shape[0]),
         )
         with np.errstate(all="ignore"):
@@ -108,7 +108,7 @@ class ExtendedSimulator:
     def losses(self, windows: Windows, theta: np.ndarray | None = None) -> np.ndarray:
         """L of each window [N]."""
         states = self.states(windows, self.theta if theta is None else theta)
-        return state_losses(states, series(windows))
+        return window_loss(states - windows.state, windows.dt)
 
     def spread(self, windows: Windows) -> np.ndarray:
         """[N, I, 6] from draws of all numbers: instruments bend what derivatives do not."""
@@ -215,9 +215,9 @@ def as_record(
     starts[:, 0] = True
     wind = np.zeros((count, size, 2))
     if windows.wind.shape[-1]:
-        speed, angle = windows.wind[..., 0].numpy(), windows.wind[..., 1].numpy()
+        speed, angle = windows.wind[..., 0], windows.wind[..., 1]
         wind = np.stack((speed * np.cos(angle), speed * np.sin(angle)), -1)
-    since = np.concatenate((np.zeros((count, 1)), np.cumsum(windows.dt.numpy(), 1)), 1)
+    since = np.concatenate((np.zeros((count, 1)), np.cumsum(windows.dt, 1)), 1)
     names = windows.plan["voyage"].to_list()
     elapsed = windows.plan["elapsed"].to_numpy()[:, None] + since
     share = np.ones((count, size))
@@ -237,10 +237,10 @@ def as_record(
         share=share.reshape(rows),
         starts=starts.reshape(rows),
         seen=np.ones(rows, dtype=bool),
-        state=windows.state.double().numpy().reshape(rows, 6),
-        actuator=windows.actuator.double().numpy().reshape(rows, -1),
+        state=windows.state.reshape(rows, 6),
+        actuator=windows.actuator.reshape(rows, -1),
         wind=wind.reshape(rows, 2),
-        step=float(np.median(windows.dt.numpy())),
+        step=float(np.median(windows.dt)),
     )
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from shiplog.models.base import Dynamics
 from shiplog.voyages.windows import Windows
 
 
-@torch.no_grad()
 def rollout(
-    dynamics: Dynamics, start: Tensor, actuator: Tensor, wind: Tensor, dt: Tensor
-) -> Tensor:
+    dynamics: Dynamics,
+    start: np.ndarray,
+    actuator: np.ndarray,
+    wind: np.ndarray,
+    dt: np.ndarray,
+) -> np.ndarray:
     """Integrate ẋ = f(x, u, ω) with the explicit Euler method, Eq. 9.
 
     start     [N, 6]       first state of each window, order channels.STATE
@@ -27,19 +29,20 @@ def rollout(
     Heading is not wrapped: a turning ship keeps counting. Wrap when comparing or plotting.
     """
     states = [start]
-    for i in range(dt.shape[1]):
-        rate = dynamics(states[-1], actuator[:, i], wind[:, i])
-        states.append(states[-1] + dt[:, i, None] * rate)
-    return torch.stack(states, dim=1)
+    with np.errstate(over="ignore", invalid="ignore"):  # a rollout may diverge
+        for i in range(dt.shape[1]):
+            rate = dynamics(states[-1], actuator[:, i], wind[:, i])
+            states.append(states[-1] + dt[:, i, None] * rate)
+    return np.stack(states, axis=1)
 
 
 class Simulates(Protocol):
-    """A model that knows how to roll itself out: compiled physics, in `sensitivity`."""
+    """A model that rolls itself out: compiled physics, in `sensitivities`, or a network."""
 
-    def simulate(self, windows: Windows) -> Tensor: ...
+    def simulate(self, windows: Windows) -> np.ndarray: ...
 
 
-def simulate(dynamics: Dynamics | Simulates, windows: Windows) -> Tensor:
+def simulate(dynamics: Dynamics | Simulates, windows: Windows) -> np.ndarray:
     """Roll out every window from its first measured state: [N, I, 6]."""
     own = getattr(dynamics, "simulate", None)
     if own is not None:

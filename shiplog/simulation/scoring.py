@@ -1,14 +1,17 @@
 """How wrong a simulation is: the paper's error d and evaluation function L, and what a navigator
-asks: how far off it ends, and by how many degrees."""
+asks: how far off it ends, and by how many degrees.
+
+d and L are of an error: simulated less measured states [N, I, 6], in the order of channels.STATE.
+Gradients need bodies of their own, in `training.network_gradient` and in `sensitivities`.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import polars as pl
-import torch
-from torch import Tensor
 
 from shiplog import channels
 from shiplog.models.base import Dynamics
@@ -18,44 +21,62 @@ from shiplog.voyages.windows import Windows
 ERRORS = ("loss", "rmse_surge", "rmse_sway", "rmse_yaw_rate", "end_position_m", "end_heading_deg")
 
 
-def prediction_error(simulated: Tensor, measured: Tensor) -> Tensor:
-    """d of Eq. 6, [N, I] from states [N, I, 6]: weighted velocities, yaw rate in deg/s."""
-    rows = list(channels.VELOCITY_IN_STATE)
-    error = simulated[..., rows] - measured[..., rows]
-    weights = torch.tensor(channels.VELOCITY_WEIGHTS, dtype=error.dtype)
-    return ((weights * error) ** 2).sum(-1)
+def weighted_squares(error: np.ndarray) -> np.ndarray:
+    """What surge, sway and yaw rate (in deg/s) add to d of Eq. 6: [..., 3]."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        velocity = error[..., list(channels.VELOCITY_IN_STATE)]
+        return (velocity * np.array(channels.VELOCITY_WEIGHTS)) ** 2
 
 
-def window_loss(d: Tensor, dt: Tensor) -> Tensor:
-    """Trapezoidal time integral of d over each window [N], the inner sum of Eq. 8."""
-    return (0.5 * (d[:, 1:] + d[:, :-1]) * dt).sum(1)
+def prediction_error(error: np.ndarray) -> np.ndarray:
+    """d of Eq. 6 [N, I]; infinite where the rollout has diverged."""
+    with np.errstate(over="ignore"):
+        d = weighted_squares(error).sum(-1)
+    return np.where(np.isfinite(d), d, np.inf)
+
+
+def trapezoid(dt: np.ndarray) -> np.ndarray:
+    """Weights of the samples [N, I] in s, in the time integral of Eq. 8, from dt [N, I - 1]."""
+    half = 0.5 * dt
+    return np.pad(half, ((0, 0), (1, 0))) + np.pad(half, ((0, 0), (0, 1)))
+
+
+def loss_shares(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
+    """What each sample and velocity adds to L of its window [N, I, 3]."""
+    with np.errstate(over="ignore"):
+        return trapezoid(dt)[..., None] * weighted_squares(error)
+
+
+def window_loss(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
+    """L of each window [N], the inner sum of Eq. 8; infinite where the rollout has diverged."""
+    with np.errstate(over="ignore"):
+        return (trapezoid(dt) * prediction_error(error)).sum(1)
 
 
 @dataclass(frozen=True)
 class Scores:
     """One model on N windows: simulated states [N, I, 6], d [N, I], and ERRORS per window."""
 
-    simulated: Tensor
-    d: Tensor
+    simulated: np.ndarray
+    d: np.ndarray
     errors: pl.DataFrame
 
 
 def score(dynamics: Dynamics | Simulates, windows: Windows) -> Scores:
     """Roll a model out over the windows and compare. A rollout that diverges scores infinity."""
     simulated = simulate(dynamics, windows)
-    d = prediction_error(simulated, windows.state)
-    d = torch.where(torch.isfinite(d), d, torch.inf)
-    difference = simulated - windows.state
-    turned = torch.remainder(difference[:, -1, 4] + math.pi, 2.0 * math.pi) - math.pi
-    root = {
-        f"rmse_{c.name}": difference[..., i].square().mean(1).sqrt()
-        for c, i in zip(channels.VELOCITY, channels.VELOCITY_IN_STATE, strict=True)
-    }
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = simulated - windows.state
+        turned = np.remainder(error[:, -1, 4] + math.pi, 2.0 * math.pi) - math.pi
+        root = {
+            f"rmse_{c.name}": np.sqrt((error[..., i] ** 2).mean(1))
+            for c, i in zip(channels.VELOCITY, channels.VELOCITY_IN_STATE, strict=True)
+        }
+        far = np.linalg.norm(error[:, -1, [0, 2]], axis=-1)
     columns = {
-        "loss": window_loss(d, windows.dt),
+        "loss": window_loss(error, windows.dt),
         **root,
-        "end_position_m": torch.linalg.vector_norm(difference[:, -1, [0, 2]], dim=-1),
-        "end_heading_deg": turned.abs() * 180.0 / math.pi,
+        "end_position_m": far,
+        "end_heading_deg": np.degrees(np.abs(turned)),
     }
-    errors = pl.DataFrame({name: values.numpy() for name, values in columns.items()})
-    return Scores(simulated, d, errors)
+    return Scores(simulated, prediction_error(error), pl.DataFrame(columns))

@@ -14,11 +14,11 @@ from typing import NamedTuple, Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
-import torch
 from jax import Array
 
 from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
 from shiplog.jit_cache import traced
+from shiplog.simulation.scoring import trapezoid, window_loss
 from shiplog.voyages.windows import Windows
 
 VELOCITY = np.array(VELOCITY_IN_STATE)
@@ -73,19 +73,17 @@ class WindowSeries(NamedTuple):
     @property
     def steps(self) -> np.ndarray:
         """Trapezoidal weights of the samples [N, I] in s, as in Eq. 8."""
-        half = 0.5 * self.dt
-        return np.pad(half, ((0, 0), (1, 0))) + np.pad(half, ((0, 0), (0, 1)))
+        return trapezoid(self.dt)
 
 
 def series(windows: Windows) -> WindowSeries:
     """Windows as physical models take them."""
-    measured = windows.state.double().numpy()
-    wind = windows.wind.double().numpy()
+    measured, wind = windows.state, windows.wind
     return WindowSeries(
         measured,
-        windows.actuator.double().numpy(),
+        windows.actuator,
         true_wind(measured, wind) if wind.shape[-1] else np.zeros((*measured.shape[:2], 2)),
-        windows.dt.double().numpy(),
+        windows.dt,
         np.ones(len(measured)),
     )
 
@@ -301,15 +299,7 @@ def normal(
 
 def losses(model: Physical, theta: np.ndarray, data: WindowSeries) -> np.ndarray:
     """L of each window [N], infinite where the rollout diverges."""
-    return state_losses(rollout(model, theta, data), data)
-
-
-def state_losses(states: np.ndarray, data: WindowSeries) -> np.ndarray:
-    """The same of states [N, I, 6] that are simulated already."""
-    error = states[..., VELOCITY] - data.measured[..., VELOCITY]
-    with np.errstate(over="ignore", invalid="ignore"):
-        each = (data.steps[..., None] * (error * np.array(VELOCITY_WEIGHTS)) ** 2).sum((1, 2))
-    return np.where(np.isfinite(each), each, np.inf)
+    return window_loss(rollout(model, theta, data) - data.measured, data.dt)
 
 
 def pick(data: WindowSeries, rows: Sequence[int] | np.ndarray | slice) -> WindowSeries:
@@ -340,9 +330,9 @@ class Simulator:
     theta: np.ndarray  # [P]
     covariance: np.ndarray  # [P, P]
 
-    def simulate(self, windows: Windows) -> torch.Tensor:
+    def simulate(self, windows: Windows) -> np.ndarray:
         """States [N, I, 6], as shiplog.simulation.rollout gives them."""
-        return torch.from_numpy(rollout(self.model, self.theta, series(windows)).copy())
+        return rollout(self.model, self.theta, series(windows))
 
     def spread(self, windows: Windows) -> np.ndarray:
         """[N, I, 6]"""

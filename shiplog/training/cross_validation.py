@@ -8,14 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.simulation.sensitivities import (
-    Simulator,
-    WindowSeries,
-    pick,
-    rollout,
-    spread,
-    state_losses,
-)
+from shiplog.simulation.scoring import window_loss
+from shiplog.simulation.sensitivities import Simulator, WindowSeries, pick, rollout, spread
 
 FOLDS = 5
 WORKERS = 2  # fits at a time; compiled rollouts leave Python's lock
@@ -77,7 +71,8 @@ def cross_validate(
     states, own = np.empty_like(data.measured), np.zeros_like(data.measured)
     for held, (simulated, unsure) in zip(parts, results, strict=True):
         states[held], own[held] = simulated[held], unsure[held]
-    return CrossValidated(np.array(list(groups)), states, own, state_losses(states, data))
+    loss = window_loss(states - data.measured, data.dt)
+    return CrossValidated(np.array(list(groups)), states, own, loss)
 
 
 def as_good(judged: dict[float, np.ndarray]) -> list[float]:

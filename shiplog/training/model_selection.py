@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog import random_streams as streams
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, series
-from shiplog.training import hybrid_training, output_error, regularisation
+from shiplog.training import hybrid_training, output_error, random_streams, regularisation
 from shiplog.training.cross_validation import CrossValidated, cross_validate
 from shiplog.training.output_error import Identified
 from shiplog.training.run_config import Physics
@@ -95,7 +94,7 @@ def choose_network(
         model, done = hybrid_training.fit(
             ready.model, physics, part,
             width=settings.width, strength=strength,
-            rng=np.random.default_rng(streams.generator(seed, "residual").initial_seed()),
+            rng=np.random.default_rng(random_streams.generator(seed, "residual").initial_seed()),
         )  # fmt: skip
         return Simulator(model, done.values, done.covariance), done
 

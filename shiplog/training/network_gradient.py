@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from shiplog import channels
-from shiplog.models.feedforward import Scaling, Shape, exogenous
+from shiplog.models.feedforward import Scaling, Shape, driven_by
 from shiplog.training import kernel
 from shiplog.voyages.windows import Windows
 
@@ -41,12 +41,12 @@ class Batch:
 
 def batch(windows: Windows, scaling: Scaling, shape: Shape, dtype: torch.dtype) -> Batch:
     """Standardise once what does not change during training."""
-    driven = exogenous(windows.actuator, windows.wind, shape.wind_input)
+    driven = driven_by(windows, shape.wind_input)
     driven = (driven - scaling.input_mean[3:]) / scaling.input_std[3:]
     if shape.input_tanh:
         driven = torch.tanh(driven)
-    first = [t.transpose(0, 1).to(dtype).contiguous() for t in (windows.velocity, driven)]
-    return Batch(first[0], first[1], windows.dt.T.to(dtype).contiguous())
+    parts = (torch.from_numpy(windows.velocity), driven, torch.from_numpy(windows.dt))
+    return Batch(*(t.transpose(0, 1).to(dtype).contiguous() for t in parts))
 
 
 def trapezoid(dt: Tensor) -> Tensor:

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from shiplog import random_streams
 from shiplog.models.feedforward import FeedForward
-from shiplog.training import network_gradient
+from shiplog.training import network_gradient, random_streams
 from shiplog.training.network_gradient import Batch
 from shiplog.training.run_config import Fast, Paper
 

@@ -1,17 +1,15 @@
-"""Windows of I samples: planned as rows (voyage, segment, start, copy), then cut to tensors.
+"""Windows of I samples: planned as rows (voyage, segment, start, copy), then cut to arrays.
 
 A window never crosses a segment, so never a gap. The paper's reference set is slicing with the
-step S = I; jittering adds noise to the velocities of clean windows.
+step S = I; training adds noise to the velocities of its noisy copies.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
-import torch
-from torch import Tensor
 
 from shiplog import channels
 from shiplog.exceptions import WindowError
@@ -21,7 +19,7 @@ SIZE = channels.WINDOW
 
 @dataclass(frozen=True)
 class Windows:
-    """N windows of I samples, row by row with their plan.
+    """N windows of I samples, row by row with their plan; float64.
 
     plan      [N]           voyage, segment, start, copy, elapsed (s into the voyage)
     state     [N, I, 6]     channels.STATE, SI; heading unwrapped within each window
@@ -31,27 +29,23 @@ class Windows:
     """
 
     plan: pl.DataFrame
-    state: Tensor
-    actuator: Tensor
-    wind: Tensor
-    dt: Tensor
+    state: np.ndarray
+    actuator: np.ndarray
+    wind: np.ndarray
+    dt: np.ndarray
 
     def __len__(self) -> int:
         return self.state.shape[0]
 
     @property
-    def velocity(self) -> Tensor:
+    def velocity(self) -> np.ndarray:
         """[N, I, 3] surge, sway, yaw rate."""
-        return self.state[..., list(channels.VELOCITY_IN_STATE)]
+        return np.take(self.state, channels.VELOCITY_IN_STATE, axis=-1)
 
-    def pick(self, rows: Tensor) -> Windows:
+    def pick(self, rows: np.ndarray) -> Windows:
         """The windows at these row numbers."""
         return Windows(
-            self.plan[rows.tolist()],
-            self.state[rows],
-            self.actuator[rows],
-            self.wind[rows],
-            self.dt[rows],
+            self.plan[rows], self.state[rows], self.actuator[rows], self.wind[rows], self.dt[rows]
         )
 
 
@@ -79,7 +73,7 @@ def cut(
     actuators: tuple[str, ...],
     wind: tuple[str, ...],
 ) -> Windows:
-    """Gather planned windows from the sorted 1 Hz table (clean; noise is `jittered`).
+    """Gather planned windows from the sorted 1 Hz table (clean; training adds noise).
 
     Raises WindowError where nothing was planned, saying how long the longest segment is.
     """
@@ -97,31 +91,20 @@ def cut(
     times = seconds["time"].to_physical().to_numpy()[rows]
     elapsed = (times[:, 0] - plan["departure"].to_physical().to_numpy()) * 1e-9
 
-    def gather(names: tuple[str, ...]) -> Tensor:
+    def gather(names: tuple[str, ...]) -> np.ndarray:
         if not names:
-            return torch.zeros(*rows.shape, 0, dtype=torch.float64)
-        return torch.from_numpy(seconds.select(names).to_numpy()[rows].astype(np.float64))
+            return np.zeros((*rows.shape, 0))
+        return seconds.select(names).to_numpy()[rows].astype(np.float64)
 
     state = gather(tuple(c.name for c in channels.STATE))
-    state[..., 4] = torch.from_numpy(np.unwrap(state[..., 4].numpy(), axis=1))
+    state[..., 4] = np.unwrap(state[..., 4], axis=1)
     return Windows(
         plan=planned.with_columns(elapsed=pl.Series(elapsed)),
         state=state,
         actuator=gather(actuators),
         wind=gather(wind),
-        dt=torch.from_numpy(np.diff(times, axis=1) * 1e-9),
+        dt=np.diff(times, axis=1) * 1e-9,
     )
-
-
-def jittered(windows: Windows, generator: torch.Generator) -> Windows:
-    """Normal noise on the velocities of every copy above 0, Eq. 15 with Σ_x of Table 5.
-
-    Actuators and wind stay as measured. Noise is independent in time and between copies.
-    """
-    noisy = torch.from_numpy((windows.plan["copy"] > 0).to_numpy()).to(torch.float64)
-    noise = torch.randn(windows.state.shape, generator=generator, dtype=torch.float64)
-    sigma = torch.tensor(channels.JITTER, dtype=torch.float64)
-    return replace(windows, state=windows.state + noise * sigma * noisy[:, None, None])
 
 
 def _too_long(seconds: pl.DataFrame, size: int) -> tuple[str, str]:

@@ -329,11 +329,11 @@ def test_whole_voyages_are_left_out_and_of_one_alone_its_halves(sea):
     assert alone.left_out == "its half of the voyage"
     halves = list(alone.folds())
     assert [late for _, (_, late), _ in halves] == [False, True]
-    rows = np.concatenate([rows.numpy() for _, _, rows in halves])
+    rows = np.concatenate([rows for _, _, rows in halves])
     assert sorted(rows) == list(range(len(alone.voyages)))
     size = float(alone.cut.dt[0].sum())
     for _, (middle, late), rows in halves:
-        for row in alone.cut.plan[rows.numpy()].to_dicts():
+        for row in alone.cut.plan[rows].to_dicts():
             inside = (row["elapsed"], row["elapsed"] + size)
             assert min(inside) >= middle - 1.0 if late else max(inside) <= middle + 1.0
 

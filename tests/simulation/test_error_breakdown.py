@@ -8,7 +8,8 @@ import polars as pl
 import pytest
 
 from shiplog.simulation import error_breakdown
-from shiplog.simulation.sensitivities import WindowSeries, state_losses
+from shiplog.simulation.scoring import window_loss
+from shiplog.simulation.sensitivities import WindowSeries
 
 COUNT, SIZE = 30, 100
 
@@ -59,9 +60,7 @@ def test_shares_are_those_of_the_loss(driven):
     )
     assert all(c.where == "everywhere alike" for c in found.channels)
     losses = found.timeline.group_by("window", maintain_order=True).agg(pl.col("loss").sum())
-    assert losses["loss"].to_numpy() == pytest.approx(
-        state_losses(data.measured + error, data), rel=1e-9
-    )
+    assert losses["loss"].to_numpy() == pytest.approx(window_loss(error, data.dt), rel=1e-9)
     json.dumps([c.as_json() for c in found.channels])
 
 

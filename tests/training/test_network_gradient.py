@@ -4,6 +4,7 @@ import math
 import os
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from small_networks import by_autograd, network, windows
 
 from shiplog import channels
-from shiplog.models.feedforward import FeedForward, Scaling, Shape, exogenous, scaling
+from shiplog.models.feedforward import FeedForward, Scaling, Shape, driven_by, exogenous, scaling
 from shiplog.training import kernel, network_gradient
 from shiplog.voyages.windows import Windows
 
@@ -186,8 +187,8 @@ def test_a_network_of_zeros_accelerates_by_the_mean_and_the_loss_has_a_closed_fo
     """ν̇ = μ constant: with measured ν = 0 the error after k s is kμ, and Σ gives the loss."""
     size, mean = 11, torch.tensor([0.01, -0.02, 0.005], dtype=torch.float64)
     data = windows(1, size)
-    data = Windows(data.plan, torch.zeros_like(data.state), data.actuator, data.wind,
-                   torch.ones_like(data.dt))  # fmt: skip
+    data = Windows(data.plan, np.zeros_like(data.state), data.actuator, data.wind,
+                   np.ones_like(data.dt))  # fmt: skip
     shape = Shape(3, width=4)
     one = torch.ones(8, dtype=torch.float64)
     scale = Scaling(0 * one, one, mean, torch.ones(3, dtype=torch.float64))
@@ -223,11 +224,12 @@ def test_scaling_standardises_the_reference_set_and_spares_a_constant_channel():
     data = windows(4, 50)
     data.actuator[..., 1] = 10.23
     scale = scaling(data, "angle")
-    inputs = torch.cat((data.velocity, exogenous(data.actuator, data.wind, "angle")), -1)
+    velocity = torch.from_numpy(data.velocity)
+    inputs = torch.cat((velocity, driven_by(data, "angle")), -1)
     standard = ((inputs - scale.input_mean) / scale.input_std).flatten(0, 1)
     varying = [0, 1, 2, 3, 5, 6, 7]
     assert torch.allclose(standard.mean(0), torch.zeros(8).double(), atol=1e-12)
     assert torch.allclose(standard[:, varying].std(0, unbiased=False), torch.ones(7).double())
     assert (standard[:, 4].abs() < 1e-9).all()
-    rate = data.velocity.diff(dim=1) / data.dt[..., None]
+    rate = velocity.diff(dim=1) / torch.from_numpy(data.dt)[..., None]
     assert torch.allclose(scale.output_mean, rate.flatten(0, 1).mean(0))

@@ -6,9 +6,8 @@ import pytest
 import torch
 from small_networks import by_autograd, network, windows
 
-from shiplog import random_streams
 from shiplog.models.feedforward import Shape
-from shiplog.training import network_gradient
+from shiplog.training import network_gradient, random_streams
 from shiplog.training.network_training import fast, paper, shortened
 from shiplog.training.run_config import Config, Fast, Paper
 from shiplog.voyages.split_settings import Split
@@ -32,7 +31,7 @@ def plainly(model, learnt, epochs, settings, seed):
         for rows in torch.tensor_split(torch.randperm(len(learnt), generator=stream), 3):
             adam.zero_grad()
             penalty = sum((p**2).sum() for p in model.weights)
-            loss = by_autograd(model, learnt.pick(rows)) + settings.regularisation * penalty
+            loss = by_autograd(model, learnt.pick(rows.numpy())) + settings.regularisation * penalty
             loss.backward()
             adam.step()
     return model
