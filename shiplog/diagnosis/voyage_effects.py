@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, lapack, solve_triangular
+from scipy.linalg import cholesky, get_lapack_funcs, solve_triangular
 
 EM_ROUNDS = 15  # of three steps of expectation-maximisation each, at most
 CONVERGED = 0.1  # of the logarithm of a variance: a round that moves none by more is the last
@@ -159,7 +159,9 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
     """Of a positive definite matrix. Raises np.linalg.LinAlgError where it is not."""
     if not len(matrix):
         return matrix
-    lower, failed = lapack.dpotri(cholesky(matrix, lower=True, check_finite=False), lower=True)
+    root = cholesky(matrix, lower=True, check_finite=False)
+    (potri,) = get_lapack_funcs(("potri",), (root,))
+    lower, failed = potri(root, lower=True)
     if failed:
         raise np.linalg.LinAlgError("a matrix is singular")
     return np.tril(lower) + np.tril(lower, -1).T
