@@ -1,4 +1,4 @@
-"""JAX in double precision, and functions that are traced once for a ship, not once for a process.
+"""JAX in double precision, and functions that are traced once for all ships that are alike.
 
 JAX needs seconds to trace a ship's equations with their derivatives, and milliseconds to load
 what it has traced before. All that a trace depends on is in its key, this program's source with

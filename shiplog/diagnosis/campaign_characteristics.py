@@ -39,7 +39,7 @@ NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the firs
 class Characteristics:
     """What the nominal campaign alone says of model and ship; it can be kept for later trials.
 
-    unrest      sizes and correlation times of instrument and process noise
+    process_noise  sizes and correlation times of instrument and process noise
     deviation   group of columns → standard deviation of one part's numbers, in their units
     size        family of the discrepancy → prior size of its weights
     apart       how far voyages are from each other, in those deviations

@@ -25,8 +25,8 @@ def decide(
     refuted: Mapping[str, str] | None = None,
     doubted: Mapping[str, str] | None = None,
 ) -> tuple[Decision, Posterior]:
-    """The verdict, some names refuted by held-out data or all that would be named in doubt (with
-    the reasons)."""
+    """The verdict, without the names that held-out data refute, and without any if the names are
+    in doubt; each with its reason."""
     refuted, trial = dict(refuted or {}), search.trial
     trial.process_noise = trial.reference.process_noise  # without an earlier intermittent force
     found = posteriors.posterior(search, tuple(refuted))
@@ -56,7 +56,7 @@ def decide(
     if pulses is not None:  # its force and times are taken from this trial later
         trial.process_noise = _with_pulses(search, best)
     return Decision(
-        verdict, named, structure, pulses, traces, 
+        verdict, named, structure, pulses, traces,
         _reasons(search, found, refuted | dict(doubted or {}), named),
         found.ranking(), shown.found.noise_factor, search.point(shown), shown.found, search.first,
         search.nothing.found, search.told,

@@ -31,7 +31,7 @@ Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `reading.read`
 
 
 class TrialEvidence:
-    """The trial against its nominal reference. `unrest` includes the intermittent force, if any.
+    """The trial against its nominal reference. `process_noise` includes an intermittent force.
 
     first    where it was linearised first
     rested   labels and force → numbers, path and λ at which a fit of these causes converged

@@ -15,8 +15,6 @@ from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause
 
-STOCHASTIC = "stochastic"  # the contract's word for raised process noise
-
 
 @dataclass(frozen=True)
 class Place:

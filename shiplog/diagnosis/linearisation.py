@@ -211,8 +211,8 @@ def linear(
 
     moved   [S, K, D, Q]  derivatives of actuators and wind by the causes' numbers
     shown   [S, B, 6, Q]  derivatives of the measurements by them
-    wide    standard deviation of the path about its measurement: a path FAR times that away has
-            diverged; where it is not given, the span of the segments
+    wide    standard deviation of the path about its measurement: a path RUN_AWAY times that
+            away has diverged; where it is not given, the span of the segments
     """
     y, columns = simulated(model, theta, segments, path, g, moved)
     lost = _lost(segments, y, columns, wide)

@@ -81,13 +81,13 @@ def _read(kept: File) -> dict | None:
 
 
 def _process_noise(process_noise: ProcessNoise) -> dict:
-    whole = {f"unrest_{name}": getattr(process_noise, name) for name in PROCESS_NOISE}
+    whole = {f"process_noise_{name}": getattr(process_noise, name) for name in PROCESS_NOISE}
     return whole | {name: getattr(process_noise, name) for name in TIMES}
 
 
 def _known_process_noise(arrays: dict) -> ProcessNoise:
     times = {n: float(arrays[n]) for n in TIMES}
-    return ProcessNoise(**times, **{n: arrays[f"unrest_{n}"] for n in PROCESS_NOISE})
+    return ProcessNoise(**times, **{n: arrays[f"process_noise_{n}"] for n in PROCESS_NOISE})
 
 
 def _settled(arrays: dict) -> Settled:

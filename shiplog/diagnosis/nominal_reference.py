@@ -119,9 +119,9 @@ def wide_of(setting: Setting) -> Wide:
 
 @dataclass(frozen=True)
 class Settled:
-    """Where a campaign is linearised, and how unrestful it is there.
+    """Where a campaign is linearised, and its noise there.
 
-    theta  [P] coefficients; path of each segment; unrest: the process noise
+    theta  [P] coefficients; path of each segment; process_noise with the instruments' noise
     """
 
     theta: np.ndarray

@@ -4,8 +4,8 @@ The numbers of a hypothesis are fitted without each fold in turn. A cause is ref
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it.
 
-Where something acts that no cause explains, noise is not what the likelihood takes it for, and a
-log Bayes factor proves nothing: causes are named there only if the whole interval is a gain.
+With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
+are then named only if the whole interval is a gain.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def judged(
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
         if not worse and found.remainder is not None and not gain.real:
             why = (
-                "beside something that no cause explains, a cause has to reduce the held-out error "
-                f"for certain: it does by {gain.low:.1%} to {gain.high:.1%}"
+                "the catalogue does not explain all of the trial, so a cause is named only if it "
+                f"surely reduces the held-out error: here by {gain.low:.1%} to {gain.high:.1%}"
             )
             doubted = {one.cause.name: why for one in decision.named}
             return *decide(search, refuted, doubted), None, refuted

@@ -1,7 +1,7 @@
 """The acceleration that a model leaves unexplained along what was measured, and what went with it.
 
 z | e ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P)⁻¹: the posterior of a linear Gaussian model
-(Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `likelihood.Unrest`.
+(Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `ProcessNoise`.
 """
 
 from __future__ import annotations

@@ -20,8 +20,7 @@ REMAINDER = 0.15
 
 # Share of a force or of a reading. A cause's equations are right to about this share, and what they
 # leave over imitates further causes. The evidence goes with the square: the log Bayes factor of
-# each
-# further cause has to exceed this squared times that of the strongest one.
+# each further cause has to exceed this squared times that of the strongest one.
 FORM_ERROR = 0.02
 
 # Share of what a hypothesis explains. With a remainder, a cause is named only

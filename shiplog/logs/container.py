@@ -188,9 +188,8 @@ def _records(stream: IO[bytes], found: Survey) -> Iterator[tuple[int, int, bytes
             break
         if fault is not None:
             resume = min((at for at in found.indexed if at > position), default=None)
-            if (
-                position not in found.indexed
-            ):  # a chunk's own loss is reported below, with its times
+            # the loss of an indexed chunk is reported below, with its times
+            if position not in found.indexed:
                 kind = fault.kind if resume is None else "crc"
                 found.losses.append(replace(fault, kind=kind))
             if resume is None:

@@ -288,7 +288,9 @@ def _mark(base: Path, logs: Path) -> None:
 
 
 def _trained_on(base: Path) -> Path:
-    return base.with_name(f"{base.name}.trained_on.json")  # next to: the run folder is shiplog's
+    return base.with_name(
+        f"{base.name}.trained_on.json"
+    )  # next to the run folder, which is shiplog's
 
 
 def _nominal(logs: Path) -> dict[str, str]:

@@ -254,7 +254,7 @@ class Case:
     ship: Ship
     laws: Laws
     causes: tuple[Cause, ...]
-    ordinary: Effects  # noise and process noise of both campaigns
+    ordinary: Effects  # instrument and process noise of both campaigns
     effects: Effects  # the same, and what is hidden in the trial
     nominal: tuple[Leg, ...] = field(repr=False)
     trial: tuple[Leg, ...] = field(repr=False)

@@ -71,7 +71,7 @@ def sail(
     whatever is hidden.
     """
     ship, effects, laws = ship or Ship(), effects or Effects(), laws or Laws()
-    weather_rng, helm_rng, start_rng, unrest_rng, pulse_rng = (
+    weather_rng, helm_rng, start_rng, noise_rng, pulse_rng = (
         np.random.default_rng([seed, i]) for i in range(5)
     )
     if start is None:
@@ -90,7 +90,7 @@ def sail(
     for begin, length, force in pulses:
         push[(halves >= begin) & (halves < begin + length), 0] = force
     if effects.turbulence > 0.0:
-        pushed = process_noise(laws.noise, duration_s, halves, unrest_rng)
+        pushed = process_noise(laws.noise, duration_s, halves, noise_rng)
         push[:, 1:] = effects.turbulence * pushed
     numbers = physics.coefficients(ship, laws)
     hidden = physics.hidden(effects, campaign, duration_s)

@@ -150,8 +150,7 @@ def inertia(p: Particulars) -> dict[str, float]:
     volume = p.mass / p.density
     m_x = 2.7 * volume ** (5 / 3) / p.length**2 / (0.5 * p.length**2 * p.draught)
     # Both brackets turn negative for B/L past 0.3 to 0.5. The lower limits keep 0.4 of a slender
-    # body's
-    # sway mass and a quarter of its yaw inertia.
+    # body's sway mass and a quarter of its yaw inertia.
     m_y = strip * max(1.0 + 0.16 * full - 5.1 * ratio**2, 0.4)
     j_z = strip * max(1 / 12 + 0.017 * full - 0.33 * ratio, 0.25 / 12)
     m_x = min(m_x, 0.2 * p.mass_nd)  # a ship's is less; a broad box by the formula has twice this

@@ -57,8 +57,8 @@ class Thruster:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Everything SI. Which actuator drives what is hashable by `split`, so that a rollout is
-    compiled once for all ships that are alike in it."""
+    """Everything SI. A rollout is compiled once for all ships with the same actuators: `split`
+    takes the sizes and places out, which are arguments of the compiled function."""
 
     length: float
     draught: float
@@ -87,7 +87,8 @@ class Geometry:
 
 
 def split(one: Any) -> tuple[list[Any], Any]:
-    """The sizes and places of a geometry or of one of its units, and the same without them."""
+    """The sizes and places of a geometry or of one of its units, in order, and the same with zeros
+    in their place, which is hashable."""
     found, left = [], {}
     for field in fields(one):
         value = getattr(one, field.name)
@@ -102,7 +103,7 @@ def split(one: Any) -> tuple[list[Any], Any]:
 
 
 def joined(one: Any, numbers: Iterator[Any]) -> Any:
-    """What `split` took apart."""
+    """The inverse of `split`: a geometry with the next of these numbers, in the same order."""
     found = {}
     for field in fields(one):
         if field.type == "float":

@@ -28,11 +28,11 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
     table   as sets.histograms gives it
     units   of the channels
     """
-    drawn_names = table["channel"].unique(maintain_order=True).to_list()
-    rows = math.ceil(len(drawn_names) / COLUMNS)
+    names = table["channel"].unique(maintain_order=True).to_list()
+    rows = math.ceil(len(names) / COLUMNS)
     with figure(0.4 + 1.5 * rows, path) as drawn:
         axes = drawn.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for axis, channel in zip(axes, drawn_names, strict=False):
+        for axis, channel in zip(axes, names, strict=False):
             for (name,), own in table.filter(pl.col("channel") == channel).group_by(
                 "set", maintain_order=True
             ):
@@ -42,9 +42,9 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
             axis.set_yscale("log")
             axis.set_ylim(bottom=0.7)
             axis.set_xlabel(LABELS.get(channel, f"{channel} [{units.get(channel, '1')}]"))
-        for axis in axes[len(drawn_names) :]:
+        for axis in axes[len(names) :]:
             axis.set_axis_off()
-        for axis in axes[: len(drawn_names) : COLUMNS]:
+        for axis in axes[: len(names) : COLUMNS]:
             axis.set_ylabel("seconds")
         drawn.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
 
@@ -64,7 +64,7 @@ def wind(table: pl.DataFrame, path: Path) -> None:
             counts = np.zeros((len(speeds) - 1, len(angles) - 1))
             for row in table.filter(pl.col("set") == name).iter_rows(named=True):
                 counts[round(row["speed"] / width), int(row["angle"] // ANGLE_BIN)] = row["seconds"]
-            drawn_names = axis.pcolormesh(
+            mesh = axis.pcolormesh(
                 angles, speeds, np.ma.masked_equal(counts, 0.0), norm=LogNorm(1, most),
                 cmap="viridis", rasterized=True,
             )  # fmt: skip
@@ -72,7 +72,7 @@ def wind(table: pl.DataFrame, path: Path) -> None:
             axis.set_xticks([0, 90, 180, 270, 360])
         axes[0].set_ylabel("apparent wind speed [m/s]")
         drawn.supxlabel("apparent wind angle [deg from the bow]", fontsize=8)
-        drawn.colorbar(drawn_names, ax=axes, label="seconds")
+        drawn.colorbar(mesh, ax=axes, label="seconds")
 
 
 def validation(histories: pl.DataFrame, path: Path) -> None:
@@ -126,10 +126,10 @@ def inputs(rows: pl.DataFrame, units: dict[str, str], path: Path) -> None:
 
     rows    elapsed [s], the channels of `units`, angles in rad
     """
-    drawn_names = [name for name in units if name in rows.columns]
-    with figure(0.4 + 1.0 * len(drawn_names), path) as drawn:
-        axes = drawn.subplots(len(drawn_names), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, name in zip(axes, drawn_names, strict=True):
+    recorded = [name for name in units if name in rows.columns]
+    with figure(0.4 + 1.0 * len(recorded), path) as drawn:
+        axes = drawn.subplots(len(recorded), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, name in zip(axes, recorded, strict=True):
             values = rows[name].to_numpy()
             if units[name] == "deg":
                 values = values / channels.DEGREE
@@ -172,13 +172,13 @@ def states(rollouts: pl.DataFrame, measured: pl.DataFrame, pair: Sequence[str], 
 def _band(axis: Axes, own: pl.DataFrame, name: str, factor: float, of: str) -> None:
     """Median and range of the seeds, broken where a window ends."""
     value = pl.col(name) * factor
-    drawn_names = (
+    spread = (
         own.group_by("window", "time")
         .agg(low=value.min(), middle=value.median(), high=value.max())
         .sort("window", "time")
     )
     label: str | None = named(of)
-    for _, window in drawn_names.group_by("window", maintain_order=True):
+    for _, window in spread.group_by("window", maintain_order=True):
         axis.fill_between(window["time"], window["low"], window["high"], color=COLOURS[of],
                           alpha=0.18, linewidth=0)  # fmt: skip
         axis.plot(window["time"], window["middle"], color=COLOURS[of], linewidth=0.9, label=label)

@@ -33,19 +33,19 @@ CUT_OFF = 4.0  # times the middle error before: where the axis of errors ends at
 class Pictured:
     """An exhibit ready to be drawn.
 
-    tracks    its voyages, and of each the window that tells most as a voyage of its own
-    models    what `tracks` calls BEFORE and, where there is one, AFTER; in this order their names
-              sort, which is the order of their colours
-    closeups  voyage → the name of that window
-    pushed    voyage, time, part, surge, sway, yaw [N, N m]: as ComparisonData.forces
-    errors    voyage, time, seconds, before, after: root mean square
+    tracks      its voyages, and of each the window that tells most as a voyage of its own
+    models      what `tracks` calls BEFORE and, where there is one, AFTER; in this order their names
+                sort, which is the order of their colours
+    closeups    voyage → the name of that window
+    components  voyage, time, part, surge, sway, yaw [N, N m]: as ComparisonData.forces
+    errors      voyage, time, seconds, before, after: root mean square
     """
 
     exhibit: Exhibit
     tracks: Drawn
     models: dict[str, str]
     closeups: dict[str, str]
-    acting: pl.DataFrame
+    components: pl.DataFrame
     errors: pl.DataFrame
 
     @property
@@ -89,7 +89,7 @@ def pictured(exhibit: Exhibit) -> Pictured:
     # L is over seconds: its value per second has a root that reads as a speed
     root = [(pl.col(n) / pl.col("seconds")).sqrt().alias(n) for n in (BEFORE, AFTER)]
     return Pictured(
-        exhibit, display.drawn(compared), models, closeups, _acting(exhibit),
+        exhibit, display.drawn(compared), models, closeups, _components(exhibit),
         exhibit.errors.with_columns(root),
     )  # fmt: skip
 
@@ -100,7 +100,7 @@ def _spoken(names: tuple[str, ...]) -> str:
     return " and ".join(f"{cause} ({of})" if of else cause for cause, _, of in spoken)
 
 
-def _acting(exhibit: Exhibit) -> pl.DataFrame:
+def _components(exhibit: Exhibit) -> pl.DataFrame:
     """A row an instant and part: what the model lacks, the ends of its band, what was named."""
     part = {
         LACKS: pl.col("force"),
@@ -138,7 +138,7 @@ def _tab(picture: Pictured, voyage: str) -> rrb.Container:
         row_shares=[1.55, 1.0],
     )
     right: list[rrb.View] = []
-    if (picture.acting["voyage"] == voyage).any():
+    if (picture.components["voyage"] == voyage).any():
         right += [_force(picture, voyage, axis) for axis in forces.AXES]
     if (picture.errors["voyage"] == voyage).any():
         right.append(_errors(picture, voyage))
@@ -174,12 +174,12 @@ def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
 
 def _force(picture: Pictured, voyage: str, axis: str) -> rrb.View:
     what, _, positive = forces.AXES[axis]
-    name, factor = forces.unit(picture.acting, axis)
+    name, factor = forces.unit(picture.components, axis)
     return rrb.TimeSeriesView(
         origin=entity("unexplained", voyage, axis),
         name=f"{what} [{name}], positive {positive}",
         axis_x=_whole_voyage(picture, voyage),
-        axis_y=rrb.ScalarAxis(range=forces.readable_range(picture.acting, axis, factor)),
+        axis_y=rrb.ScalarAxis(range=forces.readable_range(picture.components, axis, factor)),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=axis == "surge"),
         background=style.plot_background(),
     )
@@ -223,7 +223,7 @@ def send(recording: rr.RecordingStream, picture: Pictured) -> None:
 
 
 def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:
-    rows = picture.acting.filter(pl.col("voyage") == voyage)
+    rows = picture.components.filter(pl.col("voyage") == voyage)
     lacks, low, high, named = (
         rows.filter(pl.col("part") == part) for part in (LACKS, "low", "high", "named")
     )
@@ -232,7 +232,7 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
         return
     ends, none = time[[0, -1]], np.empty(0, dtype=np.intp)
     for axis in forces.AXES:
-        _, factor = forces.unit(picture.acting, axis)
+        _, factor = forces.unit(picture.components, axis)
         band = np.column_stack([display.column(end, axis) for end in (low, high)])
         # drawn in order of names: zero, the band, what the model lacks, what was named
         for name, at, values, cuts, labels, colour, width in (
