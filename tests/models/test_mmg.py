@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
 from shiplog.models.mmg import body, parameters
-from shiplog.models.mmg.geometry import Geometry, geometry_of
+from shiplog.models.mmg.geometry import Geometry, geometry_of, joined, split
 from shiplog.models.mmg.hull import cross_flow
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.parameters import Parameters
@@ -724,6 +724,26 @@ def test_twin_screws_and_rudders_in_a_mirror_change_places(twin, n):
 
 
 # ---------------------------------------------------------------- geometry
+
+
+def test_ships_of_the_same_actuators_share_what_is_compiled(twin):
+    """Sizes and places are its arguments, in the order that gives them back; which blade stands
+    behind which screw, what an azimuth is turned by and the number of actuators are not."""
+    numbers, shape = split(twin.model.geometry)
+    assert joined(shape, iter(numbers)) == twin.model.geometry
+    larger = TWIN.replace("length_m = 4.0", "length_m = 9.0").replace(
+        "area_m2 = 0.02", "area_m2 = 0.05"
+    )
+    other = estimated(profiles.parse(larger, "larger.toml"))
+    assert split(other.model.geometry)[0] != numbers
+    assert jax.tree.structure(other.model) == jax.tree.structure(twin.model)
+    assert hash(jax.tree.structure(other.model)) == hash(jax.tree.structure(twin.model))
+    aside = TWIN.replace("position_m = [-1.8, 0.3]", "position_m = [-1.8, -0.31]")
+    swapped = estimated(profiles.parse(aside, "aside.toml"))
+    assert [blade.behind for blade in swapped.model.geometry.rudders] != [
+        blade.behind for blade in twin.model.geometry.rudders
+    ]
+    assert jax.tree.structure(swapped.model) != jax.tree.structure(twin.model)
 
 
 def test_the_profile_says_which_blades_are_wide(esso, vectwin):
