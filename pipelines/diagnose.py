@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -131,7 +131,11 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     notes += [lacking] if lacking else []
     whole = tried.covering(decided.point)
     reach("external forces")
-    pushed = error_location.pushed(tried, decided.point, whole)
+    pushed, out_of_reach = error_location.pushed(
+        tried, decided.point, whole, decision.shown.remainder
+    )
+    tried = tried.leaving_out(out_of_reach)
+    judge = None if judge is None else replace(judge, trial=tried)
     held, network, alone = judge, None, None
     if not run.judges_itself:
         notes += answer.of_physics(run, tried, found)
@@ -147,7 +151,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     simulated = (tried, decision)
     if network is not None:
         simulated = network.beside(decision)
-        whole = simulated[0].covering(simulated[1].first)
+        whole = simulated[0].covering(simulated[1].nothing.point)
     if held and decision.named and tried.reference.adapts:
         notes += _of_own_voyages(run, decision)
         alone = held.adapted(decision).reduction if decision.adapted else None
@@ -163,7 +167,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         tried.grid.seconds,
         error_location.uncovered(run, store, names, profile, held.cut) if held else (),
         error_location.by_channel(held) if held else (),
-        error_location.depends_on(*simulated, whole),
+        error_location.depends_on(simulated[0], simulated[1].nothing, whole),
         alone,
     )
     after = held.extended(decision) if held and decision.named else None

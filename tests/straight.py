@@ -21,7 +21,7 @@ from shiplog.diagnosis import (
     segments,
 )
 from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.fitted import Point
+from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_campaign import Campaign, prior
@@ -187,27 +187,30 @@ def campaign(
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
 class Straight(Trial):
     """A trial whose pass is the same wherever its causes stand, less what their numbers do."""
 
-    def __init__(self, made: Campaign, record: Record, given: Linear, fixed=()) -> None:
-        super().__init__(made, record, fixed)
-        self.given = given
+    given: Linear | None = None
 
-    def at(self, numbers, near=None, noise_factor=None) -> Point:
-        columns = self.reference.columns
+    def at(self, numbers, near=None, noise_factor=None, remainder=None) -> Point:
+        assert self.given is not None
+        columns, ref = self.reference.columns, self.reference
         d = np.concatenate((np.zeros(columns.base), columns.numbers(dict(numbers))))
         linear = replace(self.given, e=self.given.e - self.given.j @ d)
-        point = Point(
-            dict(numbers), linear.path, linear, likelihood.weighed(linear, self.process_noise)
-        )
-        if self.first is None:
-            self.first = point
-        return point
+        weighed = likelihood.weighed(linear, ref.process_noise)
+        return self._judged(Point(dict(numbers), linear.path, linear, weighed))
 
-    def intermittent(self, point, base) -> Pulses:
-        """There is no hull that a force could act on."""
-        return Pulses(0.0, -1.0, 0.0, 1.0, np.zeros(3))
+
+def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] = ()) -> Straight:
+    """One of equal weights that was linearised where nothing has changed."""
+    found = Straight.of(made, record, fixed, given=given)
+    return replace(found, first=found.at({}))
+
+
+def no_hull(_: Fit) -> Pulses:
+    """There is no hull that an intermittent force could act on."""
+    return Pulses(0.0, -1.0, 0.0, 1.0, np.zeros(3))
 
 
 def dense(given: Linear, process_noise: ProcessNoise, rows: np.ndarray | None = None):

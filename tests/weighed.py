@@ -9,8 +9,8 @@ import straight
 
 from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
+from shiplog.diagnosis.remainder import NOMINAL, Remainder
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import NOMINAL, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
@@ -21,7 +21,7 @@ def trial() -> straight.Straight:
     columns = straight.columns_of(straight.CAUSES)
     nominal, record = straight.sailed(8), straight.sailed(4, seed=3)
     usual = straight.campaign(nominal, straight.passed(nominal, columns), columns)
-    return straight.Straight(usual, record, straight.passed(record, columns, seed=2))
+    return straight.trial(usual, record, straight.passed(record, columns, seed=2))
 
 
 def search(
@@ -37,7 +37,8 @@ def search(
     evidence   of a hypothesis; 100 nats a cause where none is given
     sizes      of a label's numbers
     """
-    point = of.first or of.at({})
+    point = of.first
+    assert point is not None
     made = Search(of, point, {})
     columns = of.reference.columns
     given = {((), NOMINAL): 1e-12, **probability}
@@ -50,9 +51,9 @@ def search(
         found = Found("+".join(labels), said, 1.0, numbers, 0.01 * np.eye(count))
         remainder = Remainder(kind, 3.0)
         score = float(np.log(p)) - 40.0
-        made.found[labels, kind] = Hypothesis(
+        made.table.found[labels, kind] = Hypothesis(
             tuple(sorted(labels)), remainder, said, score, point, found, pulses
         )
     made.run = lambda: None  # there is nothing else to weigh
-    made.alone = {cause.label: 1.0 for cause in made.catalogue}
+    made.table.alone = {cause.label: 1.0 for cause in made.table.catalogue}
     return made

@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from shiplog.diagnosis import fits, thresholds
 from shiplog.diagnosis import posterior as posteriors
-from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.fitted import Fit
+from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.likelihood import ProcessNoise
+from shiplog.diagnosis.intermittent import pulse_force
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
 from shiplog.diagnosis.result import Decision, Named, Structure
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL
-from shiplog.diagnosis.unrecorded_thruster import pulse_force
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
@@ -27,58 +29,55 @@ def decide(
 ) -> tuple[Decision, Posterior]:
     """The verdict, without the names that held-out data refute, and without any if the names are
     in doubt; each with its reason."""
-    refuted, trial = dict(refuted or {}), search.trial
-    trial.process_noise = trial.reference.process_noise  # without an earlier intermittent force
+    refuted, table = dict(refuted or {}), search.table
     found = posteriors.posterior(search, tuple(refuted))
     names = () if doubted else found.stated
     kind = found.remainder
-    best = search.recalled(posteriors.best_with(found, names, kind if not names else None))
-    mostly = posteriors.share_of_causes(search, best) >= thresholds.MOST
-    mostly = mostly and not _imitated(search, best, names)
-    trial.remainder = best.remainder
+    best = posteriors.best_with(found, names, kind if not names else None)
+    fit = table.fit(best)
+    mostly = posteriors.share_of_causes(table, best) >= thresholds.MOST
+    mostly = mostly and not _imitated(table, fit, names)
     verdict, structure, named, pulses = "undecided", None, (), None
     if names and mostly:
-        verdict, named = "named", _named(search, found, best, names)
+        verdict, named = "named", _named(table, found, best, names)
     elif best.kind != NOMINAL and (kind is not None or names):
-        verdict, structure = "unknown", _structure(search, best)
-        if best.kind == INTERMITTENT and best.pulses is not None and is_device(search, best):
-            verdict, structure, pulses = "named", None, best.pulses
+        verdict, structure = "unknown", _structure(table, best, fit)
     elif found.none >= thresholds.STATED:
         verdict = "none"
-    if verdict == "named" and best.kind == INTERMITTENT and is_device(search, best):
-        pulses = best.pulses
+    if verdict in ("named", "unknown") and is_device(table, best, fit):
+        verdict, structure, pulses = "named", None, best.pulses
     traces = ()
     if verdict == "none":
         rest = [n for n in map(name_of, best.causes) if n not in names]
-        traces = _named(search, found, best, rest)
-    shown = best if verdict in ("named", "unknown") else search.nothing
-    trial.remainder = shown.remainder
-    if pulses is not None:  # its force and times are taken from this trial later
-        trial.process_noise = _with_pulses(search, best)
+        traces = _named(table, found, best, rest)
+    shown = fit if verdict in ("named", "unknown") else table.fit(table.nothing)
+    if pulses is not None:
+        shown = _with_pulses(shown, pulses)
+    nothing = Fit(table.first, table.nothing.found, shown.remainder)
     return Decision(
         verdict, named, structure, pulses, traces,
-        _reasons(search, found, refuted | dict(doubted or {}), named),
-        found.ranking(), shown.found.noise_factor, search.point(shown), shown.found, search.first,
-        search.nothing.found, search.told,
+        _reasons(table, found, refuted | dict(doubted or {}), named),
+        found.ranking(), shown, nothing, search.told,
     ), found  # fmt: skip
 
 
-def _imitated(search: Search, best: Hypothesis, names: Sequence[str]) -> bool:
+def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> bool:
     """Whether the remainder could reproduce most of a named cause's effect: with an unknown
     force of the controls, an offset of the rudder may be a part of that force."""
     shares = [
-        search.trial.imitated(search.point(best), best.found, label, best.remainder)
-        for label in best.causes if name_of(label) in names
-    ]  # fmt: skip
+        fits.imitated(table.trial, fit, label)
+        for label in fit.included
+        if label not in table.trial.fixed and name_of(label) in names
+    ]
     return any(share > thresholds.MOST for share in shares)
 
 
 def _named(
-    search: Search, found: Posterior, best: Hypothesis, names: Sequence[str]
+    table: Hypotheses, found: Posterior, best: Hypothesis, names: Sequence[str]
 ) -> tuple[Named, ...]:
     """The causes of a hypothesis that have these names, with what else they may be."""
-    by = {c.label: c for c in search.catalogue}
-    columns = search.trial.reference.columns
+    by = {c.label: c for c in table.catalogue}
+    columns = table.trial.reference.columns
     given, at = [], 0
     for label in best.found.numbers:
         part = slice(at, at + len(columns.of[label]))
@@ -89,10 +88,10 @@ def _named(
         assert best.found.covariance is not None
         given.append(
             Named(
-                by[label], search.alone.get(label, float("nan")),
+                by[label], table.alone.get(label, float("nan")),
                 found.names.get(name_of(label), 0.0), np.asarray(best.found.numbers[label]),
                 best.found.covariance[part, part], tuple(others), others,
-                search.trial.reference.freedom,
+                table.trial.reference.freedom,
             )
         )  # fmt: skip
     return tuple(given)
@@ -112,45 +111,42 @@ def _instead(found: Posterior, best: Hypothesis, label: str) -> dict[str, float]
     return others
 
 
-def _structure(search: Search, best: Hypothesis) -> Structure:
-    gained = best.evidence - search.nothing.evidence
+def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
+    gained = best.evidence - table.nothing.evidence
     family = FAMILY.get(best.kind, best.kind)
     if family in (STOCHASTIC, INTERMITTENT):
         channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
         return Structure(family, gained, channels)
-    acts_on = search.trial.acts_on(search.point(best), best.found, best.kind)
-    return Structure(family, gained, acts_on)
+    return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
 
 
-def is_device(search: Search, best: Hypothesis) -> bool:
-    assert best.pulses is not None
-    trial = search.trial
-    kept = trial.process_noise
-    trial.process_noise = _with_pulses(search, best)
-    try:
-        force, deviation = pulse_force(trial, search.point(best), best.found, best.pulses)
-    finally:
-        trial.process_noise = kept
+def is_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> bool:
+    """Whether an intermittent force is what remains, and is that of one device."""
+    if best.kind != INTERMITTENT or best.pulses is None:
+        return False
+    with_it = _with_pulses(fit, best.pulses)
+    force, deviation = pulse_force(table.trial, with_it, best.pulses)
     return posteriors.of_one_device(force, deviation)
 
 
-def _with_pulses(search: Search, best: Hypothesis) -> ProcessNoise:
-    """The trial's process noise with the hypothesis' intermittent force in it."""
-    assert best.pulses is not None
-    return replace(search.trial.reference.process_noise, pulse=best.pulses.unit * best.pulses.force)
+def _with_pulses(fit: Fit, pulses: Pulses) -> Fit:
+    """The same with the intermittent force in its remainder."""
+    surge, sway, yaw = pulses.unit * pulses.force
+    remainder = replace(fit.remainder, pulse=(float(surge), float(sway), float(yaw)))
+    return replace(fit, remainder=remainder)
 
 
 def _reasons(
-    search: Search, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
+    table: Hypotheses, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
 ) -> dict[str, str]:
     """Label → why it is not named."""
     said = dict(refuted)
     kept = {n.cause.name for n in named}
-    for label, gained in sorted(search.alone.items(), key=lambda pair: -pair[1])[:8]:
+    for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:8]:
         name = name_of(label)
         if name in kept or name in said:
             continue
-        misfit = search.placebo.get(label, 0.0)
+        misfit = table.placebo.get(label, 0.0)
         why = f"log Bayes factor {gained:+.0f} nats by itself"
         if misfit >= 1.0:
             why += f", of which a nominal voyage has {misfit:.0f} too"

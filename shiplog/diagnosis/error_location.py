@@ -8,19 +8,21 @@ import numpy as np
 import polars as pl
 
 from shiplog.diagnosis import (
+    evidence,
     external_forces,
+    fits,
+    intermittent,
     omitted_inputs,
     residual_acceleration,
-    unrecorded_thruster,
 )
-from shiplog.diagnosis import trial as diagnosis_trial
-from shiplog.diagnosis.evidence import TrialEvidence
-from shiplog.diagnosis.fitted import Point
+from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.profile import Profile
 from shiplog.simulation import coverage as covering
@@ -37,15 +39,18 @@ PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
 PULSE_APART = 2.5  # nodes that an intermittent force may pause for
 
 
-def pushed(trial: TrialEvidence, point: Point, whole: Linear) -> list[Interval]:
-    """Stretches that no force of the ship explains; the trial judges no hypothesis on them."""
+def pushed(
+    trial: Trial, point: Point, whole: Linear, remainder: Remainder
+) -> tuple[list[Interval], np.ndarray]:
+    """Stretches that no force of the ship explains, and the segments [S] bool that they touch: no
+    hypothesis is judged on those. The point is of the model as it stands, `whole` its pass with
+    the segments between its own."""
     ref = trial.reference
-    base, _ = trial.scan(point, (), trial.fixed)
-    if isinstance(trial, diagnosis_trial.Trial):
-        whole = trial.of_parts(whole, point, base)
+    base, _ = evidence.scan(trial, point, (), trial.fixed, remainder=remainder)
+    fit = Fit(point, base, remainder)
     found = external_forces.find(
-        *trial.left(whole, trial.solved(point, base)),
-        trial.process_noise.times(base.noise_factor), trial.record,
+        *fits.residual(trial, fits.of_parts(trial, whole, fit), fit),
+        trial.process_noise(remainder).times(base.noise_factor), trial.record,
         ref.model.stand_in, np.array(list(ref.coefficients.values())),
     )  # fmt: skip
     out = np.zeros(len(trial.rows), dtype=bool)
@@ -54,8 +59,8 @@ def pushed(trial: TrialEvidence, point: Point, whole: Linear) -> list[Interval]:
     for stretch in found:
         inside = (begin < stretch.end_s) & (begin + trial.grid.seconds > stretch.start_s)
         out |= inside & (of == stretch.voyage)
-    trial.leave_out(out)
-    return [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
+    said = [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
+    return said, out
 
 
 def by_channel(held: HeldOut) -> list[dict]:
@@ -68,11 +73,11 @@ def by_channel(held: HeldOut) -> list[dict]:
     return [c.as_json() for c in found.channels]
 
 
-def depends_on(trial: TrialEvidence, decision: Decision, whole: Linear) -> tuple[Dependence, ...]:
-    """What the model cannot see and the residual depends on."""
+def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, ...]:
+    """What the model cannot see and the residual depends on, with no cause named."""
     found = residual_acceleration.posterior(
-        *trial.left(whole, trial.solved(decision.first, decision.nothing)),
-        trial.process_noise.times(decision.nothing.noise_factor), trial.record,
+        *fits.residual(trial, whole, nothing),
+        trial.process_noise(nothing.remainder).times(nothing.found.noise_factor), trial.record,
     )  # fmt: skip
     knots = residual_acceleration.table(found, trial.record)
     return omitted_inputs.table(
@@ -108,9 +113,9 @@ def uncovered(
     return found
 
 
-def pulses(trial: TrialEvidence, decision: Decision, found: Pulses) -> list[dict]:
+def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
-    force, sd = unrecorded_thruster.pulse_force(trial, decision.point, decision.base, found)
+    force, sd = intermittent.pulse_force(trial, decision.shown, found)
     strongest = float(np.quantile(np.abs(force), 0.98))
     times: list[dict] = []
     for i, row in enumerate(trial.rows):

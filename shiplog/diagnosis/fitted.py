@@ -9,6 +9,7 @@ import numpy as np
 
 from shiplog.diagnosis.likelihood import Weighed
 from shiplog.diagnosis.linear_segments import Linear, Path
+from shiplog.diagnosis.remainder import Remainder
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,20 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Fit:
+    """A hypothesis with the trial linearised where it was found, and what remains with it."""
+
+    point: Point
+    found: Found
+    remainder: Remainder
+
+    @property
+    def included(self) -> tuple[str, ...]:
+        """Labels of the causes that it holds, those of the model with them."""
+        return tuple(self.found.numbers)
+
+
+@dataclass(frozen=True)
 class Level:
     """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
 
@@ -66,7 +81,6 @@ class Level:
 
     noise_factor: float
     gram: np.ndarray  # [1 + C, 1 + C]
-    logdet: float
     inverse: np.ndarray  # of information and data together, base's own numbers last
     solution: np.ndarray
     value: float  # log evidence of the base

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog.diagnosis import sign_conventions
-from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis import fits, sign_conventions
 from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
 from shiplog.simulation.error_reduction import Gain, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
@@ -54,7 +54,7 @@ class HeldOut(Rollouts):
     """The same with the trial whose causes are judged on them; `own` of a network, whose causes
     another model found."""
 
-    trial: TrialEvidence
+    trial: Trial
     own: Own | None = None
 
     def states_after(self, decision: Decision) -> np.ndarray:
@@ -75,20 +75,20 @@ class HeldOut(Rollouts):
 
     def adapted(self, decision: Decision) -> Gain:
         """What the model's own coefficients take off alone, fitted again with nothing named."""
-        return self.gain(replace(decision, named=(), point=decision.first, base=decision.nothing))
+        return self.gain(decision.unnamed)
 
     def extended(self, decision: Decision) -> ExtendedSimulator:
         """The model with what is named in it, with numbers from all voyages."""
         named, beside = decision.named, None
         if decision.adapted:
             trial, seen = self.simulated(decision)
-            beside = trial.coefficients(seen.point, seen.base)
+            beside = fits.coefficients(trial, seen.shown)
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
             {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
         )  # fmt: skip
 
-    def simulated(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
+    def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
         """The model that is simulated on the trial's segments, with what is named in it."""
         return (self.trial, decision) if self.own is None else self.own.beside(decision)
 
@@ -164,22 +164,17 @@ class HeldOut(Rollouts):
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         """Numbers of the named causes from all else alone, and the coefficients together with them
         where the model adapts."""
-        recorded, segment = self.trial.record, decision.point.linear.cut
+        recorded, segment = self.trial.record, decision.shown.point.linear.cut
         index = recorded.names.index(voyage) if voyage in recorded.names else -1
         out = segment.voyage == index
         if half is not None:
             middle, late = half
             out &= (recorded.time[segment.rows] >= middle) == late
-        included = tuple(decision.base.numbers)
         numbers, coefficients = {}, None
-        if included or decision.adapted:
-            numbers, beside = self.trial.without(
-                decision.point, included, decision.noise_factor, out
-            )
+        if decision.shown.included or decision.adapted:
+            numbers, beside = fits.without(self.trial, decision.shown, out)
             if self.own is not None and decision.adapted:
                 trial, seen = self.own.beside(decision)
-                _, beside = trial.without(
-                    seen.point, tuple(seen.base.numbers), seen.noise_factor, out
-                )
+                _, beside = fits.without(trial, seen.shown, out)
             coefficients = beside if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

@@ -11,7 +11,7 @@ import numpy as np
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.linear_segments import Path
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause
 

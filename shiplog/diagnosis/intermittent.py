@@ -1,4 +1,4 @@
-"""An intermittent side force at one place, and its nominal part.
+"""An intermittent side force at one place of a trial, and its nominal part.
 
 Random forces on a ship often act at one place, and in bursts. In rougher weather the same forces
 are larger, and no device is at work.
@@ -6,11 +6,16 @@ are larger, and no device is at work.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from shiplog.diagnosis import unrecorded_thruster
+from shiplog.diagnosis import fits, likelihood, unrecorded_thruster
+from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.segments import SegmentGrid
+from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 
 def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
@@ -37,3 +42,30 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
         left, none, reference, reference.process_noise, campaign.weight
     )
     return found.unit * found.force if found.gain > 0.0 else None
+
+
+def pulses(trial: Trial, fit: Fit, usual: np.ndarray | None = None) -> Pulses:
+    """Of what a hypothesis leaves; `usual` as `unrecorded_thruster.pulses_of`."""
+    left, d = fits.residual(trial, fit.point.linear, fit)
+    process_noise = trial.process_noise(fit.remainder)
+    return unrecorded_thruster.pulses_of(
+        left, d, trial.reference, process_noise, trial.weight, usual
+    )
+
+
+def pulse_force(trial: Trial, fit: Fit, pulses: Pulses) -> tuple[np.ndarray, np.ndarray]:
+    """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N; of a
+    hypothesis whose remainder has it."""
+    process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
+    left = fits.residual(trial, fit.point.linear, fit)
+    z, covariance = likelihood.starts_and_knots(*left, process_noise)
+    knots = trial.grid.knots
+    kernel = process_noise.kernel(knots)
+    pulse = replace(process_noise, push=1e-9 * process_noise.push).kernel(knots)
+    share = pulse @ np.linalg.inv(kernel)
+    pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+    sway = slice(knots, 2 * knots)
+    beyond = (pulse - share @ pulse)[sway, sway]
+    known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
+    variance = np.diagonal(known + beyond, axis1=1, axis2=2)
+    return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]

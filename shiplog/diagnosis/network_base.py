@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shiplog.diagnosis import nominal_reference
-from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis import evidence, nominal_campaign, nominal_reference
+from shiplog.diagnosis.fitted import Fit
+from shiplog.diagnosis.remainder import RAISED, Remainder
 from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.trial_voyages import constants_for
 from shiplog.models.extended import Extended
 from shiplog.training.load_model import Run
+
+ANY_NOISE = Remainder(RAISED)  # a network's process noise is its own, whatever the judge's is
 
 
 class Own:
     """The run's own network on the segments of a trial that another model judges."""
 
-    def __init__(self, run: Run, trial: TrialEvidence) -> None:
+    def __init__(self, run: Run, trial: Trial) -> None:
         self.judge = trial
         extension = run.extension
         self.numbers = run.extension_numbers()
@@ -24,44 +28,33 @@ class Own:
         setting = trial.reference.setting
         model = Extended(base, self.held, stand_in, values, constants_for(run, self.held, setting))
         self.reference = nominal_reference.assume(model, setting, start, trial.record, False, base)
-        self._known: dict[tuple, tuple[TrialEvidence, Decision]] = {}
+        self._known: dict[tuple, tuple[Trial, Fit, Fit]] = {}
 
-    def beside(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
+    def beside(self, decision: Decision) -> tuple[Trial, Decision]:
         """A trial of the network with what is named in it, and the decision there: its numbers
         are the judge's and stay, what else there is of points and hypotheses the network's."""
         key = tuple((n.cause.label, n.numbers.tobytes()) for n in decision.named)
         if key not in self._known:
             self._known[key] = self._beside(decision)
-        trial, seen = self._known[key]
-        return trial, replace(
-            decision,
-            point=seen.point,
-            base=seen.base,
-            noise_factor=seen.noise_factor,
-            first=seen.first,
-            nothing=seen.nothing,
-        )
+        trial, shown, nothing = self._known[key]
+        return trial, replace(decision, shown=shown, nothing=nothing)
 
-    def _beside(self, decision: Decision) -> tuple[TrialEvidence, Decision]:
+    def _beside(self, decision: Decision) -> tuple[Trial, Fit, Fit]:
+        """The trial, and its fits with what is named and with nothing."""
         causes = (*self.held, *(n.cause for n in decision.named))
-        trial = TrialEvidence(
-            nominal_reference.beside(self.reference, causes),
-            self.judge.record,
-            [c.label for c in causes],
-        )
-        first = trial.begin(self.numbers)
-        trial.leave_out(self.judge.weight == 0.0)
-        nothing, _ = trial.scan(first, (), tuple(self.numbers))
-        point, base = first, nothing
-        if decision.named:
-            numbers = {n.cause.label: n.numbers for n in decision.named}
-            point = trial.at({**self.numbers, **numbers}, first, nothing.noise_factor)
-            base, _ = trial.scan(point, (), trial.fixed)
-        return trial, replace(
-            decision,
-            point=point,
-            base=base,
-            noise_factor=base.noise_factor,
-            first=first,
-            nothing=nothing,
-        )
+        campaign = nominal_campaign.of_reference(nominal_reference.beside(self.reference, causes))
+        trial = Trial.of(campaign, self.judge.record, [c.label for c in causes])
+        trial, first = evidence.begin(trial, self.numbers)
+        trial = trial.leaving_out(self.judge.weight == 0.0)
+
+        def fit(point, included) -> Fit:
+            found, _ = evidence.scan(trial, point, (), included, remainder=ANY_NOISE)
+            return Fit(point, found, ANY_NOISE)
+
+        nothing = fit(first, tuple(self.numbers))
+        if not decision.named:
+            return trial, nothing, nothing
+        numbers = {n.cause.label: n.numbers for n in decision.named}
+        both = {**self.numbers, **numbers}
+        point = trial.at(both, first, nothing.found.noise_factor)
+        return trial, fit(point, trial.fixed), nothing

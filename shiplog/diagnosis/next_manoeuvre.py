@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import likelihood, linearisation, segments
-from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.result import Named
+from shiplog.diagnosis.trial import Trial
 from shiplog.simulation.sensitivities import WindowSeries, rollout
 from shiplog.voyages.recording import Record
 
@@ -89,7 +89,7 @@ class Advice:
 
 
 def advice(
-    trial: TrialEvidence, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
+    trial: Trial, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
 ) -> dict[str, Advice]:
     """Label → what would tell it best from all that these data cannot tell it from.
 
@@ -112,7 +112,7 @@ def advice(
     return found
 
 
-def apart(trial: TrialEvidence, gram: np.ndarray, one: Named, other: str) -> float:
+def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
     """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units."""
     columns = trial.reference.columns
     own, rival = columns.of[one.cause.label], columns.of[other]
@@ -124,7 +124,7 @@ def apart(trial: TrialEvidence, gram: np.ndarray, one: Named, other: str) -> flo
     return 0.5 * float(p @ left[np.ix_(own, own)] @ p - imitated @ np.linalg.solve(free, imitated))
 
 
-def sailed(trial: TrialEvidence, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
+def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | None]:
     """[1 + C, 1 + C] of each manoeuvre, in units; None where the model diverges in it."""
     ref = trial.reference
     numbers = dict(fixed)
@@ -146,7 +146,7 @@ def sailed(trial: TrialEvidence, fixed: Mapping[str, np.ndarray]) -> list[np.nda
     return found
 
 
-def simulated(trial: TrialEvidence, theta: np.ndarray) -> tuple[Record, np.ndarray]:
+def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
     """All manoeuvres in the trial's mean wind, a voyage each; which stayed in the pond [M]."""
     record, model = trial.record, trial.reference.model
     factor = record.timescale.factor

@@ -158,6 +158,13 @@ def widened(model: Extended, setting: Setting, start: Start) -> Start:
     return replace(start, spread=spread)
 
 
+def of_reference(made: Reference) -> Campaign:
+    """A campaign whose voyages do not differ, and whose model has no discrepancy."""
+    none = Discrepancy((), made.process_noise.push)
+    effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
+    return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
+
+
 def assumed(
     model: Extended, setting: Setting, start: Start, record: Record, given: bool,
     inputs: Network | None = None, numbers: Mapping[str, np.ndarray] | None = None,
@@ -170,10 +177,7 @@ def assumed(
     numbers  of causes that were found in these voyages: what they explain is no discrepancy
     """
     if inputs is not None:
-        made = nominal_reference.assume(model, setting, start, record, given, inputs)
-        none = Discrepancy((), made.process_noise.push)
-        effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
-        return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
+        return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
     at = nominal_reference.settled(
         model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS

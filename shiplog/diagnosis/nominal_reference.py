@@ -8,7 +8,7 @@ is divided by κ (a power prior, Ibrahim & Chen 2000).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -79,10 +79,23 @@ class Reference:
         return np.linalg.solve(self.information, self.pull)
 
     @cached_property
+    def information_volume(self) -> float:
+        """log|information|."""
+        return float(np.linalg.slogdet(self.information)[1])
+
+    @cached_property
     def usual(self) -> np.ndarray:
         """[P] coefficients."""
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
+
+    def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
+        """The most that a number differs, in units of its size; of the same causes."""
+        columns = self.columns
+        return max(
+            (float(np.abs((one[n] - other[n]) / columns.unit[columns.of[n]]).max()) for n in one),
+            default=0.0,
+        )
 
     def held(self, noise_factor: float, pulse: np.ndarray | None = None) -> Wide:
         """Allowed distance of a path where the process noise has this factor, and with an

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shiplog.diagnosis.nominal_campaign import Campaign
-from shiplog.diagnosis.trial import SIZES
+from shiplog.diagnosis.remainder import SIZES
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.remainder import NOMINAL, RAISED
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
@@ -71,7 +72,7 @@ class Posterior:
 
 def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     """Of the weighed hypotheses, without those that contain a refuted cause (by name)."""
-    kept = [h for h in search.ranked() if not {name_of(n) for n in h.causes} & set(refuted)]
+    kept = search.table.ranked({*search.banned, *refuted})
     score = np.array([h.score for h in kept])
     share = np.exp(score - score.max())
     share /= share.sum()
@@ -80,7 +81,7 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     kinds: dict[str, float] = {}
     none = 0.0
     for one, p in zip(kept, share, strict=True):
-        real = practical(search, one)
+        real = practical(search.table, one)
         for name in dict.fromkeys(name_of(label) for label in real):
             names[name] = names.get(name, 0.0) + float(p)
         for label in real:
@@ -98,23 +99,23 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     return Posterior(tuple(kept), share, {n: names[n] for n in order}, labels, kinds, none, hidden)
 
 
-def practical(search: Search, one: Hypothesis) -> tuple[str, ...]:
+def practical(table: Hypotheses, one: Hypothesis) -> tuple[str, ...]:
     """Causes of a hypothesis that are large enough to matter."""
-    setting = search.trial.reference.setting
-    by = {c.label: c for c in search.catalogue}
+    setting = table.trial.reference.setting
+    by = {c.label: c for c in table.catalogue}
     return tuple(
         label for label in one.causes
         if by[label].practical(np.asarray(one.found.numbers[label]), setting)
     )  # fmt: skip
 
 
-def share_of_causes(search: Search, one: Hypothesis) -> float:
+def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
     """Of what a hypothesis explains beyond nothing, the share that its causes explain."""
-    nothing = search.nothing.evidence
+    nothing = table.nothing.evidence
     whole = one.evidence - nothing
     alone = max(
-        (search.found[one.causes, kind].evidence for kind in (NOMINAL, RAISED)
-         if (one.causes, kind) in search.found), default=nothing,
+        (table.found[one.causes, kind].evidence for kind in (NOMINAL, RAISED)
+         if (one.causes, kind) in table.found), default=nothing,
     )  # fmt: skip
     return (alone - nothing) / whole if whole > 0.0 else 1.0
 
@@ -144,6 +145,3 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> bool:
     between = (size > 0.2 * strongest) & ~on
     often = on.mean() > 0.5  # what is on for most of the time is no device that comes and goes
     return bool(not often and between.sum() < thresholds.BETWEEN * on.sum())
-
-
-__all__ = ["FAMILY", "INTERMITTENT", "Posterior", "best_with", "of_one_device", "posterior"]

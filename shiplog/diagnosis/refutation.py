@@ -49,7 +49,7 @@ def judged(
         gain = held.gain(decision)
         worths = [gain]
         if len(decision.named) > 1:
-            rests = [decisions.without(search.trial, decision, one) for one in decision.named]
+            rests = [decisions.without(search.table.trial, decision, one) for one in decision.named]
             worths = [held.worth(rest, decision) for rest in rests]
         asked = list(zip(decision.named, worths, strict=True))
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss

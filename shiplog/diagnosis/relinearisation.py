@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis import evidence
 from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.linear_segments import Path
+from shiplog.diagnosis.remainder import Remainder
+from shiplog.diagnosis.trial import Trial
 
 RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
@@ -22,28 +24,29 @@ STEADY = 0.05  # of the logarithm of the process noise, from one round to the ne
 
 
 def settle(
-    trial: TrialEvidence,
+    trial: Trial,
     included: Sequence[str],
     numbers: Mapping[str, np.ndarray],
     path: Path | None,
     lowest: float = -np.inf,
+    remainder: Remainder = evidence.USUAL,
 ) -> tuple[Point, Found]:
     """These causes together, linearised at their numbers until these converge (from where they did
     before, if they have). A step goes too far if the evidence is then below the `lowest` that is
     possible, where that is known, or falls far."""
     point, noise_factor, lately = None, 1.0, None
     near: Path | Point | None = path
-    key = (tuple(included), trial.pulse)
-    if key in trial.rested:
-        numbers, near, noise_factor = trial.rested[key]
+    key = (tuple(included), remainder)
+    if key in trial.settled:
+        numbers, near, noise_factor = trial.settled[key]
         lately = noise_factor
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
     steady = False  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
-            point = trial.at(numbers, near, noise_factor)
-            base = _fitted(trial, point, included, lately, steady, lowest)
+            point = trial.at(numbers, near, noise_factor, remainder)
+            base = _fitted(trial, point, included, remainder, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
             if shorter == SHORTER:
                 assert trial.first is not None
@@ -63,32 +66,32 @@ def settle(
             base = replace(base, evidence=-np.inf)  # the fit diverged
             break
         moved = _within_bounds(trial, base.numbers, base.covariance)
-        far = trial.apart(moved, numbers)
+        far = trial.reference.apart(moved, numbers)
         numbers = moved
         if far < AT_REST:
             if kept:
-                base, _ = trial.scan(point, (), included, lately)
+                base, _ = evidence.scan(trial, point, (), included, lately, remainder)
                 numbers, noise_factor = (
                     _within_bounds(trial, base.numbers, base.covariance),
                     base.noise_factor,
                 )
-            trial.rested[key] = (numbers, point.path, noise_factor)
+            trial.settled[key] = (numbers, point.path, noise_factor)
             break
     assert point is not None
     return point, replace(base, name="+".join(included), numbers=numbers)
 
 
 def _fitted(
-    trial: TrialEvidence, point: Point, included: Sequence[str], lately: float | None,
-    steady: bool, lowest: float,
+    trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
+    lately: float | None, steady: bool, lowest: float,
 ) -> Found:  # fmt: skip
     """The hypothesis at a point. Raises np.linalg.LinAlgError where the step there went too far."""
     if np.abs(point.linear.e).max() > AWAY:
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
-        base = trial.fit(point, included, lately)
+        base = evidence.fit(trial, point, included, lately, remainder)
     else:
-        base, _ = trial.scan(point, (), included, lately)
+        base, _ = evidence.scan(trial, point, (), included, lately, remainder)
     if base.evidence < lowest:
         raise np.linalg.LinAlgError("a step too far")
     return base
@@ -104,7 +107,7 @@ def _half_way(
 
 
 def _within_bounds(
-    trial: TrialEvidence, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
+    trial: Trial, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
 ) -> dict[str, np.ndarray]:
     """Numbers of a hypothesis as its causes allow them."""
     by = {cause.label: cause for cause in trial.reference.model.causes}

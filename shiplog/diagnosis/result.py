@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.evidence import TrialEvidence
-from shiplog.diagnosis.fitted import Found, Point, Told
+from shiplog.diagnosis.fitted import Fit, Found, Told
 from shiplog.diagnosis.relinearisation import settle
+from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause, Shown
 
@@ -57,12 +57,11 @@ class Decision:
     verdict    named, none or unknown
     named      in the order they were found
     pulses     the unrecorded thruster, where it is one of the causes
-    rejected   label → why not
     traces     causes below their practical size
+    rejected   label → why not
     ranking    label or family → probability, of the first step
-    noise_factor   λ, factor of the process noise, of the remainder
-    point, base      the trial linearised with what is named, and that hypothesis
-    first, nothing   the same without any cause
+    shown      the hypothesis of the verdict: what is named, or nothing, with its remainder
+    nothing    no cause, with the same remainder
     told       label → information of these data about each cause
     adapted    whether the model's coefficients are fitted again together with the named causes
     """
@@ -74,50 +73,51 @@ class Decision:
     traces: tuple[Named, ...]
     rejected: Mapping[str, str]
     ranking: Mapping[str, float]
-    noise_factor: float
-    point: Point
-    base: Found
-    first: Point
-    nothing: Found
+    shown: Fit
+    nothing: Fit
     told: Mapping[str, Told] = field(default_factory=dict)
     adapted: bool = False
 
+    @property
+    def unnamed(self) -> Decision:
+        """The same with nothing named, and the process noise as it is shown."""
+        noise_factor = self.shown.found.noise_factor
+        nothing = replace(self.nothing.found, noise_factor=noise_factor)
+        return replace(self, named=(), shown=replace(self.nothing, found=nothing))
 
-def without(trial: TrialEvidence, decision: Decision, one: Named) -> Decision:
+
+def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     """The same verdict with one cause less, the others fitted again."""
     named = tuple(n for n in decision.named if n is not one)
-    labels = tuple(n for n in decision.base.numbers if n != one.cause.label)
+    shown, remainder = decision.shown, decision.shown.remainder
+    labels = tuple(n for n in shown.included if n != one.cause.label)
+    again = decision.nothing
     if labels:
-        numbers = {n: decision.base.numbers[n] for n in labels}
-        point, base = settle(trial, labels, numbers, decision.point.path)
-        if base.covariance is None:  # the fit diverged: it has no numbers
-            labels, named = (), ()
-    if not labels:
-        point, base = decision.first, decision.nothing
-    again, at = [], 0
-    by = {n.cause.label: n for n in named}
-    for label in labels:
-        count = len(base.numbers[label])
-        part = slice(at, at + count)
-        at += count
+        numbers = {n: shown.found.numbers[n] for n in labels}
+        point, found = settle(trial, labels, numbers, shown.point.path, remainder=remainder)
+        if found.covariance is None:  # the fit diverged: it has no numbers
+            named = ()
+        else:
+            again = Fit(point, found, remainder)
+    kept = _fitted_again(again.found, named)
+    verdict = "named" if kept or decision.pulses else "none"
+    return replace(decision, named=kept, verdict=verdict, shown=again)
+
+
+def _fitted_again(found: Found, named: Sequence[Named]) -> tuple[Named, ...]:
+    """The named causes that a hypothesis holds, in its order, with its numbers."""
+    again, end, by = [], 0, {n.cause.label: n for n in named}
+    for label, values in found.numbers.items():
+        part = slice(end, end + len(values))
+        end = part.stop
         if label in by:
-            assert base.covariance is not None
+            assert found.covariance is not None
             again.append(
                 replace(
-                    by[label],
-                    numbers=np.asarray(base.numbers[label]),
-                    covariance=base.covariance[part, part],
+                    by[label], numbers=np.asarray(values), covariance=found.covariance[part, part]
                 )
             )
-    verdict = "named" if again or decision.pulses else "none"
-    return replace(
-        decision,
-        named=tuple(again),
-        verdict=verdict,
-        point=point,
-        base=base,
-        noise_factor=base.noise_factor,
-    )
+    return tuple(again)
 
 
 def untold(decision: Decision) -> Decision:

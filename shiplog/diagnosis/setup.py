@@ -61,4 +61,4 @@ def trial_of(
         at = nominal_cache.settled(plain, before, start, nominal)
         found = nominal_cache.characteristics(plain, before, start, nominal, at)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
-    return Setup(Trial(campaign, recorded, tuple(held)), untested)
+    return Setup(Trial.of(campaign, recorded, tuple(held)), untested)

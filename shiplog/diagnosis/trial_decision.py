@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.diagnosis import placebo, refutation, setup, trial_voyages
+from shiplog.diagnosis import evidence, placebo, refutation, setup, trial_voyages
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.result import Decision
@@ -65,7 +65,7 @@ def decided(
         names = _names(done)
         if not names:
             break
-        before, done = names, once({n: done.decision.base.numbers[n] for n in names})
+        before, done = names, once({n: done.decision.shown.found.numbers[n] for n in names})
         if set(before) == set(_names(done)):
             break
     return done
@@ -78,13 +78,12 @@ def _names(done: Decided) -> list[str]:
 def _once(
     run: Run, made: setup.Setup, cut: Windows | None, reach: Callable[[str], None]
 ) -> Decided:
-    trial = made.trial
+    trial, point = evidence.begin(made.trial, run.extension_numbers())
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
         listed(trial.record.names, most=4), run.name, len(trial.rows), trial.grid.seconds,
         trial.reference.counts,
     )  # fmt: skip
-    point = trial.begin(run.extension_numbers())
     judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
     reach("hypotheses")
     search = Search(trial, point, placebo.placebos(trial.campaign))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import StoreError
 from shiplog.models import mmg
 from shiplog.models.causes import Cause, Setting, constants_of
@@ -72,7 +72,7 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
     return windows.cut(rows, planned, run.config.window, profile.actuator_names, profile.wind_names)
 
 
-def simulator(run: Run, trial: TrialEvidence) -> ExtendedSimulator:
+def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
     """What judges in a trial, with what the run has of causes, as it stands before any more."""
     if run.judges_itself:
         return run.extended(run.config.seeds[0], trial.record)

@@ -12,8 +12,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from shiplog.diagnosis import likelihood
-from shiplog.diagnosis.evidence import NOISE_FACTORS, TrialEvidence
-from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.nominal_reference import Reference
@@ -21,6 +19,7 @@ from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
 REACH_LENGTHS = 0.5  # lengths from midship
+NOISE_FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of process noise, to start from
 
 
 @dataclass(frozen=True)
@@ -36,23 +35,16 @@ class Pulses:
     unit: np.ndarray
 
 
-def pulses(
-    trial: TrialEvidence, point: Point, base: Found, usual: np.ndarray | None = None
-) -> Pulses:
-    """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
-    as no other process noise does. Estimated from the residual.
-
-    usual    acceleration [3] of nominal process noise at one place; None without any
-    """
-    left, d = trial.left(point.linear, trial.solved(point, base))
-    return pulses_of(left, d, trial.reference, trial.process_noise, trial.weight, usual)
-
-
 def pulses_of(
     linear: Linear, d: np.ndarray, ref: Reference, process_noise: ProcessNoise, weight: np.ndarray,
     usual: np.ndarray | None = None,
 ) -> Pulses:  # fmt: skip
-    """The same of a pass whose numbers are d [C], its segments of a `weight` [S]."""
+    """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
+    as no other process noise does. Estimated from the residual.
+
+    d       [C] numbers of the pass; weight [S] of its segments
+    usual   acceleration [3] of nominal process noise at one place; None without any
+    """
     kept = weight > 0.0  # a segment that says nothing has no likelihood
     linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
@@ -95,25 +87,6 @@ def pulses_of(
     lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
     one = -float(finer.fun)
     return Pulses(one, one - by_channel, lever, force, across + lever * turning)
-
-
-def pulse_force(
-    trial: TrialEvidence, point: Point, base: Found, pulses: Pulses
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N."""
-    process_noise = trial.process_noise.times(base.noise_factor)
-    left = trial.left(point.linear, trial.solved(point, base))
-    z, covariance = likelihood.starts_and_knots(*left, process_noise)
-    knots = trial.grid.knots
-    kernel = process_noise.kernel(knots)
-    pulse = replace(process_noise, push=1e-9 * process_noise.push).kernel(knots)
-    share = pulse @ np.linalg.inv(kernel)
-    pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
-    sway = slice(knots, 2 * knots)
-    beyond = (pulse - share @ pulse)[sway, sway]
-    known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
-    variance = np.diagonal(known + beyond, axis1=1, axis2=2)
-    return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
 
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:

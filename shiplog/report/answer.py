@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shiplog.diagnosis import error_location, next_manoeuvre, segments
-from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.trial import Trial
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.simulation.error_reduction import Gain
@@ -40,8 +40,8 @@ class DiagnosedTrial:
     verdict: Verdict
     folder: Path
     decision: Decision | None = None
-    trial: TrialEvidence | None = None
-    seen: tuple[TrialEvidence, Decision] | None = None
+    trial: Trial | None = None
+    seen: tuple[Trial, Decision] | None = None
     whole: Linear | None = None
     held: HeldOut | None = None
     after: ExtendedSimulator | None = None
@@ -80,7 +80,7 @@ class Context:
 
 
 def verdict(
-    trial: TrialEvidence,
+    trial: Trial,
     decision: Decision,
     found: Gain | None,
     held: HeldOut | None,
@@ -97,7 +97,7 @@ def verdict(
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
     unavailable = verdicts.rejected_json(context.untested)
-    advised = next_manoeuvre.advice(trial, decision.named, decision.first.numbers)
+    advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.pulses is not None:
         times = error_location.pulses(trial, decision, decision.pulses)
@@ -109,8 +109,8 @@ def verdict(
     sentence = f"{context.lost}: no cause can be named."
     if not context.lost:
         sentence = verdicts.sentence(
-            word, causes, structure, found, decision.noise_factor, context.alone, ranking,
-            context.wrong,
+            word, causes, structure, found, decision.shown.found.noise_factor, context.alone,
+            ranking, context.wrong,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
@@ -135,7 +135,7 @@ def verdict(
     )
 
 
-def of_physics(run: Run, trial: TrialEvidence, found: Gain | None) -> list[str]:
+def of_physics(run: Run, trial: Trial, found: Gain | None) -> list[str]:
     """Notes for a network: which MMG the causes were tested on, and their gain there."""
     where = "these voyages" if trial.reference.adapts else "the network's training voyages"
     notes = [

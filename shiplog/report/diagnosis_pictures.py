@@ -10,14 +10,14 @@ import polars as pl
 from shiplog.channels import STATE, VELOCITY
 from shiplog.diagnosis import (
     external_forces,
+    intermittent,
     linearisation,
     residual_acceleration,
-    unrecorded_thruster,
 )
-from shiplog.diagnosis.evidence import TrialEvidence
 from shiplog.diagnosis.measurement_correction import corrected
 from shiplog.diagnosis.residual_acceleration import around
 from shiplog.diagnosis.result import PULSES, Decision
+from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import listed
 from shiplog.report import page, viewer
 from shiplog.report.answer import DiagnosedTrial
@@ -72,10 +72,9 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     assert done.seen is not None and done.whole is not None
     (trial, decision), whole = done.seen, done.whole
     ref, record = trial.reference, trial.record
-    nominal, process_noise = (
-        ref.mean * ref.columns.unit,
-        trial.process_noise.times(decision.nothing.noise_factor),
-    )
+    nothing = decision.nothing
+    nominal = ref.mean * ref.columns.unit
+    process_noise = trial.process_noise(nothing.remainder).times(nothing.found.noise_factor)
     found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
     keep = residual_acceleration.once(found)
     order = np.argsort(found.rows[keep])
@@ -102,10 +101,10 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     return pl.concat(tables), tuple(names)
 
 
-def _caused(trial: TrialEvidence, decision: Decision, rows: np.ndarray) -> np.ndarray:
+def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     """ν̇ [n, 3] that the named causes add where the ship was: a wrong instrument adds none."""
     ref = trial.reference
-    fixed = dict(decision.first.numbers)
+    fixed = dict(decision.nothing.point.numbers)
     named = {n.cause.label: n.numbers for n in decision.named if n.cause.kind != "sensor"}
     nominal = np.concatenate((ref.theta, np.zeros(ref.columns.linearised - ref.columns.base)))
     nominal += (ref.mean * ref.columns.unit)[: len(nominal)]
@@ -128,12 +127,10 @@ def _caused(trial: TrialEvidence, decision: Decision, rows: np.ndarray) -> np.nd
     return acceleration(fixed | named) - acceleration(fixed)
 
 
-def _pulses(trial: TrialEvidence, decision: Decision) -> np.ndarray:
+def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.pulses is not None
-    force, _ = unrecorded_thruster.pulse_force(
-        trial, decision.point, decision.base, decision.pulses
-    )
+    force, _ = intermittent.pulse_force(trial, decision.shown, decision.pulses)
     apart = round(trial.record.timescale.knot / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
     whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force

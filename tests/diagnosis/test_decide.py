@@ -5,9 +5,9 @@ import pytest
 import weighed
 
 from shiplog.diagnosis import decide as deciding
-from shiplog.diagnosis import thresholds
+from shiplog.diagnosis import fits, thresholds
 from shiplog.diagnosis.decide import decide
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
@@ -36,13 +36,13 @@ def test_one_name(trial):
     assert one.numbers == pytest.approx([weighed.SIZE])
     assert one.covariance.shape == (1, 1)
     assert found.structure is None and found.pulses is None
-    assert found.base.numbers.keys() == {"drag"}
+    assert found.shown.included == ("drag",)
 
 
 def test_two_names_each_with_its_own_part_of_the_covariance(trial):
     made = weighed.search(trial, {(("drag", "two"), NOMINAL): 1.0})
     whole = np.array([[4.0, 1.0, 2.0], [1.0, 9.0, 3.0], [2.0, 3.0, 16.0]])
-    made.found[("drag", "two"), NOMINAL].found.covariance[:] = whole
+    made.table.found[("drag", "two"), NOMINAL].found.covariance[:] = whole
     decision, _ = decide(made)
     assert named(decision) == ["drag", "two"]
     drag, two = decision.named
@@ -55,7 +55,7 @@ def test_neither_of_two_is_named(trial):
     assert (found.verdict, named(found)) == ("undecided", [])
     assert list(found.ranking)[:2] == ["drag", "load"]
     # neither is shown: the numbers are of nothing
-    assert found.base.numbers == {}
+    assert found.shown.included == ()
 
 
 def test_a_name_that_is_sure_beside_one_that_is_not(trial):
@@ -90,7 +90,8 @@ def test_a_kind_of_remainder_is_unknown_and_says_its_family(trial, kind, family)
     assert found.structure.family == family
     assert found.structure.evidence == pytest.approx(37.0)
     assert set(found.structure.acts_on) <= {"surge", "sway", "yaw_rate"}
-    assert trial.remainder == Remainder(kind, 3.0)  # what is drawn afterwards includes it
+    # what is drawn afterwards includes it
+    assert found.shown.remainder == found.nothing.remainder == Remainder(kind, 3.0)
 
 
 def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
@@ -113,11 +114,11 @@ def test_a_cause_that_the_remainder_imitates_is_not_named_beside_it(
     reported."""
     asked = []
 
-    def imitated(self, point, base, label, remainder):
-        asked.append((label, remainder.kind))
+    def imitated(of, fit, label):
+        asked.append((label, fit.remainder.kind))
         return share
 
-    monkeypatch.setattr(type(trial), "imitated", imitated)
+    monkeypatch.setattr(fits, "imitated", imitated)
     sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
     found = verdict(trial, sure, evidence={(DRAG, "time"): 80.0, (DRAG, NOMINAL): 70.0})
     assert found.verdict == word
@@ -139,6 +140,9 @@ def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, mon
         assert found.verdict == wanted
         assert (found.pulses is PULSES) == device
         assert (found.structure is None) == device
+        pulse = PULSES.unit * PULSES.force  # that the process noise has from then on
+        assert found.shown.remainder.pulse == (tuple(pulse) if device else None)
+        assert found.nothing.remainder == found.shown.remainder
 
 
 def test_a_refuted_name_is_not_named_and_its_reason_is_kept(trial):

@@ -8,7 +8,7 @@ from straight import CAUSES, One
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import Priors, form_error, name_of
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.models import causes
 
 FAMILIES = ("motion", "wind", "position")

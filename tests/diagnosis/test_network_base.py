@@ -11,9 +11,11 @@ from pipelines.diagnose import diagnose_run
 from pipelines.experiments.simulated_ship import cases, sensors
 from pipelines.prepare import ingest_logs
 from pipelines.train import train_run
-from shiplog.diagnosis import network_base, setup
+from shiplog.diagnosis import evidence, fits, network_base, setup
 from shiplog.diagnosis import trial_voyages as trials
+from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.held_out import HeldOut
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.setup import trial_of
 from shiplog.diagnosis.trial_voyages import in_ship_time, record_of
 from shiplog.exceptions import RunError
@@ -57,7 +59,7 @@ def afloat(tmp_path_factory):
         done = diagnose_run(run.path, store, names, work / "out")
     return SimpleNamespace(
         work=work, run=run, names=names, case=case, recorded=recorded, done=done,
-        trial=done.trial, untested=made[0].untested, point=done.decision.first,
+        trial=done.trial, untested=made[0].untested, point=done.decision.nothing.point,
         decision=replace(done.decision, adapted=False), network=done.held.own, held=done.held,
     )  # fmt: skip
 
@@ -92,8 +94,9 @@ def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat
     assert ref.learned and ref.columns.base == len(ref.theta) > 0
     count = ref.columns.linearised
     assert ref.misfit.count == ref.columns.misfit == len(ref.columns.unit) - count > 0
-    base, _ = trial.scan(afloat.point, ())
-    d = trial.solved(afloat.point, base)
+    base, _ = evidence.scan(trial, afloat.point, ())
+    fit = Fit(afloat.point, base, Remainder())
+    d = fits.solved(trial, fit)
     left, own_numbers = trial.left(afloat.point.linear, d)
     weights = d[count:]
     pushed = ref.misfit.pushed(afloat.point.linear.cut, trial.grid) @ weights
@@ -102,7 +105,7 @@ def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat
     )
     assert left.e == pytest.approx(wanted) and own_numbers == pytest.approx(d[:count])
     assert np.abs(pushed).max() > 0.0
-    moved = trial.coefficients(afloat.point, base)
+    moved = fits.coefficients(trial, fit)
     assert moved == pytest.approx(ref.theta + d[: ref.columns.base])
 
 
@@ -111,23 +114,18 @@ def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     trial, seen = afloat.network.beside(afloat.decision)
     assert seen.named == afloat.decision.named
     (one,) = seen.named
-    assert seen.point.numbers["current"] == pytest.approx(one.numbers)
-    assert seen.base.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
-    assert seen.first.numbers == {} and seen.nothing.numbers == {}
+    assert seen.shown.point.numbers["current"] == pytest.approx(one.numbers)
+    assert seen.shown.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
+    assert seen.nothing.point.numbers == {} and seen.nothing.included == ()
     ref, base = trial.reference, trial.reference.model.base
-    d = trial.level(seen.point, seen.noise_factor, ("current",)).solution
+    d = fits.solution(trial, seen.shown).solution
     weights = d[ref.columns.linearised : len(ref.columns.unit)]
-    assert trial.coefficients(seen.point, seen.base) == pytest.approx(ref.misfit.bends(weights))
+    assert fits.coefficients(trial, seen.shown) == pytest.approx(ref.misfit.bends(weights))
     assert np.abs(weights).max() > 0.0 and base.bent is None
     assert (trial.rows == afloat.trial.rows).all()
     assert afloat.network.beside(afloat.decision)[0] is trial
-    kept, left_out = afloat.trial.weight, afloat.trial.weight.copy()
-    left_out[3] = 0.0
-    try:
-        afloat.trial.weight = left_out
-        again, _ = network_base.Own(afloat.run, afloat.trial).beside(afloat.decision)
-    finally:
-        afloat.trial.weight = kept
+    less = afloat.trial.leaving_out(np.arange(len(trial.rows)) == 3)
+    again, _ = network_base.Own(afloat.run, less).beside(afloat.decision)
     assert (again.weight == 0.0).nonzero()[0].tolist() == [3]
 
 
@@ -143,9 +141,8 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
         assert np.abs(one - whole).max() > 1e-3 * np.abs(whole).max()
     assert np.abs(bends - bent).max() > 1e-3 * np.abs(whole).max()
     assert not np.allclose(numbers["current"], others["current"], rtol=1e-6)
-    alone, _ = afloat.trial.without(
-        decision.point, ("current",), decision.noise_factor, decision.point.linear.cut.voyage == 0
-    )
+    out = decision.shown.point.linear.cut.voyage == 0
+    alone, _ = fits.without(afloat.trial, decision.shown, out)
     assert numbers["current"] == pytest.approx(alone["current"])
 
 
@@ -199,7 +196,7 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     """Extended, saved, loaded: the same rollouts; diagnosed again it is what is bent further."""
     held, cut, before = afloat.held, afloat.held.cut, afloat.held.before
     decision = afloat.decision
-    alone = replace(decision, named=(), point=decision.first, base=decision.nothing, adapted=True)
+    alone = replace(decision.unnamed, adapted=True)
     after = held.extended(alone)
     assert np.abs(after.model.base.bent).max() > 0.0
     assert not np.allclose(after.losses(cut), before.losses(cut), rtol=1e-3)

@@ -9,7 +9,7 @@ from straight import CAUSES
 
 from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.placebo import placebos
-from shiplog.diagnosis.trial import SIZES
+from shiplog.diagnosis.remainder import SIZES
 
 SHARE = 0.5
 

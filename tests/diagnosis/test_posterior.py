@@ -9,7 +9,7 @@ from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import name_of
 from shiplog.diagnosis.posterior import best_with, of_one_device, posterior, share_of_causes
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.models import causes
 from shiplog.models.causes import Setting
 
@@ -62,7 +62,7 @@ def test_what_is_below_practical_size_is_no_change(trial):
     found = posterior(made)
     assert found.names == pytest.approx({"load": 0.25, "clock": 0.18})
     assert found.none == pytest.approx(0.45)  # its hypotheses with a remainder are not nothing
-    assert posteriors.practical(made, made.found[("drag", "load"), NOMINAL]) == LOAD
+    assert posteriors.practical(made.table, made.table.found[("drag", "load"), NOMINAL]) == LOAD
     assert posterior(weighed.search(trial, MIXED, sizes={"drag": -0.11})).none == pytest.approx(
         0.05
     )
@@ -126,12 +126,12 @@ def test_share_of_what_is_explained_by_causes(trial):
         trial, {(DRAG, "position"): 0.9, (DRAG, NOMINAL): 0.05, (DRAG, RAISED): 0.05},
         evidence={(DRAG, "position"): 50.0, (DRAG, NOMINAL): 4.0, (DRAG, RAISED): 10.0},
     )  # fmt: skip
-    of = both.found
-    assert share_of_causes(both, of[DRAG, "position"]) == pytest.approx(0.2)
-    assert share_of_causes(both, of[DRAG, RAISED]) == pytest.approx(1.0)
-    assert share_of_causes(both, of[(), NOMINAL]) == 1.0  # nothing is explained
+    of = both.table.found
+    assert share_of_causes(both.table, of[DRAG, "position"]) == pytest.approx(0.2)
+    assert share_of_causes(both.table, of[DRAG, RAISED]) == pytest.approx(1.0)
+    assert share_of_causes(both.table, of[(), NOMINAL]) == 1.0  # nothing is explained
     del of[DRAG, NOMINAL], of[DRAG, RAISED]
-    assert share_of_causes(both, of[DRAG, "position"]) == 0.0
+    assert share_of_causes(both.table, of[DRAG, "position"]) == 0.0
 
 
 # --- one device

@@ -6,7 +6,7 @@ import pytest
 import weighed
 
 from shiplog.diagnosis.refutation import judged
-from shiplog.diagnosis.trial import NOMINAL, RAISED
+from shiplog.diagnosis.remainder import NOMINAL, RAISED
 from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)

@@ -1,5 +1,6 @@
 """A search over hypotheses finds what was hidden, whatever the catalogue's order."""
 
+import math
 from dataclasses import replace
 from itertools import combinations
 
@@ -8,13 +9,15 @@ import pytest
 import straight
 from straight import CAUSES
 
+from shiplog.diagnosis import evidence, fits, hypotheses, weighing
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Point
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, Remainder
 from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.weighing import weigh
 
 TOLD = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2
@@ -45,13 +48,19 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
         j[..., columns.of[other]] += j[..., columns.of[one]]
         given = replace(given, j=j)
     given = replace(given, e=given.e + given.j @ numbers_of(columns, hidden))
-    trial = straight.Straight(usual, record, given, tuple(fixed or {}))
-    return trial, trial.begin({n: np.asarray(v) for n, v in (fixed or {}).items()})
+    trial = straight.trial(usual, record, given, tuple(fixed or {}))
+    return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
+
+
+def search_of(trial, point, placebo=None, banned=()) -> Search:
+    made = Search(trial, point, placebo or {}, banned)
+    made.table.intermittent = straight.no_hull
+    return made
 
 
 def searched(hidden, placebo=None, banned=(), **setting) -> Search:
     trial, point = trial_with(hidden, **setting)
-    found = Search(trial, point, placebo or {}, banned)
+    found = search_of(trial, point, placebo, banned)
     found.run()
     return found
 
@@ -62,12 +71,14 @@ def one():
 
 
 def test_a_hidden_cause_is_found_and_sized(one):
-    best = one.ranked()[0]
+    best = one.table.ranked()[0]
     assert (best.causes, best.kind) == (("drag",), NOMINAL)
     spread = float(np.sqrt(best.found.covariance[0, 0]))
     assert best.found.numbers["drag"][0] == pytest.approx(1.2, abs=4.0 * spread)
     assert spread < 0.2
-    assert one.alone["drag"] > 20.0 > max(v for k, v in one.alone.items() if k != "drag")
+    assert (
+        one.table.alone["drag"] > 20.0 > max(v for k, v in one.table.alone.items() if k != "drag")
+    )
     assert set(one.told) == {cause.label for cause in CAUSES}
     decision, found = decide(one)
     assert decision.verdict == "named"
@@ -78,9 +89,9 @@ def test_a_hidden_cause_is_found_and_sized(one):
 def test_the_order_of_the_catalogue_does_not_matter(one):
     """The same data with its causes in reverse: the same hypotheses with the same probabilities."""
     other = searched({"drag": [1.2]}, causes=CAUSES[::-1])
-    assert set(other.found) == set(one.found)
-    for key, hypothesis in one.found.items():
-        assert other.found[key].score == pytest.approx(hypothesis.score, abs=1e-4)
+    assert set(other.table.found) == set(one.table.found)
+    for key, hypothesis in one.table.found.items():
+        assert other.table.found[key].score == pytest.approx(hypothesis.score, abs=1e-4)
     assert posteriors.posterior(other).ranking() == pytest.approx(
         posteriors.posterior(one).ranking(), abs=1e-6
     )
@@ -90,19 +101,19 @@ def test_the_order_of_the_catalogue_does_not_matter(one):
 def test_two_hidden_causes_are_both_found(hidden):
     sizes = {"two": [1.2, -3.0], "drag": [-1.2], "load": [1.0]}
     found = searched({n: sizes[n] for n in hidden})
-    best = found.ranked()[0]
+    best = found.table.ranked()[0]
     assert best.causes == tuple(sorted(hidden))
     for label in hidden:
         assert np.sign(best.found.numbers[label]).tolist() == np.sign(sizes[label]).tolist()
     decision, _ = decide(found)
     assert {n.cause.label for n in decision.named} == set(hidden)
     # the set without either was weighed as well
-    assert {((label,), NOMINAL) for label in hidden} & set(found.found)
+    assert {((label,), NOMINAL) for label in hidden} & set(found.table.found)
 
 
 def test_nothing_hidden_is_nothing():
     found = searched({})
-    assert found.ranked()[0].causes == ()
+    assert found.table.ranked()[0].causes == ()
     decision, weighed = decide(found)
     assert not decision.named
     assert max(weighed.names.values(), default=0.0) < 0.5
@@ -123,27 +134,29 @@ def test_a_placebo_is_taken_off(one):
     """What a nominal voyage has of a cause is subtracted from what the trial has of it."""
     wanted = 3.0
     less = searched({"drag": [1.2]}, {"drag": wanted, "position": 2.0})
-    for (labels, kind), hypothesis in less.found.items():
-        if (labels, kind) in one.found and len(labels) < 2:
+    for (labels, kind), hypothesis in less.table.found.items():
+        if (labels, kind) in one.table.found and len(labels) < 2:
             off = wanted * ("drag" in labels) + 2.0 * (kind == "position")
-            assert one.found[labels, kind].score - hypothesis.score == pytest.approx(off, abs=1e-3)
+            assert one.table.found[labels, kind].score - hypothesis.score == pytest.approx(
+                off, abs=1e-3
+            )
     gone = searched({"drag": [1.2]}, {"drag": 500.0})
-    assert "drag" not in {n for h in gone.ranked()[:1] for n in h.causes}
+    assert "drag" not in {n for h in gone.table.ranked()[:1] for n in h.causes}
 
 
 def test_what_is_banned_is_not_in_any_hypothesis():
     found = searched({"drag": [1.2]}, banned=("drag",))
-    assert not [labels for labels, _ in found.found if "drag" in labels]
-    assert "drag" not in found.priors.each
+    assert not [labels for labels, _ in found.table.found if "drag" in labels]
+    assert "drag" not in found.table.priors.each
 
 
 def test_what_a_model_has_already_stays_beside_what_is_found():
     """An extended model: its own cause stands at its numbers in every hypothesis."""
     found = searched({"drag": [1.2], "load": [1.0]}, fixed={"drag": [1.2]})
-    best = found.ranked()[0]
+    best = found.table.ranked()[0]
     assert best.causes == ("load",)
-    assert not [labels for labels, _ in found.found if "drag" in labels]
-    for hypothesis in found.found.values():
+    assert not [labels for labels, _ in found.table.found if "drag" in labels]
+    for hypothesis in found.table.found.values():
         assert hypothesis.found.numbers["drag"] == pytest.approx([1.2], abs=1e-4)
     decision, _ = decide(found)
     assert [n.cause.label for n in decision.named] == ["load"]
@@ -159,62 +172,64 @@ def pushes() -> np.ndarray:
     return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
 
 
-def test_an_intermittent_force_is_asked_for_beside_no_family():
+def test_an_intermittent_force_is_asked_for_beside_no_family(monkeypatch):
     """Where the process noise is raised, whatever was tried before it."""
-    asked = []
+    asked, real = [], fits.changed
 
-    def intermittent(point, base):
-        asked.append(trial.remainder)
-        return straight.Straight.intermittent(trial, point, base)
+    def no_force(fit):
+        asked.append(fit.remainder)
+        return straight.no_hull(fit)
 
     more = pushes()
     for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
         asked.clear()
         trial, point = trial_with({}, pushed=more)
-        trial.intermittent = intermittent
-        real = trial.changed
-        trial.changed = lambda p, level, labels, family, real=real, gain=gain, last=last: (
-            (gain, 3.0) if family == last else real(p, level, labels, family)
-        )
-        found = Search(trial, point, {})
-        found.weigh((), {}, point)
-        assert found.found[(), "raised"].found.noise_factor > 1.5
+        monkeypatch.setattr(
+            fits, "changed", lambda *given, gain=gain, last=last: (
+                (gain, 3.0) if given[4] == last else real(*given)
+            )
+        )  # fmt: skip
+        table = search_of(trial, point).table
+        table.intermittent = no_force
+        weigh(table, (), {}, point)
+        assert table.found[(), RAISED].found.noise_factor > 1.5
         assert asked == [Remainder(INTERMITTENT)]
-        assert ((), INTERMITTENT) not in found.found  # it gains nothing: it is raised noise
+        assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
 
 
 @pytest.mark.parametrize("gain", [40.0, -1.0])
 def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
     trial, point = trial_with({}, pushed=pushes())
-    trial.intermittent = lambda point, base: Pulses(0.0, gain, 0.0, 1.0, np.zeros(3))
-    found = Search(trial, point, {})
-    found.weigh((), {}, point)
+    table = search_of(trial, point).table
+    table.intermittent = lambda fit: Pulses(0.0, gain, 0.0, 1.0, np.zeros(3))
+    weigh(table, (), {}, point)
     if gain < 0.0:
-        assert ((), INTERMITTENT) not in found.found
+        assert ((), INTERMITTENT) not in table.found
         return
-    one, raised = found.found[(), INTERMITTENT], found.found[(), "raised"]
+    one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
     assert one.evidence - raised.evidence == pytest.approx(gain)
     assert one.score - raised.score == pytest.approx(gain)
 
 
 @pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
-def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(gain, noisy):
+def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
+    gain, noisy, monkeypatch
+):
     """What gains a little beside noise that explains much is fitted to that noise."""
     trial, point = trial_with({}, pushed=pushes())
-    trial.campaign = replace(trial.campaign, noise=0.05)  # its parts have the same noise
-    trial.changed = lambda p, level, labels, family: (gain, 3.0)
-    found = Search(trial, point, {})
-    trial.remainder = Remainder("raised")
-    levels = found.levels_of(point, (), 1.0)
+    trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
+    monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
+    levels = weighing.nominal_levels(trial, point, (), 1.0)
     raised = max(level.value for level in levels)
-    usual = max(
-        level.value
-        - trial.expected(level.noise_factor, Remainder("raised"))
-        + trial.expected(level.noise_factor, Remainder())
+    usual = weighing.best(trial, levels, NOMINAL).value
+    wanted = max(
+        level.value - 0.5 * (math.log(level.noise_factor) / 0.05) ** 2
+        + 0.5 * math.log(level.noise_factor) ** 2 + math.log(1.0 / 0.05)
         for level in levels
-    )
+    )  # fmt: skip
+    assert usual == pytest.approx(wanted)
     assert usual + 2.0 < raised < usual + 60.0
-    change = found.changed(point, (), levels, "time")
+    change = weighing.changed(trial, point, (), levels, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == pytest.approx((raised if noisy else usual) + gain)
 
@@ -242,44 +257,29 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     without the strongest the third is weighed, which was not worth a look beside it."""
     monkeypatch.setattr(searching, "CONTENDERS", 1)
     found = searched({"drag": [1.2]}, alike=("drag", "load", 0.7))
-    assert found.ranked()[0].causes == ("drag",)
-    weighed = {h.causes for h in found.ranked()}
+    assert found.table.ranked()[0].causes == ("drag",)
+    weighed = {h.causes for h in found.table.ranked()}
     assert ("load",) not in weighed
     found.without("drag")
-    assert all("drag" not in h.causes for h in found.ranked())
-    assert found.ranked()[0].causes == ("load",)
+    assert found.table.ranked(found.banned)[0].causes == ("load",)
+    assert all("drag" not in h.causes for h in posteriors.posterior(found).hypotheses)
     assert set(found.scanned) == {c.label for c in CAUSES}
-
-
-def test_without_a_cause_the_process_noise_is_the_usual_one_again():
-    """A verdict leaves its pulses in the trial's process noise; the next search begins without."""
-    found = searched({"drag": [1.2]})
-    trial = found.trial
-    usual = trial.process_noise
-    trial.process_noise = replace(usual, pulse=np.array([0.0, 0.02, 0.0]))
-    found.without("load")
-    assert trial.process_noise is trial.reference.process_noise is usual
-    again = searched({"drag": [1.2]})
-    again.without("load")
-    assert {key: h.score for key, h in found.found.items()} == pytest.approx(
-        {key: h.score for key, h in again.found.items()}
-    )
 
 
 @pytest.mark.parametrize("kept", [1, 2])
 def test_what_is_far_behind_keeps_its_place_and_not_its_linearisation(monkeypatch, kept):
     """The same hypotheses, with the same scores, and the same decision."""
     whole = searched({"drag": [1.2], "load": [1.2]})
-    monkeypatch.setattr(searching, "KEPT_LINEARISATIONS", kept)
+    monkeypatch.setattr(hypotheses, "KEPT_LINEARISATIONS", kept)
     found = searched({"drag": [1.2], "load": [1.2]})
-    linearised = {id(h.point) for h in found.found.values() if isinstance(h.point, Point)}
-    assert len(linearised) == kept < len({id(h.point) for h in whole.found.values()})
-    assert {key: h.score for key, h in found.found.items()} == pytest.approx(
-        {key: h.score for key, h in whole.found.items()}
+    linearised = {id(h.point) for h in found.table.found.values() if isinstance(h.point, Point)}
+    assert len(linearised) == kept < len({id(h.point) for h in whole.table.found.values()})
+    assert {key: h.score for key, h in found.table.found.items()} == pytest.approx(
+        {key: h.score for key, h in whole.table.found.items()}
     )
-    assert isinstance(found.nothing.point, Point)
-    far = next(h for h in found.ranked()[::-1] if h.causes)
-    assert set(found.point(far).numbers) == set(far.causes)
+    assert isinstance(found.table.nothing.point, Point)
+    far = next(h for h in found.table.ranked()[::-1] if h.causes)
+    assert set(found.table.fit(far).point.numbers) == set(far.causes)
     (one, _), (other, _) = decide(found), decide(whole)
     named = {n.cause.label: n.numbers for n in other.named}
     assert {n.cause.label for n in one.named} == set(named) == {"drag", "load"}

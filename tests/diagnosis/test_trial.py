@@ -10,12 +10,11 @@ import straight
 from scipy.stats import multivariate_normal, norm
 from straight import CAUSES, PROCESS_NOISE
 
-from shiplog.diagnosis import campaign_parts
-from shiplog.diagnosis import trial as trials
+from shiplog.diagnosis import campaign_parts, evidence, fits, remainder
 from shiplog.diagnosis.discrepancy import EVEN
-from shiplog.diagnosis.evidence import TrialEvidence as Former
+from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
-from shiplog.diagnosis.trial import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 
 SHARE = 0.5  # of itself that the trial counts
 DRAG = 1.5  # three realistic sizes, in the trial
@@ -37,7 +36,7 @@ def made():
 
 @pytest.fixture
 def trial(made):
-    return straight.Straight(*made)
+    return straight.trial(*made)
 
 
 def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None):
@@ -91,8 +90,11 @@ def nats(trial, point, noise, included=(), families=(), size=1.0) -> float:
 
 
 def level(trial, point, noise, included=(), kind=NOMINAL, size=1.0):
-    trial.remainder = Remainder(kind, size)
-    return trial.level(point, noise, included)
+    return evidence.level(trial, point, noise, included, Remainder(kind, size))
+
+
+def of_noise(trial, noise, beside=Remainder()):  # noqa: B008
+    return remainder.expected(noise, trial.usual_spread, beside)
 
 
 HYPOTHESES = (
@@ -110,7 +112,7 @@ def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
     differences = []
     for included, kind, size in HYPOTHESES[1:]:
         found = level(trial, point, noise, included, kind, size).value - nothing.value
-        found -= trial.expected(noise, Remainder(kind)) - trial.expected(noise, Remainder())
+        found -= of_noise(trial, noise, Remainder(kind)) - of_noise(trial, noise)
         families = () if kind == NOMINAL else (kind,)
         wanted = nats(trial, point, noise, included, families, size) - usual
         assert found == pytest.approx(wanted, abs=1e-5 * abs(usual) / 100.0)
@@ -128,15 +130,17 @@ def test_a_hypothesis_that_was_linearised_elsewhere_has_the_same_evidence(trial)
     assert other.value == pytest.approx(one.value, abs=1e-6)
     wanted = nats(trial, there, 1.0, ("drag",)) - nats(trial, here, 1.0)
     assert other.value - level(trial, here, 1.0).value == pytest.approx(wanted, abs=1e-4)
-    moved, _ = trial.numbers_of(other, there, ("drag",))
-    stood, _ = trial.numbers_of(one, here, ("drag",))
+    moved, _ = evidence.numbers_of(trial, other, there, ("drag",))
+    stood, _ = evidence.numbers_of(trial, one, here, ("drag",))
     assert moved["drag"] == pytest.approx(stood["drag"], rel=1e-6)
 
 
 def test_numbers_are_the_dense_posteriors(trial):
     """Mean and covariance of drag and of both numbers of `two`, by conditioning."""
     point, included = trial.at({}), ("two", "drag")
-    found, covariance = trial.numbers_of(level(trial, point, 1.0, included), point, included)
+    found, covariance = evidence.numbers_of(
+        trial, level(trial, point, 1.0, included), point, included
+    )
     e, j, x, _, c, mean, usual, _, _, _ = gaussian(trial, point, 1.0, included)
     whole = c / SHARE + j @ usual @ j.T + x @ x.T
     gain = np.linalg.solve(whole, x).T
@@ -152,10 +156,12 @@ def test_numbers_are_the_dense_posteriors(trial):
 
 def test_a_fixed_cause_stays_where_it_is(made):
     """As an extended model has it: no prior of its own pulls it back, and no data move it."""
-    trial = straight.Straight(*made, ("drag",))
+    trial = straight.trial(*made, ("drag",))
     stands = {"drag": np.array([0.7])}
     point = trial.at(stands)
-    found, covariance = trial.numbers_of(level(trial, point, 1.0, ("drag",)), point, ("drag",))
+    found, covariance = evidence.numbers_of(
+        trial, level(trial, point, 1.0, ("drag",)), point, ("drag",)
+    )
     assert found["drag"] == pytest.approx([0.7], abs=1e-5)
     assert covariance[0, 0] < 2.0 / HELD_INFORMATION
     nothing = level(trial, point, 1.0).value
@@ -170,10 +176,10 @@ def test_a_fixed_cause_stays_where_it_is(made):
 def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
     base = level(trial, point, 1.4, included)
-    gained, size = trial.changed(point, base, included, family)
-    each = [level(trial, point, 1.4, included, family, s).value for s in trials.SIZES]
+    gained, size = fits.changed(trial, point, base, included, family, Remainder())
+    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
-    assert size == trials.SIZES[int(np.argmax(each))]
+    assert size == remainder.SIZES[int(np.argmax(each))]
     with_it = nats(trial, point, 1.4, included, (family,), size)
     assert gained == pytest.approx(with_it - nats(trial, point, 1.4, included), abs=1e-3)
 
@@ -181,7 +187,7 @@ def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, fami
 def test_a_change_that_is_there_is_found_at_its_size(made):
     """A push that depends on the place, three times the process noise, in the trial alone."""
     usual, record, _ = made
-    plain = straight.Straight(*made)
+    plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "position")
     rng = np.random.default_rng(5)
     weights = np.zeros(plain.unseen.count)
@@ -190,10 +196,12 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     pushed = plain.unseen.pushed(plain.at({}).linear.cut, plain.grid) @ weights
     columns = straight.columns_of(CAUSES)
     given = straight.passed(record, columns, seed=2, told=0.3, pushed=pushed)
-    trial = straight.Straight(usual, record, given)
+    trial = straight.trial(usual, record, given)
     point = trial.at({})
     base = level(trial, point, 1.0)
-    gained = {name: trial.changed(point, base, (), name) for name in trial.families}
+    gained = {
+        name: fits.changed(trial, point, base, (), name, Remainder()) for name in trial.families
+    }
     best = max(gained, key=lambda name: gained[name][0])
     assert best == "position"
     assert gained[best][0] > 50.0
@@ -202,7 +210,7 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
 
 def test_a_change_acts_on_the_channels_that_it_pushes(made):
     usual, record, _ = made
-    plain = straight.Straight(*made)
+    plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     weights = np.zeros(plain.unseen.count)
     at = (family.columns - plain.unseen.families[0].columns[0])[3 * EVEN["time"] :]
@@ -210,12 +218,10 @@ def test_a_change_acts_on_the_channels_that_it_pushes(made):
     weights[at[each : 2 * each]] = 20.0
     pushed = plain.unseen.pushed(plain.at({}).linear.cut, plain.grid) @ weights
     given = straight.passed(record, straight.columns_of(CAUSES), seed=2, told=0.3, pushed=pushed)
-    trial = straight.Straight(usual, record, given)
+    trial = straight.trial(usual, record, given)
     point = trial.at({})
-    base, _ = trial.scan(point, (), (), 1.0)
-    trial.remainder = Remainder(RAISED)
-    assert trial.acts_on(point, base, "time") == ("sway",)
-    assert trial.remainder == Remainder(RAISED)
+    base, _ = evidence.scan(trial, point, (), (), 1.0)
+    assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
 
 
 @pytest.mark.parametrize(
@@ -225,7 +231,7 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     """A cause that pushes as a function of time does, and so much besides as nothing else does.
     What is not pushed at the knots, where process noise pushes too, is felt far more."""
     usual, record, given = made
-    plain = straight.Straight(*made)
+    plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     at = family.columns - plain.unseen.families[0].columns[0]
     pushed = plain.unseen.pushed(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
@@ -234,36 +240,36 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     rest = np.random.default_rng(11).standard_normal(does.shape) * weight
     j, columns = given.j.copy(), straight.columns_of(CAUSES)
     j[..., columns.of["drag"][0]] = 30.0 * (does + own * rest)
-    trial = straight.Straight(usual, record, replace(given, j=j))
+    trial = straight.trial(usual, record, replace(given, j=j))
     point = trial.at({})
-    base, _ = trial.scan(point, (), ("drag",), 1.0)
+    base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
-    share = trial.imitated(point, base, "drag", Remainder("time", 1e4))
+    share = fits.imitated(trial, Fit(point, base, Remainder("time", 1e4)), "drag")
     assert low <= share <= high
-    assert trial.imitated(point, base, "drag", Remainder(RAISED)) == 0.0
+    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag") == 0.0
 
 
 # --- levels of process noise
 
 
 def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
-    usual = max(trial.campaign.noise, trials.LEAST_SPREAD)
+    usual = max(trial.campaign.noise, remainder.LEAST_SPREAD)
     top = norm(0.0, usual).logpdf(0.0)
     for noise in (0.5, 1.0, 1.3, 4.0):
         at = math.log(noise)
         wanted = norm(0.0, usual).logpdf(at) - top
         for beside in (Remainder(), Remainder("wind", 3.0)):
-            assert trial.expected(noise, beside) == pytest.approx(wanted)
-        wanted = norm(0.0, trials.RAISED_SPREAD).logpdf(at) - top
+            assert of_noise(trial, noise, beside) == pytest.approx(wanted)
+        wanted = norm(0.0, remainder.RAISED_SPREAD).logpdf(at) - top
         for beside in (Remainder(RAISED), Remainder(INTERMITTENT), Remainder("wind", 3.0, True)):
-            assert trial.expected(noise, beside) == pytest.approx(wanted)
+            assert of_noise(trial, noise, beside) == pytest.approx(wanted)
 
 
 def test_campaigns_are_never_quite_alike(made):
     usual, record, given = made
-    trial = straight.Straight(replace(usual, noise=0.0), record, given)
-    wanted = -0.5 * (math.log(1.2) / trials.LEAST_SPREAD) ** 2
-    assert trial.expected(1.2, Remainder()) == pytest.approx(wanted)
+    trial = straight.trial(replace(usual, noise=0.0), record, given)
+    wanted = -0.5 * (math.log(1.2) / remainder.LEAST_SPREAD) ** 2
+    assert of_noise(trial, 1.2) == pytest.approx(wanted)
 
 
 def test_levels_of_noise_differ_as_dense_gaussians_do(made):
@@ -271,12 +277,12 @@ def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     usual, record, given = made
     sure = replace(PROCESS_NOISE, start=np.full(6, 1e-5))
     ref = replace(usual.reference, process_noise=sure)
-    trial = straight.Straight(replace(usual, reference=ref), record, given)
+    trial = straight.trial(replace(usual, reference=ref), record, given)
     point = trial.at({})
     found, wanted = [], []
     for noise in (1.0, 1.4):
         one = level(trial, point, noise)
-        found.append(one.value - trial.expected(noise, Remainder()))
+        found.append(one.value - of_noise(trial, noise))
         e, j, _, _, c, mean, usual_covariance, *_ = gaussian_of(trial, point, noise, sure)
         # of a power of the likelihood log|C| counts for its share, log|C + share·JUJᵀ| whole
         whole = c / SHARE + j @ usual_covariance @ j.T
@@ -299,16 +305,17 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
     """Twice the process noise in the trial: found under a raised remainder, between the steps."""
     usual, record, _ = made
     rng = np.random.default_rng(8)
-    plain = straight.Straight(*made)
+    plain = straight.trial(*made)
     kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.knots))
     more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.knots)) @ kernel.T
     given = straight.passed(record, straight.columns_of(CAUSES), seed=2, told=0.3, pushed=more)
-    trial = straight.Straight(usual, record, given)
-    trial.remainder = Remainder(RAISED)
-    levels = trial.levels(trial.at({}))
+    trial = straight.trial(usual, record, given)
+    raised = Remainder(RAISED)
+    levels = evidence.levels(trial, trial.at({}), remainder=raised)
     best = max(levels, key=lambda one: one.value)
     assert best.noise_factor == pytest.approx(2.0, rel=0.12)
-    near = max(trial.levels(trial.at({}), (), best.noise_factor), key=lambda one: one.value)
+    again = evidence.levels(trial, trial.at({}), (), best.noise_factor, raised)
+    near = max(again, key=lambda one: one.value)
     assert near.noise_factor == pytest.approx(best.noise_factor, rel=0.02)
 
 
@@ -323,18 +330,16 @@ def test_segments_left_out_say_nothing(made):
     spoilt = replace(given, e=np.where(out[:, None, None], 50.0 * given.e + 1.0, given.e))
     found = []
     for one in (given, spoilt):
-        trial = straight.Straight(usual, record, one)
+        trial = straight.trial(usual, record, one)
         point = trial.at({})
-        trial.level(point, 1.0, ())
-        kept = trial.weight.copy()
-        found.append(trial.without(point, ("drag", "two"), 1.0, out))
-        assert (trial.weight == kept).all()
+        fit = Fit(point, evidence.fit(trial, point, ("drag", "two"), 1.0, Remainder()), Remainder())
+        found.append(fits.without(trial, fit, out))
     (numbers, coefficients), (again, others) = found
     for label in ("drag", "two"):
         assert again[label] == pytest.approx(numbers[label], rel=1e-9)
     assert others == pytest.approx(coefficients, rel=1e-9)
-    trial = straight.Straight(usual, record, spoilt)
-    whole = trial.without(trial.at({}), ("drag", "two"), 1.0, np.zeros(8, dtype=bool))[0]
+    trial = straight.trial(usual, record, spoilt)
+    whole = fits.without(trial, fit, np.zeros(8, dtype=bool))[0]
     assert whole["drag"] != pytest.approx(numbers["drag"], rel=0.1)
 
 
@@ -343,18 +348,18 @@ def test_a_few_segments_do_not_decide(made):
     usual, record, given = made
     spoilt = given.e.copy()
     spoilt[3] += 40.0 * straight.NOISE * np.random.default_rng(1).standard_normal((15, 6))
-    trial = straight.Straight(usual, record, replace(given, e=spoilt))
-    trial.robust(trial.at({}))
-    assert trial.weight[3] < 0.05
-    assert (np.delete(trial.weight, 3) > 0.9).all()
+    trial = straight.trial(usual, record, replace(given, e=spoilt))
+    weight = evidence.robust(trial, trial.at({}))
+    assert weight[3] < 0.05
+    assert (np.delete(weight, 3) > 0.9).all()
 
 
 def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
     """What is left of each segment in units of its covariance: weights are by its median."""
     usual, record, given = made
-    trial = straight.Straight(usual, record, given)
+    trial = straight.trial(usual, record, given)
     point = trial.at({})
-    best = max(trial.levels(point), key=lambda one: one.value)
+    best = max(evidence.levels(trial, point), key=lambda one: one.value)
     left = best.solution[: len(trial.reference.pull)]
     ref, chi2 = trial.reference, []
     seen = ref.misfit.pushed(given.cut, trial.grid)
@@ -364,47 +369,52 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
         chi2.append(r @ np.linalg.solve(c, r))
     wanted = np.minimum(1.0, 1.5 * np.median(chi2) / np.array(chi2))
     monkeypatch.setattr(campaign_parts, "ROBUST", 1.5)
-    trial.robust(point)
-    assert trial.weight == pytest.approx(wanted, rel=1e-5)
+    assert evidence.robust(trial, point) == pytest.approx(wanted, rel=1e-5)
 
 
 def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
     """Points come and go while a fit settles, and one may stand where another stood in memory."""
-    trial.at({})
-    here, there = (trial.at({"drag": np.array([size])}) for size in (0.0, 0.5))
-    wanted = trial.total(there, 1.0)[0]
-    assert trial.total(here, 1.0)[0] is trial.total(here, 1.0)[0]  # worked out once
-    assert abs(trial.total(here, 1.0)[0][0, 0] / wanted[0, 0] - 1.0) > 1e-3
+    first, there, last = (trial.at({"drag": np.array([size])}) for size in (0.1, 0.5, 0.7))
+    here = trial.at({"drag": np.array([0.0])})
+    products = straight.trial(trial.campaign, trial.record, trial.given).products
+
+    def total(point):
+        return products.total(point, 1.0, trial.weight, Remainder())[0]
+
+    assert total(first) is total(first)  # worked out once
+    apart, wanted = total(here)[0, 0], total(there)
+    assert abs(apart / wanted[0, 0] - 1.0) > 1e-3
+    total(last)  # of points passes are kept, too: the first one's and two more
     stood, again = id(here.weighed), there.weighed
     del here
-    trial.kept_modes.clear()
     gc.collect()
     others = []
     for _ in range(20000):
         others.append(replace(again))
         if id(others[-1]) == stood:
             break
-    assert trial.total(replace(there, weighed=others[-1]), 1.0)[0] == pytest.approx(wanted)
+    assert total(replace(there, weighed=others[-1])) == pytest.approx(wanted)
 
 
-def test_segments_on_which_the_model_runs_away_carry_no_weight(made, monkeypatch):
+def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     """At the start they are left out; later it is the hypothesis that fails."""
-    usual, record, given = made
-    trial = straight.Straight(usual, record, given)
     lost = np.zeros(8, dtype=bool)
-
-    def at(self, numbers, near=None, noise_factor=None):
-        point = straight.Straight.at(self, numbers, near, noise_factor)
-        return replace(point, linear=replace(point.linear, lost=lost.copy()))
-
-    monkeypatch.setattr(Former, "at", at)
     lost[2] = True
-    trials.Trial.at(trial, {})
-    assert trial.weight.tolist() == [1, 1, 0, 1, 1, 1, 1, 1]
-    assert trial.lost.tolist() == lost.tolist()
-    trial.begun = True
-    trials.Trial.at(trial, {})  # the same one again is no failure
-    lost[5] = True
+    usual, record, given = made
+    away = replace(given, lost=lost)
+    trial, point = evidence.begin(straight.Straight.of(usual, record, given=away), {})
+    assert (trial.weight > 0.0).tolist() == (~lost).tolist()
+    assert trial.begun and point.linear.lost.tolist() == lost.tolist()
+    trial.at({"drag": np.array([0.1])})  # the same one again is no failure
+    worse = replace(away, lost=lost | (np.arange(8) == 5))
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):
-        trials.Trial.at(trial, {"drag": np.array([9.0])})
-    assert trial.weight[5] == 1.0
+        replace(trial, given=worse).at({"drag": np.array([9.0])})
+    assert trial.weight[5] > 0.0
+
+
+def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
+    out = np.arange(8) == 3
+    less = trial.leaving_out(out)
+    assert less.weight.tolist() == (~out).astype(float).tolist()
+    assert trial.weight.tolist() == [1.0] * 8
+    assert less.first is trial.first and less.products is trial.products

@@ -21,6 +21,7 @@ from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from shiplog import profile_file as profiles
 from shiplog.diagnosis import (
+    evidence,
     likelihood,
     linear_segments,
     linearisation,
@@ -110,8 +111,8 @@ def sea(tmp_path_factory):
 
 def judged(campaign, seen):
     """A trial of a record, and the decision before anything was held out."""
-    trial = Trial(campaign, seen)
-    found = search.Search(trial, trial.begin({}), placebo.placebos(campaign))
+    trial, point = evidence.begin(Trial.of(campaign, seen), {})
+    found = search.Search(trial, point, placebo.placebos(campaign))
     found.run()
     return trial, decide(found)[0]
 
@@ -384,16 +385,9 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     weighed = likelihood.Weighed(
         sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
     )
-    trial = SimpleNamespace(
-        reference=SimpleNamespace(
-            model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
-            setting=SimpleNamespace(scale={"length": 3.0}), counts=1.0,
-        ),
-        # an earlier one is no matter
-        process_noise=replace(process_noise, pulse=np.array([9.0, 9.0, 9.0])),
-        weight=np.ones(count),
-        left=lambda *_: (linear, np.zeros(0)),
-        solved=lambda *_: np.zeros(0),
+    reference = SimpleNamespace(
+        model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
+        setting=SimpleNamespace(scale={"length": 3.0}), counts=1.0,
     )  # fmt: skip
     cut = segments.Cut(
         np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
@@ -405,7 +399,9 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
-    found = unrecorded_thruster.pulses(trial, SimpleNamespace(linear=linear), None)
+    # an earlier force is no matter
+    noise = replace(process_noise, pulse=np.array([9.0, 9.0, 9.0]))
+    found = unrecorded_thruster.pulses_of(linear, np.zeros(0), reference, noise, np.ones(count))
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0
@@ -429,8 +425,7 @@ def test_causes_settle_from_where_they_rested_before(compass):
             asked.append(numbers)
             return super().at(numbers, *given)
 
-    again = Counted(trial.campaign, trial.record)
-    point = again.begin({})
+    again, point = evidence.begin(Counted.of(trial.campaign, trial.record), {})
     asked.clear()
     rests = []
     for begin in (0.5, -0.5):
@@ -546,7 +541,7 @@ def test_half_the_data_has_the_same_name(sea):
 def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     """An antenna's columns come from what is measured: 1.4 s apart they are other ones, and the
     position and the velocity would seem to disagree."""
-    trial = Trial(sea.campaign, sea.done.trial.record)
+    trial = Trial.of(sea.campaign, sea.done.trial.record)
     trial.at({})
     numbers = {"clock_offset:gnss": np.array([1.4])}
     late = trial.at(numbers)
@@ -623,8 +618,9 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
     def broken(*_):
         raise np.linalg.LinAlgError
 
-    monkeypatch.setattr(trial, "levels", broken)
-    _, found = settle(trial, ("current",), {"current": np.zeros(2)}, decision.first.path)
+    monkeypatch.setattr(evidence, "levels", broken)
+    path = decision.nothing.point.path
+    _, found = settle(replace(trial, settled={}), ("current",), {"current": np.zeros(2)}, path)
     assert found.evidence == -np.inf
 
 
@@ -641,14 +637,12 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, low
         found = {"heading_offset": np.array([0.1])}
         return Found("nothing", seemed if high else rests, 1.0, found, np.eye(1) * 1e-4), []
 
-    monkeypatch.setattr(
-        trial, "at", lambda n, *_: at.append(n["heading_offset"][0]) or decision.first
-    )
-    monkeypatch.setattr(trial, "scan", told)
-    monkeypatch.setattr(trial, "fit", lambda *given: told(*given)[0])
-    monkeypatch.setattr(trial, "rested", {})
+    point = decision.nothing.point
+    monkeypatch.setattr(Trial, "at", lambda _, n, *more: at.append(n["heading_offset"][0]) or point)
+    monkeypatch.setattr(evidence, "scan", told)
+    monkeypatch.setattr(evidence, "fit", lambda *given: told(*given)[0])
     begin = {"heading_offset": np.array([0.16])}
-    _, found = settle(trial, ("heading_offset",), begin, None, lowest)
+    _, found = settle(replace(trial, settled={}), ("heading_offset",), begin, None, lowest)
     assert found.evidence == (rests if holds else -np.inf)
 
 
@@ -659,37 +653,39 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
         one, cause=next(c for c in trial.reference.model.causes if c.label == "current")
     )
     both = {one.cause.label: one.numbers, other.cause.label: one.numbers}
-    two = replace(decision, named=(one, other), base=replace(decision.base, numbers=both))
+    shown = replace(decision.shown, found=replace(decision.shown.found, numbers=both))
+    two = replace(decision, named=(one, other), shown=shown)
     gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
-    monkeypatch.setattr(decisions, "settle", lambda *_: (decision.point, gone))
+    monkeypatch.setattr(decisions, "settle", lambda *_, **__: (decision.shown.point, gone))
     left = decisions.without(trial, two, other)
     assert left.named == () and left.verdict == "none"
-    assert (left.point, left.base) == (decision.first, decision.nothing)
+    assert left.shown is decision.nothing
 
 
 def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     """Three halvings at most; then it has no evidence. A path of kilometres diverged, too."""
     trial, decision = still
-    at, path = trial.at, decision.first.path
+    at, path = Trial.at, decision.nothing.point.path
     away = []
 
-    def bounded(numbers, *given):
-        point = at({n: np.minimum(v, 0.2) for n, v in numbers.items()}, *given)
+    def bounded(self, numbers, *given):
+        point = at(self, {n: np.minimum(v, 0.2) for n, v in numbers.items()}, *given)
         if abs(numbers["heading_offset"][0]) > 0.2:
             away.append(float(numbers["heading_offset"][0]))
             return replace(point, linear=replace(point.linear, e=point.linear.e + 1e5))
         return point
 
-    monkeypatch.setattr(trial, "at", bounded)
-    monkeypatch.setattr(trial, "rested", {})
+    monkeypatch.setattr(Trial, "at", bounded)
+    trial = replace(trial, settled={})
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
-    assert -30.0 < found.evidence - decision.nothing.evidence < decisions.SHOWS_NATS
+    assert -30.0 < found.evidence - decision.nothing.found.evidence < decisions.SHOWS_NATS
     away.clear()
-    trial.rested.clear()
+    trial.settled.clear()
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
-    low = decision.nothing.evidence + 900.0  # nothing at rest is so high: each step went too far
+    # nothing at rest is so high: each step went too far
+    low = decision.nothing.found.evidence + 900.0
     begin = {"heading_offset": np.array([0.01])}
     _, found = settle(trial, ("heading_offset",), begin, path, low)
     assert found.evidence == -np.inf

@@ -27,8 +27,7 @@ import jax
 import numpy as np
 from scipy.special import chdtri  # scipy.stats takes a second to load
 
-from shiplog.diagnosis import likelihood, measurement_correction, segments
-from shiplog.diagnosis.evidence import TrialEvidence
+from shiplog.diagnosis import evidence, likelihood, measurement_correction, segments
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
@@ -36,6 +35,7 @@ from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.segments import Cut
 from shiplog.diagnosis.setup import trial_of
+from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError, ShiplogError
 from shiplog.training import load_model
 from shiplog.voyages import recording
@@ -86,7 +86,7 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, R
         for some in (trained, names)
     )
     trial = trial_of(run, usual, recorded, ()).trial
-    point = trial.begin(run.extension_numbers())
+    trial, point = evidence.begin(trial, run.extension_numbers())
     fitted = run.base()[1].values
     return {
         "regression": regression(trial, fitted, usual),
@@ -98,7 +98,7 @@ def answers(run_path: Path, store: Store, voyages: Sequence[str]) -> dict[str, R
 # --- regression of accelerations ------------------------------------------------------------------
 
 
-def regression(trial: TrialEvidence, fitted: np.ndarray, usual: Record) -> Ranked:
+def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Ranked:
     """Coefficients stay as they were fitted; noise is as large as it was on the nominal voyages."""
     ref = trial.reference
     columns, model = ref.columns, ref.model
@@ -191,7 +191,7 @@ class White:
     pull: np.ndarray
 
 
-def likelihood_ratio(trial: TrialEvidence, point: Point) -> Ranked:
+def likelihood_ratio(trial: Trial, point: Point) -> Ranked:
     """Coefficients after the nominal voyages, all of which count (κ = 1); BIC's price for
     numbers."""
     ref = trial.reference
@@ -268,9 +268,9 @@ def ratios(
 # --- our evidence, linearised once ----------------------------------------------------------------
 
 
-def linear(trial: TrialEvidence, point: Point) -> Ranked:
+def linear(trial: Trial, point: Point) -> Ranked:
     causes = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
-    _, found = trial.scan(point, causes, trial.fixed)
+    _, found = evidence.scan(trial, point, causes, trial.fixed)
     return reported({one.name: one.evidence for one in found}, SHOWS_NATS)
 
 

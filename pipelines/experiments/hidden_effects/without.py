@@ -27,6 +27,8 @@ from shiplog.diagnosis import (
     baseline_check,
     campaign_characteristics,
     discrepancy,
+    evidence,
+    fits,
     nominal_cache,
     placebo,
     posterior,
@@ -35,7 +37,7 @@ from shiplog.diagnosis import (
     trial_voyages,
     voyage_effects,
 )
-from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.report import tables
 
 WHOLE = "nothing"  # the decision as it is
@@ -43,7 +45,7 @@ WHOLE = "nothing"  # the decision as it is
 
 def _no_placebo(stack: ExitStack) -> None:
     stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
-    stack.enter_context(patch.object(Trial, "usual_push", None))
+    stack.enter_context(patch.object(Hypotheses, "usual_push", None))
 
 
 def _no_form_error(stack: ExitStack) -> None:
@@ -81,7 +83,7 @@ def _no_robust_weights(stack: ExitStack) -> None:
     def plain(square, kept):
         return np.where(kept, 1.0, 0.0)
 
-    for module in (campaign_characteristics, sys.modules[Trial.__module__]):
+    for module in (campaign_characteristics, evidence):
         stack.enter_context(patch.object(module, "robust_weights", plain))
     _learned_anew(stack)
 
@@ -113,7 +115,7 @@ def _no_share_of_causes(stack: ExitStack) -> None:
 
 def _no_imitation(stack: ExitStack) -> None:
     """A cause is named though the remainder next to it could do most of what it does."""
-    stack.enter_context(patch.object(Trial, "imitated", lambda *given: 0.0))
+    stack.enter_context(patch.object(fits, "imitated", lambda *given: 0.0))
 
 
 def _fixed_time_scale(stack: ExitStack) -> None:

@@ -45,7 +45,7 @@ def headless() -> Iterator[ViewerClient]:
         try:
             native.wait_for(process, (port,), PATIENCE)
             yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")
-        except TimeoutError:
+        except (TimeoutError, ConnectionError):  # it never listened, or ended when it had to draw
             raise ShiplogError(
                 f"The headless viewer did not start: {native.last_words(output)}",
                 hint="it needs a Vulkan driver, such as the package mesa-vulkan-drivers.",

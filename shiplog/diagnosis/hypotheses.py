@@ -1,0 +1,116 @@
+"""The hypotheses about a trial that were weighed so far, on one scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from shiplog.diagnosis import intermittent
+from shiplog.diagnosis.fitted import Fit, Point
+from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
+from shiplog.diagnosis.remainder import NOMINAL
+from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.unrecorded_thruster import Pulses
+
+KEPT_LINEARISATIONS = 6  # the others are computed again when needed
+
+
+class Hypotheses:
+    """Of each set of causes and kind of remainder the most probable hypothesis.
+
+    first      the trial linearised with the model as it stands
+    placebo    label or remainder → its log Bayes factor on nominal voyages, in nats
+    catalogue  causes that a hypothesis may contain, beside those that the model has already
+    found      causes and kind of remainder → hypothesis
+    alone      label → log Bayes factor of that cause by itself, over no cause
+    """
+
+    def __init__(
+        self, trial: Trial, first: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
+    ) -> None:
+        self.trial, self.first, self.placebo = trial, first, placebo
+        self.catalogue = [
+            c for c in trial.reference.model.causes
+            if c.label not in trial.fixed and c.label not in banned
+        ]  # fmt: skip
+        self.priors = Priors(self.catalogue, tuple(trial.families))
+        self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
+        self.alone: dict[str, float] = {}
+
+    @property
+    def fixed(self) -> dict[str, np.ndarray]:
+        """Label → numbers of the causes that the model has already."""
+        return {label: np.asarray(self.first.numbers[label]) for label in self.trial.fixed}
+
+    def included(self, labels: Sequence[str]) -> tuple[str, ...]:
+        """Labels that a fit of these causes includes; causes of the model itself keep their
+        numbers."""
+        return (*self.trial.fixed, *labels)
+
+    @property
+    def nothing(self) -> Hypothesis:
+        return self.found[(), NOMINAL]
+
+    def ranked(self, without: Collection[str] = ()) -> list[Hypothesis]:
+        """Best first; without those that contain a cause of these names."""
+        kept = (h for h in self.found.values() if not set(without) & set(map(name_of, h.causes)))
+        return sorted(kept, key=lambda h: -h.score)
+
+    def fit(self, one: Hypothesis) -> Fit:
+        """A hypothesis with the trial linearised where it was."""
+        point = one.point
+        if isinstance(point, Place):
+            point = self.trial.at(point.numbers, point.path)
+        return Fit(point, one.found, one.remainder)
+
+    def score(self, evidence: float, labels: Sequence[str], kind: str) -> float:
+        """Log posterior, in nats, up to a constant."""
+        misfit = sum(self.placebo.get(n, 0.0) for n in labels) + self.placebo.get(kind, 0.0)
+        return evidence + self.priors.of(labels, kind) - misfit - form_error(self.alone, labels)
+
+    def put(
+        self, labels: tuple[str, ...], evidence: float, fit: Fit, pulses: Pulses | None = None
+    ) -> None:
+        """Keep a hypothesis where it is the most probable one of its causes and kind."""
+        kind = fit.remainder.kind
+        score = self.score(evidence, labels, kind)
+        if (labels, kind) not in self.found or self.found[labels, kind].score < score:
+            self.found[labels, kind] = Hypothesis(
+                labels, fit.remainder, evidence, score, fit.point, fit.found, pulses
+            )
+
+    def noted_alone(self, label: str, gained: float) -> None:
+        """A log Bayes factor of one cause; the greatest counts."""
+        self.alone[label] = max(gained, self.alone.get(label, -math.inf))
+
+    def rescore(self) -> None:
+        """Renew the scores: the allowance for form errors needs every cause's own log Bayes
+        factor."""
+        self.found = {
+            key: replace(h, score=self.score(h.evidence, h.causes, h.kind))
+            for key, h in self.found.items()
+        }
+
+    def forget(self, without: Collection[str] = ()) -> None:
+        """Drop the linearisations of all but the best hypotheses: each takes 50 MB and more."""
+        best = [self.nothing, *self.ranked(without)]
+        points = dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point))
+        kept = list(points)[:KEPT_LINEARISATIONS]
+        for key, one in self.found.items():
+            if isinstance(one.point, Point) and id(one.point) not in kept:
+                place = Place(one.point.numbers, one.point.path)
+                self.found[key] = replace(one, point=place)
+
+    @cached_property
+    def usual_push(self) -> np.ndarray | None:
+        """Acceleration [3] that the nominal process noise has at one place."""
+        return intermittent.usual_push(self.trial.campaign, self.trial.grid)
+
+    def intermittent(self, fit: Fit) -> Pulses:
+        """An intermittent force at one place along the ship, and its log Bayes factor over raised
+        noise, whose nominal part acts at one place too."""
+        return intermittent.pulses(self.trial, fit, self.usual_push)

@@ -1,0 +1,102 @@
+"""Products of a trial's segments with every voyage's and part's own deviations integrated out.
+
+Every voyage of a trial and every part of it has deviations of its own (`voyage_effects`,
+`campaign_prior`).
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+
+import numpy as np
+
+from shiplog.diagnosis import campaign_prior, likelihood
+from shiplog.diagnosis.campaign_parts import products
+from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.fitted import Point
+from shiplog.diagnosis.likelihood import Modes, Weighed
+from shiplog.diagnosis.nominal_campaign import Campaign
+from shiplog.diagnosis.remainder import Remainder
+from shiplog.diagnosis.segments import SegmentGrid
+from shiplog.diagnosis.voyage_effects import reduced
+
+KEPT_TOTALS = 41  # of one point about a dozen levels are asked for, and again for each family
+
+
+class Products:
+    """They are kept: one pass serves every level of process noise and many hypotheses.
+
+    parts   rows of the segments of each part; voyage of each part
+    """
+
+    def __init__(
+        self, campaign: Campaign, unseen: Discrepancy, grid: SegmentGrid,
+        parts: Sequence[np.ndarray], voyage: np.ndarray,
+    ) -> None:  # fmt: skip
+        self._campaign, self._unseen, self._grid = campaign, unseen, grid
+        self._parts, self._voyage = parts, voyage
+        self._modes: list[tuple[Weighed, Modes]] = []
+        self._totals: list[tuple[weakref.ref[Weighed], tuple, np.ndarray, float]] = []
+        self._volumes: dict[tuple, float] = {}
+
+    def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
+        """Products of the point, and the wanted factors λ: one pass serves every λ, but that of a
+        pulse together with the process noise, whose axes turn with it."""
+        process_noise = remainder.in_noise(self._campaign.reference.process_noise)
+        if process_noise.pulse is not None:
+            found = likelihood.modes(point.weighed, process_noise.times(noise_factor))
+            return self._with_families(found, point), 1.0
+        for of, found in self._modes:
+            if of is point.weighed:
+                return found, noise_factor
+        found = self._with_families(likelihood.modes(point.weighed, process_noise), point)
+        # the first point's, for `volume`, and the last two
+        self._modes = [*self._modes[:1], *self._modes[1:][-1:], (point.weighed, found)]
+        return found, noise_factor
+
+    def _with_families(self, modes: Modes, point: Point) -> Modes:
+        cut, misfit = point.linear.cut, self._campaign.reference.misfit
+        if misfit is not None:
+            modes = modes.beside(misfit.pushed(cut, self._grid))
+        return modes.beside(self._unseen.pushed(cut, self._grid))
+
+    def of_parts(
+        self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> list[np.ndarray]:
+        """[1 + C, 1 + C] of each part, in units, its own deviations in it."""
+        modes, noise = self.modes(point, noise, remainder)
+        unit = np.append(self._campaign.reference.columns.unit, np.ones(self._unseen.count))
+        return products(modes, self._parts, unit, weight, noise)
+
+    def total(
+        self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
+    ) -> tuple[np.ndarray, float]:
+        """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
+        key = (noise, weight.tobytes(), remainder.pulse)
+        for of, known, total, volume in self._totals:
+            if of() is point.weighed and known == key:
+                return total, volume
+        effects = self._campaign.effects
+        deviation = np.append(effects.deviation, np.zeros(self._unseen.count))
+        each = self.of_parts(point, noise, weight, remainder)
+        parts, volumes = zip(*(reduced(gram, deviation) for gram in each), strict=True)
+        apart = self._campaign.apart * deviation
+        voyages, more = campaign_prior.of_voyages(parts, self._voyage, apart)
+        total, volume = sum(voyages[1:], voyages[0]), sum(volumes) + sum(more)
+        # no id(): a point that is gone leaves its own to the next one
+        kept = (weakref.ref(point.weighed), key, total, volume)
+        self._totals = [*self._totals[1 - KEPT_TOTALS :], kept]
+        return total, volume
+
+    def volume(
+        self, first: Point, noise_factor: float, weight: np.ndarray, remainder: Remainder
+    ) -> float:
+        """log |C| at one level of process noise, the same for every hypothesis: that of the first
+        point. How far a model lets noise be felt is no evidence of a cause."""
+        key = (noise_factor, remainder.pulse, weight.tobytes())
+        if key not in self._volumes:
+            modes, by = self.modes(first, noise_factor, remainder)
+            total = self.total(first, noise_factor, weight, remainder)
+            self._volumes[key] = modes.log_volume(by) + total[1]
+        return self._volumes[key]
