@@ -134,7 +134,7 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
     return notes, choices
 
 
-class HeldOut(NamedTuple):
+class HeldOutErrors(NamedTuple):
     """Windows rolled out by fits that did not know their voyage, or their day.
 
     before    [N] L of the starting values
@@ -179,7 +179,9 @@ class HeldOut(NamedTuple):
         )
 
 
-def _hold_out(ready: Prepared, refit: Callable[[WindowSeries], Identified], folds: int) -> HeldOut:
+def _hold_out(
+    ready: Prepared, refit: Callable[[WindowSeries], Identified], folds: int
+) -> HeldOutErrors:
     def fit(part: WindowSeries) -> Simulator:
         return _simulator(ready.model, refit(part))
 
@@ -190,7 +192,7 @@ def _hold_out(ready: Prepared, refit: Callable[[WindowSeries], Identified], fold
     by_day = None
     if len(set(ready.days)) > 1 and _apart(ready.days, ready.voyages):
         by_day = cross_validate(fit, ready.data, ready.days, folds)
-    return HeldOut(before, by_voyage, by_day)
+    return HeldOutErrors(before, by_voyage, by_day)
 
 
 def save(

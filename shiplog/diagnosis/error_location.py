@@ -14,6 +14,7 @@ from shiplog.diagnosis import (
     intermittent,
     omitted_inputs,
     residual_acceleration,
+    thresholds,
 )
 from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.held_out import HeldOut
@@ -34,7 +35,6 @@ from shiplog.voyages import one_hertz
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
 
-UNCOVERED = 0.5  # share of a window's seconds outside the training data
 PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
 PULSE_APART = 2.5  # nodes that an intermittent force may pause for
 
@@ -98,7 +98,7 @@ def uncovered(
     size = run.config.window
     whole = numbered.hstack(seen.table(rows, numbered, size))
     found = []
-    for row in whole.filter(pl.col("coverage") < UNCOVERED).to_dicts():
+    for row in whole.filter(pl.col("coverage") < thresholds.COVERED).to_dicts():
         within = rows.filter(
             (pl.col("voyage") == row["voyage"])
             & pl.col("elapsed").is_between(row["elapsed"], row["elapsed"] + size - 1)

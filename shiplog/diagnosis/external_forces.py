@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from shiplog import channels, frames
-from shiplog.diagnosis import residual_acceleration
+from shiplog.diagnosis import residual_acceleration, thresholds
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.residual_acceleration import Unexplained
@@ -28,14 +28,12 @@ from shiplog.voyages.fault_detection import jumps, stretches
 from shiplog.voyages.recording import Record
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
-SURE_SPREADS = 3.0  # standard deviations
-USUAL_SPREADS = 5.0  # times the spread of what this model leaves of this ship
 GUST = 1.2  # of the measured wind speed, from whichever side is worst
 STILL = 0.05  # of full power: below, a screw stands
 RESTS = 5.0  # s that screws have stood before their jets are gone
 RESTING = 0.5  # of its means that stay allowed then: a thruster that nobody records
 DOUBT = 5.0  # s around a jump of position or heading, where velocities are not believed
-LEAST_S = 2.0  # s
+SHORTEST_S = 2.0  # s of an event
 GAP = 5.0  # s: after a shorter break it is still the same event
 EDGE = 0.5  # an event begins and ends where its force passes half of the peak
 LOOSE = 0.5  # of its full acceleration: how far the knots may go before data pull them
@@ -116,7 +114,7 @@ def find(
     if not physics.geometry.propellers and not physics.geometry.thrusters:
         return ()  # who knows what drives it
     weighed = balance(linear, d, process_noise, record, physics, values)
-    beyond = np.abs(weighed.force) > weighed.limit + SURE_SPREADS * weighed.sd
+    beyond = np.abs(weighed.force) > weighed.limit + thresholds.EXTERNAL_SPREADS * weighed.sd
     beyond &= ~_contradicted(record, weighed.rows)[:, None]
     found = []
     for part in _unbroken(record, weighed.rows):
@@ -146,7 +144,8 @@ def balance(
     misfit = np.sqrt(np.maximum(spread**2 - np.median(doubt, axis=0) ** 2, 0.0))
     state = residual_acceleration.around(record, record.state, rows)
     actuator = residual_acceleration.around(record, record.actuator, rows)
-    limit = np.abs(_forces(physics, values, state, actuator)["hull"]) + USUAL_SPREADS * misfit
+    limit = np.abs(_forces(physics, values, state, actuator)["hull"])
+    limit += thresholds.EXTERNAL_USUAL * misfit
     limit += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
@@ -318,5 +317,5 @@ def _merged(events: list[tuple[float, Stretch]], names: tuple[str, ...]) -> Iter
     for group in groups:
         _, worst = max(group, key=lambda e: e[0])
         start, end = group[0][1].start_s, max(e.end_s for _, e in group)
-        if end - start >= LEAST_S:
+        if end - start >= SHORTEST_S:
             yield replace(worst, start_s=start, end_s=end)

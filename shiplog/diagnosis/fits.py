@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 
-from shiplog.diagnosis import discrepancy, evidence
+from shiplog import channels
+from shiplog.diagnosis import discrepancy, evidence, thresholds
 from shiplog.diagnosis.fitted import Fit, Level, Point
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.remainder import SIZES, Remainder
 from shiplog.diagnosis.trial import Trial
 
-CHANNELS = ("surge", "sway", "yaw_rate")
-ACTS = 3.0  # a family acts on a channel if that has at least 1/ACTS of its largest acceleration
+CHANNELS = tuple(c.name for c in channels.VELOCITY)
 
 
 def solution(trial: Trial, one: Fit) -> Level:
@@ -144,4 +144,4 @@ def acts_on(trial: Trial, one: Fit, family: str) -> tuple[str, ...]:
     weights[columns - of.families[0].columns[0]] = level.solution[-len(columns) :]
     pushed = of.pushed(one.point.linear.cut, trial.grid) @ weights
     size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / trial.reference.process_noise.push
-    return tuple(str(n) for n in np.array(CHANNELS)[size > size.max() / ACTS])
+    return tuple(str(n) for n in np.array(CHANNELS)[size > thresholds.ACTS * size.max()])

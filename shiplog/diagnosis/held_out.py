@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog.diagnosis import fits, sign_conventions
+from shiplog.diagnosis import fits, sign_conventions, thresholds
 from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
@@ -16,9 +16,6 @@ from shiplog.models.causes import constants_of
 from shiplog.simulation.error_reduction import Gain, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
-
-SIMULATES_NOTHING = 2.0  # times the L of keeping all velocities
-TURNED = 0.5  # of the L with all that was named, below which a sign is the other way round
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
 
@@ -122,9 +119,9 @@ class HeldOut(Rollouts):
         after = own if found is None else min(own, found.after)
         hold = float(self.parts(self.cut.state[:, :1]).sum(1).mean())
         other, turned = sign_conventions.best(self.before, self.cut)
-        if turned < min(TURNED * after, hold):
+        if turned < min(thresholds.TURNED_SIGN * after, hold):
             return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
-        if own <= SIMULATES_NOTHING * hold or after <= hold:
+        if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:
             return ""
         return (
             f"The model is worse than one that keeps its velocities (L {own:.0f}, that one "

@@ -15,7 +15,6 @@ from shiplog.diagnosis.unrecorded_thruster import Pulses
 from shiplog.models.causes import Cause, Shown
 
 PULSES = "side_thrust"
-SHOWS_NATS = 5.0  # nats from which on a cause would show in these data
 
 
 @dataclass(frozen=True)

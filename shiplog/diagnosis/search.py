@@ -12,12 +12,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from shiplog.diagnosis import evidence
+from shiplog.diagnosis import evidence, thresholds
 from shiplog.diagnosis.fitted import Fit, Point, Told
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
-from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.weighing import SEARCH_NATS, weigh
 
@@ -124,7 +123,7 @@ class Search:
 
     def _say_what_would_not_show(self) -> None:
         """Log the causes that these voyages cannot reveal, before any is searched for."""
-        shares = {name: told.together(SHOWS_NATS) for name, told in self.told.items()}
+        shares = {name: told.together(thresholds.SHOWS_NATS) for name, told in self.told.items()}
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))

@@ -35,3 +35,37 @@ BASELINE = 0.5
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
 # time that it is on, while a force that merely varies is between as often as above.
 BETWEEN = 0.5
+
+# Seconds of unbroken record, below which there is no verdict: eight segments of a three-metre ship,
+# which is as many as a nominal campaign needs.
+LEAST_RECORD_S = 240.0
+
+# Share of a window's seconds inside the training data. Below it the window is listed as not trained
+# in these conditions.
+COVERED = 0.5
+
+# Share of the windows. Where more than this are not covered, an unknown dependence on motion,
+# controls or wind is answered by `coverage`.
+UNCOVERED_WINDOWS = 0.5
+
+# Ratio of errors. A model whose error is at most this many times that of keeping all velocities
+# simulates the ship; a cause named in any other would be a guess.
+WORSE_THAN_HOLDING = 2.0
+
+# Ratio of errors. Where turning a sign round leaves less than this share of the error with all that
+# was named, the sign is wrong and no cause is named.
+TURNED_SIGN = 0.5
+
+# Nats. A cause would show in these data from this expected log Bayes factor on: e^5 is 150 to 1.
+SHOWS_NATS = 5.0
+
+# Ratio. An unknown dependence acts on a channel that has at least this share of its largest
+# acceleration, in units of the process noise.
+ACTS = 1.0 / 3.0
+
+# Standard deviations. A force is external where it exceeds all that the ship's own forces can be
+# by so many standard deviations of its estimate.
+EXTERNAL_SPREADS = 3.0
+
+# Ratio. What the model usually leaves of this ship, times this, is allowed beside those forces.
+EXTERNAL_USUAL = 5.0

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class ModelFamily:
     """How models of a kind are trained.
 
     name       "network": weights, by the gradient of the loss of rollouts; "physics":
@@ -28,13 +28,13 @@ class Family:
     sections: tuple[str, ...]
 
 
-NETWORK = Family(
+NETWORK = ModelFamily(
     "network",
     "a network",
     options=("recipe", "width", "wind_input", "epochs", "copies"),
     sections=("network", "paper", "fast"),
 )
-PHYSICS = Family(
+PHYSICS = ModelFamily(
     "physics",
     "a physical model",
     options=("fit", "parameters", "without", "free", "folds"),
@@ -54,7 +54,7 @@ class Kind:
     """
 
     about: str
-    family: Family
+    family: ModelFamily
     module: str = ""
     residual: bool = False
 

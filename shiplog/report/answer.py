@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from shiplog.diagnosis import error_location, next_manoeuvre, segments
+from shiplog.diagnosis import error_location, next_manoeuvre, segments, thresholds
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
@@ -21,10 +21,8 @@ from shiplog.training.load_model import Run
 from shiplog.voyages import timescale
 from shiplog.voyages.recording import Record
 
-MOSTLY = 0.5  # share of the windows that makes `coverage` the answer
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
-LEAST_S = 240.0  # of unbroken record, below which there is no verdict
 
 
 @dataclass(frozen=True)
@@ -156,7 +154,8 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
     if named:
         return "named"
     family = decision.structure.family if decision.structure else ""
-    unseen = held is not None and len(context.uncovered) > MOSTLY * len(held.cut)
+    most = thresholds.UNCOVERED_WINDOWS
+    unseen = held is not None and len(context.uncovered) > most * len(held.cut)
     if decision.verdict == "unknown" and not context.lost and family in INPUTS and unseen:
         return "coverage"
     # less than a segment in all is listed, but is no answer for the trial
@@ -174,7 +173,7 @@ def _made(run: Run, before_effect: bool) -> str:
 
 def enough(recorded: Record) -> bool:
     """Whether the record is long enough for a verdict."""
-    return recorded.seconds >= LEAST_S and len(segments.begins(recorded)) >= 4
+    return recorded.seconds >= thresholds.LEAST_RECORD_S and len(segments.begins(recorded)) >= 4
 
 
 def runs_away(run: Run, before_effect: bool) -> Verdict:
@@ -188,9 +187,10 @@ def runs_away(run: Run, before_effect: bool) -> Verdict:
 
 
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
-    short = max(LEAST_S - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
+    least = thresholds.LEAST_RECORD_S
+    short = max(least - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
     sentence = (
-        f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {LEAST_S:.0f} s are "
+        f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {least:.0f} s are "
         f"needed in unbroken intervals of {recorded.timescale.seconds:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."

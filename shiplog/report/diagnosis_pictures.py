@@ -166,13 +166,12 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
 def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:
     """A row a sample; what has left the pond is null."""
     count, size, _ = states.shape
-    since = np.concatenate((np.zeros((count, 1)), np.cumsum(cut.dt, 1)), 1)
     gone = np.logical_or.accumulate(~(np.abs(states).max(-1) < NOT_DRAWN), axis=1)
     states = np.where(gone[..., None], np.nan, states)
     index = numbered[np.repeat(np.arange(count), size)]
     return (
         index.with_columns(
-            pl.lit(model).alias("model"), pl.col("time") + pl.Series(since.reshape(-1))
+            pl.lit(model).alias("model"), pl.col("time") + pl.Series(cut.since.reshape(-1))
         )
         .hstack(pl.DataFrame(_columns(states.reshape(-1, 6))))
         .select(TRACKS.keys())

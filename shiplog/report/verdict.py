@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shiplog.channels import VELOCITY
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.next_manoeuvre import Advice
 from shiplog.diagnosis.omitted_inputs import Dependence
-from shiplog.diagnosis.result import PULSES, SHOWS_NATS, Decision, Named
+from shiplog.diagnosis.result import PULSES, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
 from shiplog.simulation.error_reduction import Gain
 
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
-SURELY = 0.9  # probability, below which it stands in the sentence
 HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
 
@@ -189,10 +189,10 @@ def probabilities_json(ranking: Mapping[str, float]) -> tuple[dict, ...]:
 def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -> tuple[dict, ...]:
     """The smallest size of each cause that these data would reveal, best determined first: of each
     number alone, and as a share of the realistic size. Undetectable numbers are left out."""
-    by = {c.label: c for c in causes}
+    by, nats = {c.label: c for c in causes}, thresholds.SHOWS_NATS
     found = []
     for label, told in decision.told.items():
-        cause, least = by[label], told.least(SHOWS_NATS)
+        cause, least = by[label], told.least(nats)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
@@ -201,7 +201,11 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
             shown = cause.shown(sizes)
         numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
         found.append(
-            {"name": cause.name, "share": told.together(SHOWS_NATS), "parameters": numbers}
+            {
+                "name": cause.name,
+                "share": told.together(nats),
+                "parameters": numbers,
+            }
         )
         if label != cause.name:
             key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
@@ -245,7 +249,8 @@ def sentence(
         return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
     if verdict == "undecided":
         text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
-        return f"Undecided: {' or '.join(text)}. No answer has a probability of {SURELY:.0%}."
+        sure = f"{thresholds.STATED:.0%}"
+        return f"Undecided: {' or '.join(text)}. No answer has a probability of {sure}."
     if verdict == "unknown":
         assert structure is not None
         if structure["family"] == "intermittent":
@@ -316,8 +321,8 @@ def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
 
 
 def _likely(cause: dict) -> str:
-    """A cause's sentence, with its probability where that is below SURELY."""
-    if cause["probability"] >= SURELY:
+    """A cause's sentence, with its probability where that is below `thresholds.STATED`."""
+    if cause["probability"] >= thresholds.STATED:
         return _or(cause)
     how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
     return f"{how}, and not surely ({cause['probability']:.0%}): {_or(cause)}"

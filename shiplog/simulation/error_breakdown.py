@@ -15,6 +15,7 @@ from shiplog import channels
 from shiplog.profile import Profile
 from shiplog.simulation.scoring import loss_shares
 from shiplog.simulation.sensitivities import VELOCITY, WindowSeries, apparent_wind
+from shiplog.voyages.windows import seconds_since
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 MINUTE = 60.0  # s
@@ -94,7 +95,7 @@ def timeline(error: np.ndarray, data: WindowSeries, windows: pl.DataFrame) -> pl
     """One row a sample of a window: voyage, window, time_s (into the voyage), the error of surge,
     sway [m/s] and yaw_rate [rad/s], and loss: what the sample adds to L."""
     count, size = error.shape[:2]
-    elapsed = np.concatenate((np.zeros((count, 1)), np.cumsum(data.dt, axis=1)), axis=1)
+    elapsed = seconds_since(np.asarray(data.dt))
     columns = {
         "voyage": np.repeat(windows["voyage"].to_numpy(), size),
         "window": np.repeat(np.arange(count), size),

@@ -217,9 +217,8 @@ def as_record(
     if windows.wind.shape[-1]:
         speed, angle = windows.wind[..., 0], windows.wind[..., 1]
         wind = np.stack((speed * np.cos(angle), speed * np.sin(angle)), -1)
-    since = np.concatenate((np.zeros((count, 1)), np.cumsum(windows.dt, 1)), 1)
     names = windows.plan["voyage"].to_list()
-    elapsed = windows.plan["elapsed"].to_numpy()[:, None] + since
+    elapsed = windows.plan["elapsed"].to_numpy()[:, None] + windows.since
     share = np.ones((count, size))
     for i, name in enumerate(names):
         if name in shares:

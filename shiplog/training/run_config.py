@@ -10,7 +10,7 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from shiplog.exceptions import RunError, listed
-from shiplog.models import FAMILIES, MODELS, NETWORK, Family
+from shiplog.models import FAMILIES, MODELS, NETWORK, ModelFamily
 from shiplog.toml_section import Section
 from shiplog.voyages.split_settings import Split
 
@@ -111,7 +111,7 @@ class Config(Section):
         return f"{self.model} {how}{off}"
 
     @property
-    def _family(self) -> Family:
+    def _family(self) -> ModelFamily:
         return MODELS[self.model].family
 
     def to_toml(self) -> str:

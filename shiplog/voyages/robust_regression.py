@@ -84,7 +84,7 @@ def shifted(values: np.ndarray, rows: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Fit:
+class RobustFit:
     """value [k], cov [k, k]; `reverse` [k]: the same with the other side's noise in the slope."""
 
     value: np.ndarray
@@ -186,7 +186,7 @@ def _descended(problem: Problem, value: np.ndarray) -> tuple[np.ndarray, float]:
     return value, float(np.mean(np.abs(unforeseen)))
 
 
-def fit(problem: Problem, start: np.ndarray) -> Fit | None:
+def fit(problem: Problem, start: np.ndarray) -> RobustFit | None:
     """Gauss-Newton from `start`. None where there is too little to say how sure it is, where the
     voyage shows one parameter only together with another, or where a slope is another one when the
     sides are exchanged: then neither side shows more than its noise."""
@@ -230,7 +230,7 @@ def fit(problem: Problem, start: np.ndarray) -> Fit | None:
             return None
         reverse[index] += step[at]
     quantile = float(stdtrit(max(len(names) - 1, 2), NINETY_QUANTILE))
-    return Fit(value, cov, reverse, quantile)
+    return RobustFit(value, cov, reverse, quantile)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages.fault_detection import stretches
 from shiplog.voyages.resampling import RATE_HZ
-from shiplog.voyages.robust_regression import Fit, Problem, bins, fit, rough, shifted
+from shiplog.voyages.robust_regression import Problem, RobustFit, bins, fit, rough, shifted
 
 STEP_S = 1.0 / RATE_HZ
 VOYAGE_ROWS = 36_000  # of a long voyage the liveliest hour says it all
@@ -277,7 +277,7 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
         yield Estimate("antenna_offset", channel, value, low, high, 0.0, least, "m")
 
 
-def _gnss_clocks(found: Fit, profile: Profile) -> Iterator[Estimate]:
+def _gnss_clocks(found: RobustFit, profile: Profile) -> Iterator[Estimate]:
     """Delays of position and velocity; as one of `gnss` where both are late by the same.
 
     Velocities that were turned by the heading when they were recorded keep its turns and not their
@@ -329,7 +329,7 @@ def _clock(channel: str, value: float, low: float, high: float, rival: str = "")
 
 def _solved(
     motion: Motion, problem: Callable[[Motion, float], Problem], clocks: tuple[int, ...]
-) -> Fit | None:
+) -> RobustFit | None:
     """Fit with delays up to the small margin, and again with the large one if that binds.
 
     It starts from what the first ten minutes say, tried from several delays. What ends at a

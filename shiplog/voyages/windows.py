@@ -17,6 +17,11 @@ from shiplog.exceptions import WindowError
 SIZE = channels.WINDOW
 
 
+def seconds_since(dt: np.ndarray) -> np.ndarray:
+    """[N, I] seconds since the first sample, of step lengths [N, I - 1]."""
+    return np.pad(np.cumsum(dt, axis=1), ((0, 0), (1, 0)))
+
+
 @dataclass(frozen=True)
 class Windows:
     """N windows of I samples, row by row with their plan; float64.
@@ -41,6 +46,11 @@ class Windows:
     def velocity(self) -> np.ndarray:
         """[N, I, 3] surge, sway, yaw rate."""
         return np.take(self.state, channels.VELOCITY_IN_STATE, axis=-1)
+
+    @property
+    def since(self) -> np.ndarray:
+        """[N, I] seconds since each window began."""
+        return seconds_since(self.dt)
 
     def pick(self, rows: np.ndarray) -> Windows:
         """The windows at these row numbers."""

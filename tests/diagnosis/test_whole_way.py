@@ -33,6 +33,7 @@ from shiplog.diagnosis import (
     segments,
     setup,
     sign_conventions,
+    thresholds,
     unrecorded_thruster,
 )
 from shiplog.diagnosis import result as decisions
@@ -679,7 +680,7 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     trial = replace(trial, settled={})
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
-    assert -30.0 < found.evidence - decision.nothing.found.evidence < decisions.SHOWS_NATS
+    assert -30.0 < found.evidence - decision.nothing.found.evidence < thresholds.SHOWS_NATS
     away.clear()
     trial.settled.clear()
     _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)

@@ -32,9 +32,9 @@ from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.parameter_layout import Columns
-from shiplog.diagnosis.result import SHOWS_NATS
 from shiplog.diagnosis.segments import Cut
 from shiplog.diagnosis.setup import trial_of
+from shiplog.diagnosis.thresholds import SHOWS_NATS
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError, ShiplogError
 from shiplog.training import load_model
