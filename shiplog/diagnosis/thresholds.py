@@ -1,9 +1,13 @@
 """Every number that a verdict depends on: name, unit, reason. No other module decides by a number.
 
-Priors are shares before any data. Nats are natural logarithms of a Bayes factor.
+Eight decide between hypotheses. The others say when there is nothing to decide on, and what is
+listed beside a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
+factor.
 """
 
 from __future__ import annotations
+
+# --- between hypotheses
 
 # Probability. A verdict is stated where its probability is at least this; nine in ten of such
 # statements have to be right, which the calibration table checks.
@@ -35,6 +39,8 @@ BASELINE = 0.5
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
 # time that it is on, while a force that merely varies is between as often as above.
 BETWEEN = 0.5
+
+# --- whether there is a verdict, and what is listed beside it
 
 # Seconds of unbroken record, below which there is no verdict: eight segments of a three-metre ship,
 # which is as many as a nominal campaign needs.
