@@ -131,8 +131,8 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     notes += [lacking] if lacking else []
     whole = tried.covering(decided.point)
     reach("external forces")
-    pushed, out_of_reach = error_location.pushed(
-        tried, decided.point, whole, decision.shown.remainder
+    external, out_of_reach = error_location.external(
+        tried, decided.point, whole, decision.fit.remainder
     )
     tried = tried.leaving_out(out_of_reach)
     judge = None if judge is None else replace(judge, trial=tried)
@@ -150,7 +150,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         decision, found = decisions.untold(decision), None
     simulated = (tried, decision)
     if network is not None:
-        simulated = network.beside(decision)
+        simulated = network.extended_by(decision)
         whole = simulated[0].covering(simulated[1].nothing.point)
     if held and decision.named and tried.reference.adapts:
         notes += _of_own_voyages(run, decision)
@@ -163,7 +163,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         dropped,
         lost,
         notes,
-        pushed,
+        external,
         tried.grid.seconds,
         error_location.uncovered(run, store, names, profile, held.cut) if held else (),
         error_location.by_channel(held) if held else (),

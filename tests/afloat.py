@@ -73,21 +73,21 @@ def record(
     return Record(
         profile=PROFILE, names=("one",), voyage=np.zeros(count, dtype=int),
         time=0.1 * np.arange(count), share=(np.arange(count) + 0.5) / count, starts=starts,
-        seen=np.ones(count, dtype=bool),
+        measured=np.ones(count, dtype=bool),
         state=state + noise * NOISE * rng.standard_normal((count, 6)),
         actuator=controls(sailed), wind=wind,
     )  # fmt: skip
 
 
-def pushed(sailed: simulated_ship.Voyage, push: np.ndarray) -> np.ndarray:
+def sailed_with(sailed: simulated_ship.Voyage, acceleration: np.ndarray) -> np.ndarray:
     """States [K, 6] of the project's MMG, with its controls and wind, under `push` [K, 3]: forces
     in N and N m that no actuator makes. Explicit Euler at 0.1 s."""
     start = jnp.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
-    return np.asarray(_sail(start, controls(sailed), true_wind(sailed), push))
+    return np.asarray(_sail(start, controls(sailed), true_wind(sailed), acceleration))
 
 
 @jax.jit
-def _sail(start, actuator, wind, push):
+def _sail(start, actuator, wind, acceleration):
     def step(state, along):
         now, blowing, force = along
         slope = rate(MODEL, jnp.asarray(THETA), state, now, blowing)
@@ -95,19 +95,19 @@ def _sail(start, actuator, wind, push):
         added = body.accelerations(COEFFICIENTS, SHIP, still, still, still, force)
         return state + 0.1 * slope.at[jnp.array([1, 3, 5])].add(added), state
 
-    return jax.lax.scan(step, start, (actuator, wind, push))[1]
+    return jax.lax.scan(step, start, (actuator, wind, acceleration))[1]
 
 
-def linear(seen: Record) -> Linear:
+def linear(observed: Record) -> Linear:
     """The record under the project's MMG as it is, covered to the end.
 
     `linearise.linear` without its columns by θ, which take twice as long to compile.
     """
     model = Extended(MODEL, (), MODEL, np.zeros(0), {})
-    g = segments.grid(seen)
-    cut = segments.cut(seen, residual_acceleration.covering(seen))
+    g = segments.grid(observed)
+    cut = segments.cut(observed, residual_acceleration.covering(observed))
     path = linearisation.pulled(model, THETA, cut, g, WIDE)
     y, z = linearisation.simulated(model, THETA, cut, path, g)
-    at = np.concatenate((np.zeros_like(path.start), path.push.reshape(len(y), -1)), 1)
+    at = np.concatenate((np.zeros_like(path.start), path.acceleration.reshape(len(y), -1)), 1)
     e = cut.y - y + np.einsum("sbcz,sz->sbc", z, at)
     return Linear(cut, path, e, z, np.zeros((*e.shape, 0)))

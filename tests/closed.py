@@ -95,7 +95,7 @@ def record(
     starts[0] = True
     return Record(
         profile=profile, names=("one",), voyage=np.zeros(count, dtype=int), time=t,
-        share=(np.arange(count) + 0.5) / count, starts=starts, seen=np.ones(count, dtype=bool),
+        share=(np.arange(count) + 0.5) / count, starts=starts, measured=np.ones(count, dtype=bool),
         state=np.stack((x0, surge, y0, sway, compass, gyro), -1),
         actuator=controls(t, len(profile.actuators)),
         wind=np.stack((speed * np.cos(angle), speed * np.sin(angle)), -1),

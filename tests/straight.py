@@ -28,7 +28,7 @@ from shiplog.diagnosis.nominal_campaign import Campaign, prior
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Cause, Parameter, Setting
 from shiplog.voyages.recording import Record
@@ -96,7 +96,7 @@ def sailed(count: int, voyages: int = 2, seed: int = 0) -> Record:
         profile=PROFILE, names=tuple(f"v{i}" for i in range(voyages)),
         voyage=np.repeat(np.arange(voyages), each), time=np.tile(t, voyages),
         share=(np.arange(length) + 0.5) / length, starts=starts,
-        seen=np.ones(length, dtype=bool), state=np.concatenate(state),
+        measured=np.ones(length, dtype=bool), state=np.concatenate(state),
         actuator=np.concatenate(orders), wind=wind, step=STEP,
     )  # fmt: skip
 
@@ -108,12 +108,12 @@ def columns_of(causes: tuple[Cause, ...]) -> Columns:
 
 def passed(
     record: Record, columns: Columns, numbers: np.ndarray | None = None, *, seed: int = 1,
-    noise: float = 1.0, told: float = 1.0, pushed: np.ndarray | None = None,
+    noise: float = 1.0, sensitivity: float = 1.0, accelerations: np.ndarray | None = None,
 ) -> Linear:  # fmt: skip
     """One pass of a record, drawn: e = Z z + J d + noise with `numbers` d [C] in SI.
 
     noise    times the standard deviations of UNREST that the noise and the acceleration have
-    told     what one unit of a number moves an observation by, in its standard deviations
+    sensitivity  what one unit of a number moves an observation by, in its standard deviations
     pushed   [S, 3J] accelerations beside the process noise
     """
     rng = np.random.default_rng(seed)
@@ -122,21 +122,21 @@ def passed(
     knots, count = g.knots, columns.linearised
     size = 6 + 3 * knots
     z = rng.standard_normal((*cut.y.shape, size)) * NOISE[:, None] * 3.0
-    j = rng.standard_normal((*cut.y.shape, count)) * NOISE[:, None] * told
+    j = rng.standard_normal((*cut.y.shape, count)) * NOISE[:, None] * sensitivity
     j = j / columns.unit[:count]
     # each cause in columns of its own stream: another order of the causes is the same data
     for cause in columns.causes:
         own = np.random.default_rng([seed, *cause.label.encode()])
         at = columns.of[cause.label]
-        drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * told
+        drawn = own.standard_normal((*cut.y.shape, len(at))) * NOISE[:, None] * sensitivity
         j[..., at] = drawn / columns.unit[at]
     d = np.zeros(count) if numbers is None else numbers
     kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(knots))
     start = PROCESS_NOISE.start * rng.standard_normal((len(cut), 6))
-    push = noise * rng.standard_normal((len(cut), 3 * knots)) @ kernel.T
-    if pushed is not None:
-        push = push + pushed
-    moved = np.einsum("sbcz,sz->sbc", z, np.concatenate((start, push), 1))
+    acceleration = noise * rng.standard_normal((len(cut), 3 * knots)) @ kernel.T
+    if accelerations is not None:
+        acceleration = acceleration + accelerations
+    moved = np.einsum("sbcz,sz->sbc", z, np.concatenate((start, acceleration), 1))
     e = moved + j @ d + noise * NOISE * rng.standard_normal(cut.y.shape)
     path = Path(np.zeros((len(cut), 6)), np.zeros((len(cut), 3, knots)))
     return Linear(cut, path, e, z, j)
@@ -151,15 +151,17 @@ def campaign(
     g = segments.grid(nominal)
     knots = segment_nodes.at_knots(given.cut, g)
     first = columns.linearised
-    seen = discrepancy.of(PROFILE, PROCESS_NOISE.push, first, names, knots) if names else \
-        Discrepancy((), PROCESS_NOISE.push)  # fmt: skip
-    columns = columns.with_misfit(seen.count)
+    size_of = PROCESS_NOISE.acceleration
+    of_own = Discrepancy((), size_of)
+    if names:
+        of_own = discrepancy.of(PROFILE, size_of, first, names, knots)
+    columns = columns.with_misfit(of_own.count)
     count = len(columns.unit)
-    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.push, count, discrepancy.UNSEEN, knots)
+    unseen = discrepancy.of(PROFILE, PROCESS_NOISE.acceleration, count, discrepancy.UNSEEN, knots)
     modes = likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
-    if seen.families:
-        modes = modes.beside(seen.pushed(given.cut, g))
-    whole = modes.beside(unseen.pushed(given.cut, g))
+    if of_own.families:
+        modes = modes.joined(of_own.accelerations(given.cut, g))
+    whole = modes.joined(unseen.accelerations(given.cut, g))
     by = np.concatenate(([1.0], columns.unit, np.ones(unseen.count)))
     rows = np.array_split(np.arange(len(given.cut)), parts)
     each = []
@@ -176,14 +178,14 @@ def campaign(
     model = SimpleNamespace(causes=columns.causes, base=None, bends=False)
     made = Reference(
         model, SETTING, np.zeros(COEFFICIENTS), columns, PROCESS_NOISE,  # type: ignore[arg-type]
-        linear_segments.Wide(NOISE, PROCESS_NOISE.start, PROCESS_NOISE.push), information, pull,
-        anchor, 1.0 / share, given, modes, nominal_reference.freedom(parts),
-        misfit=seen if seen.families else None,  # type: ignore[arg-type]
+        linear_segments.Wide(NOISE, PROCESS_NOISE.start, PROCESS_NOISE.acceleration),
+        information, pull, anchor, 1.0 / share, given, modes, nominal_reference.freedom(parts),
+        misfit=of_own if of_own.families else None,  # type: ignore[arg-type]
         counts=share,
     )  # fmt: skip
     return Campaign(
-        made, VoyageEffects(spread, sizes), seen, unseen, tuple(each), np.arange(parts), 0.0, noise,
-        tuple(rows), np.ones(len(given.cut)),
+        made, VoyageEffects(spread, sizes), of_own, unseen, tuple(each), np.arange(parts), 0.0,
+        noise, tuple(rows), np.ones(len(given.cut)),
     )  # fmt: skip
 
 
@@ -208,9 +210,9 @@ def trial(made: Campaign, record: Record, given: Linear, fixed: tuple[str, ...] 
     return replace(found, first=found.at({}))
 
 
-def no_hull(_: Fit) -> Pulses:
+def no_hull(_: Fit) -> SideForce:
     """There is no hull that an intermittent force could act on."""
-    return Pulses(0.0, -1.0, 0.0, 1.0, np.zeros(3))
+    return SideForce(0.0, -1.0, 0.0, 1.0, np.zeros(3))
 
 
 def dense(given: Linear, process_noise: ProcessNoise, rows: np.ndarray | None = None):
@@ -221,7 +223,7 @@ def dense(given: Linear, process_noise: ProcessNoise, rows: np.ndarray | None = 
     stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
     kernel = np.zeros((6 + 3 * knots,) * 2)
     kernel[:6, :6] = np.diag(process_noise.start**2)
-    kernel[6:, 6:] = np.kron(np.diag(process_noise.push**2), stays)
+    kernel[6:, 6:] = np.kron(np.diag(process_noise.acceleration**2), stays)
     for s in range(len(given.e)) if rows is None else rows:
         z = given.z[s].reshape(-1, given.z.shape[-1])
         r = np.diag(np.tile(process_noise.noise**2, given.e.shape[1]))

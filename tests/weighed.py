@@ -11,7 +11,7 @@ from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.remainder import NOMINAL, Remainder
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 SIZE = 0.5  # of every number, where none is given: what matters is 0.1 and, of one, 0.4
 
@@ -20,8 +20,8 @@ def trial() -> straight.Straight:
     """One with nothing in it."""
     columns = straight.columns_of(straight.CAUSES)
     nominal, record = straight.sailed(8), straight.sailed(4, seed=3)
-    usual = straight.campaign(nominal, straight.passed(nominal, columns), columns)
-    return straight.trial(usual, record, straight.passed(record, columns, seed=2))
+    campaign = straight.campaign(nominal, straight.passed(nominal, columns), columns)
+    return straight.trial(campaign, record, straight.passed(record, columns, seed=2))
 
 
 def search(
@@ -30,7 +30,7 @@ def search(
     *,
     evidence: Mapping[tuple[tuple[str, ...], str], float] | None = None,
     sizes: Mapping[str, float] | None = None,
-    pulses: Pulses | None = None,
+    side_force: SideForce | None = None,
 ) -> Search:
     """Hypotheses (causes, kind) with these probabilities, up to a factor.
 
@@ -47,12 +47,12 @@ def search(
             n: np.full(len(columns.of[n]), (sizes or {}).get(n, SIZE)) for n in sorted(labels)
         }
         count = sum(map(len, numbers.values()))
-        said = (evidence or {}).get((labels, kind), 100.0 * len(labels))
-        found = Found("+".join(labels), said, 1.0, numbers, 0.01 * np.eye(count))
+        output = (evidence or {}).get((labels, kind), 100.0 * len(labels))
+        found = Found("+".join(labels), output, 1.0, numbers, 0.01 * np.eye(count))
         remainder = Remainder(kind, 3.0)
         score = float(np.log(p)) - 40.0
         made.table.found[labels, kind] = Hypothesis(
-            tuple(sorted(labels)), remainder, said, score, point, found, pulses
+            tuple(sorted(labels)), remainder, output, score, point, found, side_force
         )
     made.run = lambda: None  # there is nothing else to weigh
     made.table.alone = {cause.label: 1.0 for cause in made.table.catalogue}

@@ -24,7 +24,7 @@ from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.measurement_correction import read
-from shiplog.diagnosis.nominal_reference import Settled
+from shiplog.diagnosis.nominal_reference import Converged
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
@@ -65,49 +65,49 @@ class NominalPass:
     columns: Columns
     held: np.ndarray
     families: Discrepancy
-    pushed: np.ndarray
+    accelerations: np.ndarray
     rows: list[np.ndarray]
 
 
 def nominal_pass(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> NominalPass:  # fmt: skip
     """`numbers` of causes that the voyages have; none but on voyages that are not nominal."""
     columns = nominal_reference.columns_of(model, setting, start)
-    cut, moved, shown = read(model, setting, record, segments.begins(record), numbers)
+    cut, moved, observed = read(model, setting, record, segments.begins(record), numbers)
     whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
     g, path = segments.grid(record), at.path
     wide = nominal_reference.wide_of(setting)
     if numbers:
         path = linearisation.pulled(model, whole, cut, g, wide, path)
-    linear = linearisation.linear(model, whole, cut, g, path, moved, shown, wide)
+    linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
     held = nominal_reference.anchored(start, at.theta, columns)
     families = discrepancy.of(
-        record.profile, at.process_noise.push, len(columns.unit), discrepancy.SEEN,
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
         segment_nodes.at_knots(linear.cut, g),
     )  # fmt: skip
-    pushed = families.pushed(linear.cut, g)
+    accelerations = families.accelerations(linear.cut, g)
     columns = columns.with_misfit(families.count)
     held = np.concatenate((held, np.zeros(families.count)))
-    return NominalPass(linear, columns, held, families, pushed, parts_of(linear.cut.voyage))
+    return NominalPass(linear, columns, held, families, accelerations, parts_of(linear.cut.voyage))
 
 
 def characteristics(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Characteristics:  # fmt: skip
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
     made = nominal_pass(model, setting, start, record, at, numbers)
     columns, held, known = made.columns, made.held, made.columns.known
-    process_noise = noise_time(made.linear, made.pushed, columns, held, at.process_noise)
+    process_noise = noise_time(made.linear, made.accelerations, columns, held, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
     for last in (False, False, True):
         modes = likelihood.modes(
             likelihood.weighed(made.linear, process_noise), process_noise
-        ).beside(made.pushed)
+        ).joined(made.accelerations)
         each = products(modes, made.rows, columns.unit, weight)
         effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
         if not last:  # what the parts disagree in is no noise, nor what a few segments are off by
@@ -144,13 +144,13 @@ def _noise_of_parts(
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
-    left = made.linear.less_numbers(own, made.pushed).pick(kept)
+    left = made.linear.less_numbers(own, made.accelerations).pick(kept)
     return likelihood.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
 def noise_time(
     linear: Linear,
-    pushed: np.ndarray,
+    accelerations: np.ndarray,
     columns: Columns,
     held: np.ndarray,
     process_noise: ProcessNoise,
@@ -163,10 +163,10 @@ def noise_time(
         for factor in way:
             tried = replace(found, time=factor * process_noise.time)
             for _ in range(2 if factor == 1.0 else 1):
-                numbers, _ = _solved(linear, pushed, tried, columns, held)
-                left = linear.less(pushed @ numbers[columns.linearised :])
+                numbers, _ = _solved(linear, accelerations, tried, columns, held)
+                left = linear.less(accelerations @ numbers[columns.linearised :])
                 tried = likelihood.learnt(left, numbers[: columns.linearised], tried, rounds=2)
-            _, value = _solved(linear, pushed, tried, columns, held)
+            _, value = _solved(linear, accelerations, tried, columns, held)
             if value < best:
                 break
             best, found = value, tried
@@ -175,14 +175,14 @@ def noise_time(
 
 def _solved(
     linear: Linear,
-    pushed: np.ndarray,
+    accelerations: np.ndarray,
     process_noise: ProcessNoise,
     columns: Columns,
     held: np.ndarray,
 ) -> tuple[np.ndarray, float]:
     """Likeliest numbers [C], SI, and the campaign's log marginal likelihood."""
-    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).beside(
-        pushed
+    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise).joined(
+        accelerations
     )
     by = np.concatenate(([1.0], columns.unit))
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
@@ -198,7 +198,7 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
     each family of the discrepancy."""
     part = np.array([name.split(".")[0] for name in model.base.names])
     found = {name: np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())}
-    found |= {c.label: columns.of[c.label] for c in model.causes if c.usual}
+    found |= {c.label: columns.of[c.label] for c in model.causes if c.nominal}
     return found | {family.name: family.columns for family in families.families}
 
 

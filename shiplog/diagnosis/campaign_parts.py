@@ -33,7 +33,7 @@ def picked(modes: Modes, rows: np.ndarray) -> Modes:
     """The segments `rows` of a pass; its volume is not theirs."""
     return replace(
         modes, dd=modes.dd[rows], md=modes.md[rows], felt=modes.felt[rows], axes=modes.axes[rows],
-        pushed=modes.pushed[rows],
+        accelerations=modes.accelerations[rows],
     )  # fmt: skip
 
 
@@ -61,8 +61,8 @@ def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray
     those of accelerations at the nodes."""
     r = np.concatenate(([1.0], -numbers))
     left, more = r[: modes.dd.shape[-1]], r[modes.dd.shape[-1] :]
-    pushed = modes.pushed @ more
+    accelerations = modes.accelerations @ more
     along = modes.md @ left
     square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
-    square += ((2.0 * along + modes.felt * pushed) * pushed).sum(-1)
-    return square - ((along + modes.felt * pushed) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
+    square += ((2.0 * along + modes.felt * accelerations) * accelerations).sum(-1)
+    return square - ((along + modes.felt * accelerations) ** 2 / (modes.felt + noise**-2.0)).sum(-1)

@@ -12,12 +12,12 @@ from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.intermittent import pulse_force
+from shiplog.diagnosis.intermittent import force_at_nodes
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
 from shiplog.diagnosis.result import Decision, Named, Structure
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
@@ -37,7 +37,7 @@ def decide(
     fit = table.fit(best)
     mostly = posteriors.share_of_causes(table, best) >= thresholds.MOST
     mostly = mostly and not _imitated(table, fit, names)
-    verdict, structure, named, pulses = "undecided", None, (), None
+    verdict, structure, named, side_force = "undecided", None, (), None
     if names and mostly:
         verdict, named = "named", _named(table, found, best, names)
     elif best.kind != NOMINAL and (kind is not None or names):
@@ -45,19 +45,19 @@ def decide(
     elif found.none >= thresholds.STATED:
         verdict = "none"
     if verdict in ("named", "unknown") and is_device(table, best, fit):
-        verdict, structure, pulses = "named", None, best.pulses
+        verdict, structure, side_force = "named", None, best.side_force
     traces = ()
     if verdict == "none":
         rest = [n for n in map(name_of, best.causes) if n not in names]
         traces = _named(table, found, best, rest)
-    shown = fit if verdict in ("named", "unknown") else table.fit(table.nothing)
-    if pulses is not None:
-        shown = _with_pulses(shown, pulses)
-    nothing = Fit(table.first, table.nothing.found, shown.remainder)
+    reported = fit if verdict in ("named", "unknown") else table.fit(table.nothing)
+    if side_force is not None:
+        reported = _with_side_force(reported, side_force)
+    nothing = Fit(table.first, table.nothing.found, reported.remainder)
     return Decision(
-        verdict, named, structure, pulses, traces,
+        verdict, named, structure, side_force, traces,
         _reasons(table, found, refuted | dict(doubted or {}), named),
-        found.ranking(), shown, nothing, search.told,
+        found.ranking(), reported, nothing, search.expected,
     ), found  # fmt: skip
 
 
@@ -122,17 +122,17 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
 
 def is_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> bool:
     """Whether an intermittent force is what remains, and is that of one device."""
-    if best.kind != INTERMITTENT or best.pulses is None:
+    if best.kind != INTERMITTENT or best.side_force is None:
         return False
-    with_it = _with_pulses(fit, best.pulses)
-    force, deviation = pulse_force(table.trial, with_it, best.pulses)
+    with_it = _with_side_force(fit, best.side_force)
+    force, deviation = force_at_nodes(table.trial, with_it, best.side_force)
     return posteriors.of_one_device(force, deviation)
 
 
-def _with_pulses(fit: Fit, pulses: Pulses) -> Fit:
+def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
     """The same with the intermittent force in its remainder."""
-    surge, sway, yaw = pulses.unit * pulses.force
-    remainder = replace(fit.remainder, pulse=(float(surge), float(sway), float(yaw)))
+    surge, sway, yaw = side_force.unit * side_force.force
+    remainder = replace(fit.remainder, intermittent=(float(surge), float(sway), float(yaw)))
     return replace(fit, remainder=remainder)
 
 
@@ -140,15 +140,15 @@ def _reasons(
     table: Hypotheses, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
 ) -> dict[str, str]:
     """Label → why it is not named."""
-    said = dict(refuted)
+    reasons = dict(refuted)
     kept = {n.cause.name for n in named}
     for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:8]:
         name = name_of(label)
-        if name in kept or name in said:
+        if name in kept or name in reasons:
             continue
         misfit = table.placebo.get(label, 0.0)
         why = f"log Bayes factor {gained:+.0f} nats by itself"
         if misfit >= 1.0:
             why += f", of which a nominal voyage has {misfit:.0f} too"
-        said[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
-    return said
+        reasons[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
+    return reasons

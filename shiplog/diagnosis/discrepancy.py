@@ -74,26 +74,28 @@ class Family:
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """All families of one ship. push [3]: the unit of each channel's acceleration."""
+    """All families of one ship. acceleration [3]: the unit of each channel's acceleration."""
 
     families: tuple[Family, ...]
-    push: np.ndarray
+    acceleration: np.ndarray
 
     @property
     def count(self) -> int:
         return sum(len(family.columns) for family in self.families)
 
-    def pushed(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
+    def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
         if not self.families:
             return np.zeros((len(cut), 3 * g.knots, 0))
         knots = segment_nodes.at_knots(cut, g)
-        parts = [segment_nodes.pushed(f.features(knots), self.push) for f in self.families]
+        parts = [
+            segment_nodes.accelerations(f.features(knots), self.acceleration) for f in self.families
+        ]
         return np.concatenate(parts, axis=-1)
 
 
 def of(
-    profile: Profile, push: np.ndarray, first: int, names: Sequence[str], *campaigns: Knots
+    profile: Profile, acceleration: np.ndarray, first: int, names: Sequence[str], *campaigns: Knots
 ) -> Discrepancy:
     """The families that these campaigns can show anything of.
 
@@ -117,7 +119,7 @@ def of(
         columns = np.arange(first, first + 3 * len(level))
         first += len(columns)
         found.append(Family(name, profile, waves, level, scale, columns))
-    return Discrepancy(tuple(found), push)
+    return Discrepancy(tuple(found), acceleration)
 
 
 def _waves(name: str, *campaigns: Knots) -> Waves | None:

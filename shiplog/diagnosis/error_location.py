@@ -24,7 +24,7 @@ from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.profile import Profile
 from shiplog.simulation import coverage as covering
 from shiplog.simulation import error_breakdown
@@ -35,11 +35,11 @@ from shiplog.voyages import one_hertz
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
 
-PULSE_SURE = 0.5  # of the strongest: where the thruster counts as on
-PULSE_APART = 2.5  # nodes that an intermittent force may pause for
+ACTIVE_FROM = 0.5  # of the strongest: where the thruster counts as on
+PAUSE_NODES = 2.5  # nodes that an intermittent force may pause for
 
 
-def pushed(
+def external(
     trial: Trial, point: Point, whole: Linear, remainder: Remainder
 ) -> tuple[list[Interval], np.ndarray]:
     """Stretches that no force of the ship explains, and the segments [S] bool that they touch: no
@@ -59,8 +59,8 @@ def pushed(
     for stretch in found:
         inside = (begin < stretch.end_s) & (begin + trial.grid.seconds > stretch.start_s)
         out |= inside & (of == stretch.voyage)
-    said = [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
-    return said, out
+    intervals = [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
+    return intervals, out
 
 
 def by_channel(held: HeldOut) -> list[dict]:
@@ -90,13 +90,13 @@ def uncovered(
 ) -> list[Interval]:
     """Windows that the training data never came near."""
     rows = one_hertz.with_elapsed(store.seconds(names, profile))
-    seen = covering.of(run.training(), profile.actuator_names, profile.has_wind)
+    trained = covering.of(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",
         "elapsed",
     )  # fmt: skip
     size = run.config.window
-    whole = numbered.hstack(seen.table(rows, numbered, size))
+    whole = numbered.hstack(trained.table(rows, numbered, size))
     found = []
     for row in whole.filter(pl.col("coverage") < thresholds.COVERED).to_dicts():
         within = rows.filter(
@@ -113,19 +113,19 @@ def uncovered(
     return found
 
 
-def pulses(trial: Trial, decision: Decision, found: Pulses) -> list[dict]:
+def active_intervals(trial: Trial, decision: Decision, found: SideForce) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
-    force, sd = intermittent.pulse_force(trial, decision.shown, found)
+    force, sd = intermittent.force_at_nodes(trial, decision.fit, found)
     strongest = float(np.quantile(np.abs(force), 0.98))
     times: list[dict] = []
     for i, row in enumerate(trial.rows):
         name = trial.record.names[trial.record.voyage[row]]
         begin = float(trial.record.time[row])
-        for k in np.flatnonzero(np.abs(force[i, :-1]) >= PULSE_SURE * strongest):
+        for k in np.flatnonzero(np.abs(force[i, :-1]) >= ACTIVE_FROM * strongest):
             at, value = begin + trial.grid.knot * float(k), float(force[i, k])
             one = {"voyage": name, "start_s": at, "end_s": at, "force_N": value,
                    "sd_N": float(sd[i, k])}  # fmt: skip
-            if times and _joined(times[-1], one, PULSE_APART * trial.grid.knot):
+            if times and _joined(times[-1], one, PAUSE_NODES * trial.grid.knot):
                 last = times[-1]
                 last["end_s"] = at
                 if abs(value) > abs(last["force_N"]):

@@ -12,15 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from shiplog.diagnosis.campaign_parts import robust_weights, squares
-from shiplog.diagnosis.fitted import Found, Level, Point, Told
+from shiplog.diagnosis.fitted import ExpectedEvidence, Found, Level, Point
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
-from shiplog.diagnosis.remainder import Remainder, expected
+from shiplog.diagnosis.remainder import Remainder, noise_prior
 from shiplog.diagnosis.trial import Numbers, Trial
 from shiplog.models.causes import Cause
 
 NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the nominal
 FINER = 1.08  # step about the best of them
-USUAL = Remainder()
+NO_CHANGE_OF_NOISE = Remainder()
 
 
 def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
@@ -41,20 +41,20 @@ def robust(trial: Trial, point: Point) -> np.ndarray:
     none = np.zeros(trial.unseen.count)
     unit = np.append(trial.reference.columns.unit, none)
     d = np.append(best.solution[: len(trial.reference.pull)], none)
-    modes, noise = trial.products.modes(point, best.noise_factor, USUAL)
+    modes, noise = trial.products.modes(point, best.noise_factor, NO_CHANGE_OF_NOISE)
     return robust_weights(squares(modes, d * unit, noise), trial.weight > 0.0)
 
 
 def level(
     trial: Trial, point: Point, noise: float, included: Sequence[str] = (),
-    remainder: Remainder = USUAL,
+    remainder: Remainder = NO_CHANGE_OF_NOISE,
 ) -> Level:  # fmt: skip
     """The base hypothesis at one level of process noise."""
     assert trial.first is not None
     total, _ = trial.products.total(point, noise, trial.weight, remainder)
     volume = trial.products.volume(trial.first, noise, trial.weight, remainder)
     found = solve(trial, total, volume, noise, point, included, remainder)
-    return replace(found, value=found.value + expected(noise, trial.usual_spread, remainder))
+    return replace(found, value=found.value + noise_prior(noise, trial.nominal_spread, remainder))
 
 
 def solve(
@@ -98,7 +98,7 @@ def solve(
 
 def levels(
     trial: Trial, point: Point, included: Sequence[str] = (), near: float | None = None,
-    remainder: Remainder = USUAL,
+    remainder: Remainder = NO_CHANGE_OF_NOISE,
 ) -> list[Level]:  # fmt: skip
     """From the nominal process noise outwards while it gets likelier; finely about the best.
     `near`: about there only."""
@@ -133,7 +133,7 @@ def levels(
 
 def scan(
     trial: Trial, point: Point, candidates: Sequence[Cause], included: Sequence[str] = (),
-    near: float | None = None, remainder: Remainder = USUAL,
+    near: float | None = None, remainder: Remainder = NO_CHANGE_OF_NOISE,
 ) -> tuple[Found, list[Found]]:  # fmt: skip
     """The base hypothesis, and each candidate in addition to it, each at its own best level."""
     tried = levels(trial, point, included, near, remainder)
@@ -171,10 +171,12 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
     left = np.linalg.inv(own)
     information = own - np.eye(len(columns))
     shrunk = information @ left
-    told = Told(np.diagonal(shrunk @ information).copy(), cost - 0.5 * float(np.trace(shrunk)))
+    expected = ExpectedEvidence(
+        np.diagonal(shrunk @ information).copy(), cost - 0.5 * float(np.trace(shrunk))
+    )
     return Found(
         label, one.value + gained, one.noise_factor, {label: value * unit},
-        left * np.outer(unit, unit), told,
+        left * np.outer(unit, unit), expected,
     )  # fmt: skip
 
 

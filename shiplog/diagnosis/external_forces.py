@@ -136,7 +136,9 @@ def balance(
     weigh = masses(physics, values).T
     full = means(record, physics, values)
     reach = np.abs(np.linalg.solve(weigh, full))
-    loose = replace(process_noise, push=np.maximum(process_noise.push, LOOSE * reach))
+    loose = replace(
+        process_noise, acceleration=np.maximum(process_noise.acceleration, LOOSE * reach)
+    )
     rows, acceleration, sd = _knots(residual_acceleration.posterior(linear, d, loose, record))
     force = acceleration @ weigh.T
     doubt = np.sqrt(sd**2 @ weigh.T**2)
@@ -145,7 +147,7 @@ def balance(
     state = residual_acceleration.around(record, record.state, rows)
     actuator = residual_acceleration.around(record, record.actuator, rows)
     limit = np.abs(_forces(physics, values, state, actuator)["hull"])
-    limit += thresholds.EXTERNAL_USUAL * misfit
+    limit += thresholds.EXTERNAL_MISFIT * misfit
     limit += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
@@ -252,7 +254,7 @@ def _contradicted(record: Record, rows: np.ndarray) -> np.ndarray:
             (state[part][:, [0, 2]], velocity[part], sensors.noise("position")),
             (state[part, 4, None], state[part, 5, None], sensors.noise("heading")),
         ):
-            for row, _ in jumps(gone, rate, record.seen[part], noise):
+            for row, _ in jumps(gone, rate, record.measured[part], noise):
                 shaken[a + row] = True
     near = np.concatenate(([0], np.cumsum(shaken)))
     reach = round(DOUBT / record.step)

@@ -73,12 +73,12 @@ def of_parts(trial: Trial, linear: Linear, one: Fit) -> Linear:
     common = solved(trial, one) / columns.unit
     deviation = math.hypot(1.0, campaign.apart) * campaign.effects.deviation
     free = np.flatnonzero(deviation > 0.0)
-    pushed = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
+    accelerations = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
     if trial.reference.misfit is not None:
-        pushed = trial.reference.misfit.pushed(linear.cut, trial.grid)
+        accelerations = trial.reference.misfit.accelerations(linear.cut, trial.grid)
     begins = trial.rows[[rows[0] for rows in trial.parts]]
     of = np.searchsorted(begins, linear.cut.rows, side="right") - 1
-    numbers = np.zeros((len(linear.e), columns.linearised + pushed.shape[-1]))
+    numbers = np.zeros((len(linear.e), columns.linearised + accelerations.shape[-1]))
     each = trial.products.of_parts(
         one.point, one.found.noise_factor, trial.weight, one.remainder
     )  # fmt: skip
@@ -87,7 +87,7 @@ def of_parts(trial: Trial, linear: Linear, one: Fit) -> Linear:
         left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + np.arange(len(common)))] @ common
         rows = np.flatnonzero(of == i)
         numbers[np.ix_(rows, free)] = np.linalg.solve(own, left) * columns.unit[free]
-    return linear.less_numbers(numbers, pushed)
+    return linear.less_numbers(numbers, accelerations)
 
 
 # --- remainders
@@ -136,12 +136,15 @@ def imitated(trial: Trial, one: Fit, label: str) -> float:
 
 def acts_on(trial: Trial, one: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts."""
-    changed_by = Remainder(family, SIZES[1], pulse=one.remainder.pulse)
+    changed_by = Remainder(family, SIZES[1], intermittent=one.remainder.intermittent)
     level = evidence.level(trial, one.point, one.found.noise_factor, one.included, changed_by)
     of = trial.unseen if family in discrepancy.UNSEEN else trial.campaign.discrepancy
     columns = trial.families[family]
     weights = np.zeros(of.count)
     weights[columns - of.families[0].columns[0]] = level.solution[-len(columns) :]
-    pushed = of.pushed(one.point.linear.cut, trial.grid) @ weights
-    size = pushed.reshape(len(pushed), 3, -1).std((0, 2)) / trial.reference.process_noise.push
+    accelerations = of.accelerations(one.point.linear.cut, trial.grid) @ weights
+    size = (
+        accelerations.reshape(len(accelerations), 3, -1).std((0, 2))
+        / trial.reference.process_noise.acceleration
+    )
     return tuple(str(n) for n in np.array(CHANNELS)[size > thresholds.ACTS * size.max()])

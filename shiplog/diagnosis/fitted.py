@@ -20,7 +20,7 @@ class Found:
                    structure its log Bayes factor over the base hypothesis
     noise_factor   λ, the most probable factor of the process noise
     numbers        of each cause, as a change from nominal, with their covariance
-    told           of a candidate: the information of these data about it
+    expected       of a candidate: the log Bayes factor to expect of it, by its size
     """
 
     name: str
@@ -28,11 +28,11 @@ class Found:
     noise_factor: float
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
     covariance: np.ndarray | None = None
-    told: Told | None = None
+    expected: ExpectedEvidence | None = None
 
 
 @dataclass(frozen=True)
-class Told:
+class ExpectedEvidence:
     """Expected log Bayes factor of a cause: ½ Σ each s² - cost, for numbers s in units of their
     realistic size."""
 

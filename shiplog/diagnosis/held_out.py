@@ -76,25 +76,26 @@ class HeldOut(Rollouts):
 
     def extended(self, decision: Decision) -> ExtendedSimulator:
         """The model with what is named in it, with numbers from all voyages."""
-        named, beside = decision.named, None
+        named, coefficients = decision.named, None
         if decision.adapted:
-            trial, seen = self.simulated(decision)
-            beside = fits.coefficients(trial, seen.shown)
+            trial, simulated = self.simulated(decision)
+            coefficients = fits.coefficients(trial, simulated.fit)
         return self.before.with_causes(
             [n.cause for n in named], {n.cause.label: n.numbers for n in named},
-            {n.cause.label: n.covariance for n in named}, self._constants(decision), beside,
+            {n.cause.label: n.covariance for n in named}, self._constants(decision),
+            coefficients,
         )  # fmt: skip
 
     def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
         """The model that is simulated on the trial's segments, with what is named in it."""
-        return (self.trial, decision) if self.own is None else self.own.beside(decision)
+        return (self.trial, decision) if self.own is None else self.own.extended_by(decision)
 
     def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
         """The same with the model's own coefficients fitted again together with what is named,
         where that makes the error less."""
-        beside = replace(decision, adapted=True)
-        again = self.gain(beside)
-        return (beside, again) if again.after < found.after else (decision, found)
+        adapted = replace(decision, adapted=True)
+        again = self.gain(adapted)
+        return (adapted, again) if again.after < found.after else (decision, found)
 
     def simulated_with(self, decision: Decision) -> tuple[Decision, Gain | None]:
         """What others named in this model, and what it is worth there."""
@@ -161,17 +162,17 @@ class HeldOut(Rollouts):
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         """Numbers of the named causes from all else alone, and the coefficients together with them
         where the model adapts."""
-        recorded, segment = self.trial.record, decision.shown.point.linear.cut
+        recorded, segment = self.trial.record, decision.fit.point.linear.cut
         index = recorded.names.index(voyage) if voyage in recorded.names else -1
         out = segment.voyage == index
         if half is not None:
             middle, late = half
             out &= (recorded.time[segment.rows] >= middle) == late
         numbers, coefficients = {}, None
-        if decision.shown.included or decision.adapted:
-            numbers, beside = fits.without(self.trial, decision.shown, out)
+        if decision.fit.included or decision.adapted:
+            numbers, fitted = fits.without(self.trial, decision.fit, out)
             if self.own is not None and decision.adapted:
-                trial, seen = self.own.beside(decision)
-                _, beside = fits.without(trial, seen.shown, out)
-            coefficients = beside if decision.adapted else None
+                trial, simulated = self.own.extended_by(decision)
+                _, fitted = fits.without(trial, simulated.fit, out)
+            coefficients = fitted if decision.adapted else None
         return {n.cause.label: numbers[n.cause.label] for n in decision.named}, coefficients

@@ -14,7 +14,7 @@ from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
 from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 KEPT_LINEARISATIONS = 6  # the others are computed again when needed
 
@@ -73,14 +73,18 @@ class Hypotheses:
         return evidence + self.priors.of(labels, kind) - misfit - form_error(self.alone, labels)
 
     def put(
-        self, labels: tuple[str, ...], evidence: float, fit: Fit, pulses: Pulses | None = None
+        self,
+        labels: tuple[str, ...],
+        evidence: float,
+        fit: Fit,
+        side_force: SideForce | None = None,
     ) -> None:
         """Keep a hypothesis where it is the most probable one of its causes and kind."""
         kind = fit.remainder.kind
         score = self.score(evidence, labels, kind)
         if (labels, kind) not in self.found or self.found[labels, kind].score < score:
             self.found[labels, kind] = Hypothesis(
-                labels, fit.remainder, evidence, score, fit.point, fit.found, pulses
+                labels, fit.remainder, evidence, score, fit.point, fit.found, side_force
             )
 
     def noted_alone(self, label: str, gained: float) -> None:
@@ -106,11 +110,11 @@ class Hypotheses:
                 self.found[key] = replace(one, point=place)
 
     @cached_property
-    def usual_push(self) -> np.ndarray | None:
+    def nominal_side_force(self) -> np.ndarray | None:
         """Acceleration [3] that the nominal process noise has at one place."""
-        return intermittent.usual_push(self.trial.campaign, self.trial.grid)
+        return intermittent.nominal_side_force(self.trial.campaign, self.trial.grid)
 
-    def intermittent(self, fit: Fit) -> Pulses:
+    def intermittent(self, fit: Fit) -> SideForce:
         """An intermittent force at one place along the ship, and its log Bayes factor over raised
         noise, whose nominal part acts at one place too."""
-        return intermittent.pulses(self.trial, fit, self.usual_push)
+        return intermittent.side_force(self.trial, fit, self.nominal_side_force)

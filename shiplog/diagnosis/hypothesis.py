@@ -12,7 +12,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.models.causes import Cause
 
 
@@ -33,7 +33,7 @@ class Hypothesis:
     point      the trial linearised at the causes' numbers; of a hypothesis far behind, the point
                without relinearisation
     found      their numbers and covariance there
-    pulses     the intermittent side force, of an intermittent remainder
+    side_force  of an intermittent remainder
     """
 
     causes: tuple[str, ...]
@@ -42,7 +42,7 @@ class Hypothesis:
     score: float
     point: Point | Place
     found: Found
-    pulses: Pulses | None = None
+    side_force: SideForce | None = None
 
     @property
     def kind(self) -> str:

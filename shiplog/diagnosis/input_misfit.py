@@ -39,7 +39,7 @@ class Misfit:
     def count(self) -> int:
         return self.axes.shape[-1]
 
-    def pushed(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
+    def accelerations(self, cut: Cut, g: SegmentGrid) -> np.ndarray:
         """[S, 3J, W]: acceleration of each weight at the knots, channel by channel."""
         waves = _features(self.network, segment_nodes.at_knots(cut, g))
         return np.concatenate([waves @ axes for axes in self.axes], axis=1)
@@ -51,27 +51,27 @@ class Misfit:
 
 def of(
     network: Network, cut: Cut, g: SegmentGrid, modes: Modes, known: np.ndarray,
-    unit: np.ndarray, push: np.ndarray,
+    unit: np.ndarray, acceleration: np.ndarray,
 ) -> Misfit:  # fmt: skip
     """With the most probable size, conditional on numbers [C] in `unit`s [C] with the prior
     information `known`.
 
     cut    of the voyages that `modes` are of
-    push   [3] unit of size
+    acceleration  [3] unit of size
     """
     waves = _features(network, segment_nodes.at_knots(cut, g))
     sums = np.linalg.eigh(np.tensordot(waves, waves, ((0, 1), (0, 1))))[1][:, -SUMS:]
     count = sums.shape[1]
     axes = np.zeros((3, len(sums), 3 * count))
-    for channel, size in enumerate(push):
+    for channel, size in enumerate(acceleration):
         axes[channel][:, channel * count : (channel + 1) * count] = size * sums
     whole = Misfit(network, axes)
     by = np.concatenate(([1.0], unit, np.ones(3 * count)))
-    total = modes.beside(whole.pushed(cut, g)).total(np.ones(len(cut)))
+    total = modes.joined(whole.accelerations(cut, g)).total(np.ones(len(cut)))
     total = total * np.outer(by, by)
     size = max(SIZES, key=lambda one: _likelihood(total, known, one))
-    told = total[1 + len(known) :, 1 + len(known) :]
-    felt, turned = np.linalg.eigh(size**2 * told)
+    information = total[1 + len(known) :, 1 + len(known) :]
+    felt, turned = np.linalg.eigh(size**2 * information)
     return Misfit(network, axes @ (size * turned[:, felt > FELT]))
 
 

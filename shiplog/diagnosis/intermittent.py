@@ -15,10 +15,10 @@ from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 
-def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
+def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     """Acceleration [3], root mean square, of nominal process noise that acts at one place; None
     where independent noise in each channel is more probable.
 
@@ -28,7 +28,7 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     linear = reference.nominal
     if linear is None or not campaign.weight.sum():
         return None
-    pushed = campaign.discrepancy.pushed(linear.cut, g)
+    accelerations = campaign.discrepancy.accelerations(linear.cut, g)
     unit, share = reference.columns.unit, reference.counts
     own = np.empty((len(linear.e), len(unit)))
     names = np.unique(campaign.voyage)
@@ -37,23 +37,23 @@ def usual_push(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
         information, pull = campaign.prior_without(left_out, campaign.apart)
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
         own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
-    left, none = linear.less_numbers(own, pushed), np.zeros(linear.j.shape[-1])
-    found = unrecorded_thruster.pulses_of(
+    left, none = linear.less_numbers(own, accelerations), np.zeros(linear.j.shape[-1])
+    found = unrecorded_thruster.estimate_side_force(
         left, none, reference, reference.process_noise, campaign.weight
     )
     return found.unit * found.force if found.gain > 0.0 else None
 
 
-def pulses(trial: Trial, fit: Fit, usual: np.ndarray | None = None) -> Pulses:
-    """Of what a hypothesis leaves; `usual` as `unrecorded_thruster.pulses_of`."""
+def side_force(trial: Trial, fit: Fit, nominal: np.ndarray | None = None) -> SideForce:
+    """Of what a hypothesis leaves; `nominal` as `unrecorded_thruster.estimate_side_force`."""
     left, d = fits.residual(trial, fit.point.linear, fit)
     process_noise = trial.process_noise(fit.remainder)
-    return unrecorded_thruster.pulses_of(
-        left, d, trial.reference, process_noise, trial.weight, usual
+    return unrecorded_thruster.estimate_side_force(
+        left, d, trial.reference, process_noise, trial.weight, nominal
     )
 
 
-def pulse_force(trial: Trial, fit: Fit, pulses: Pulses) -> tuple[np.ndarray, np.ndarray]:
+def force_at_nodes(trial: Trial, fit: Fit, side_force: SideForce) -> tuple[np.ndarray, np.ndarray]:
     """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N; of a
     hypothesis whose remainder has it."""
     process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
@@ -61,11 +61,15 @@ def pulse_force(trial: Trial, fit: Fit, pulses: Pulses) -> tuple[np.ndarray, np.
     z, covariance = likelihood.starts_and_knots(*left, process_noise)
     knots = trial.grid.knots
     kernel = process_noise.kernel(knots)
-    pulse = replace(process_noise, push=1e-9 * process_noise.push).kernel(knots)
-    share = pulse @ np.linalg.inv(kernel)
-    pushed = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+    intermittent = replace(process_noise, acceleration=1e-9 * process_noise.acceleration).kernel(
+        knots
+    )
+    share = intermittent @ np.linalg.inv(kernel)
+    accelerations = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
     sway = slice(knots, 2 * knots)
-    beyond = (pulse - share @ pulse)[sway, sway]
+    beyond = (intermittent - share @ intermittent)[sway, sway]
     known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
     variance = np.diagonal(known + beyond, axis1=1, axis2=2)
-    return pushed[:, 1] / pulses.unit[1], np.sqrt(np.maximum(variance, 0.0)) / pulses.unit[1]
+    return accelerations[:, 1] / side_force.unit[1], np.sqrt(
+        np.maximum(variance, 0.0)
+    ) / side_force.unit[1]

@@ -31,19 +31,20 @@ class ProcessNoise:
 
     noise   [6]  of one observation (a mean over `bin` s), channels.STATE; of its variance a share
                  `coloured` [6] lasts, and fades within `fade` [6] s
-    push    [3]  of the process noise [m/s², m/s², rad/s²]
+    acceleration   [3]  of the process noise [m/s², m/s², rad/s²]
     time         its correlation time, s
     start   [6]  of the initial state, before any data
-    pulse   [3]  acceleration of an intermittent force, with its correlation time `pulse_time` [s]
+    intermittent   [3]  acceleration of an intermittent force, of correlation time
+                   `intermittent_time` [s]
     bin, knot    s of one observation, and between the nodes of the acceleration
     """
 
     noise: np.ndarray
-    push: np.ndarray
+    acceleration: np.ndarray
     time: float
     start: np.ndarray
-    pulse: np.ndarray | None = None
-    pulse_time: float = 12.0
+    intermittent: np.ndarray | None = None
+    intermittent_time: float = 12.0
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
     bin: float = BIN
@@ -52,13 +53,16 @@ class ProcessNoise:
     def kernel(self, knots: int) -> np.ndarray:
         """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
         apart = self.knot * np.arange(knots)
-        whole = np.kron(np.diag(self.push**2), _decay(apart, self.time))
-        if self.pulse is not None:
-            whole += np.kron(np.outer(self.pulse, self.pulse), _decay(apart, self.pulse_time))
+        whole = np.kron(np.diag(self.acceleration**2), _decay(apart, self.time))
+        if self.intermittent is not None:
+            whole += np.kron(
+                np.outer(self.intermittent, self.intermittent),
+                _decay(apart, self.intermittent_time),
+            )
         return whole
 
     def times(self, factor: float) -> ProcessNoise:
-        return replace(self, push=self.push * factor)
+        return replace(self, acceleration=self.acceleration * factor)
 
     def precision(self, knots: int) -> np.ndarray:
         """Of z [Z, Z]."""
@@ -97,11 +101,11 @@ class _Whitening:
             )
             roots = np.zeros((len(patterns), bins, bins))
             for root, pattern in zip(roots, patterns, strict=True):
-                seen = np.ix_(pattern, pattern)
-                root[seen] = np.linalg.inv(np.linalg.cholesky(correlation[seen]))
+                known = np.ix_(pattern, pattern)
+                root[known] = np.linalg.inv(np.linalg.cholesky(correlation[known]))
             each = roots[of.reshape(-1)]
-            seen = np.diagonal(each, axis1=1, axis2=2)[used[..., channel]]
-            self.logdet -= 2.0 * float(np.log(seen).sum())
+            diagonal = np.diagonal(each, axis1=1, axis2=2)[used[..., channel]]
+            self.logdet -= 2.0 * float(np.log(diagonal).sum())
             self.by.append(each / process_noise.noise[channel])
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
@@ -159,7 +163,7 @@ class Modes:
     felt    [S, 3J]            data information of each mode over its prior information
     axes    [S, 3J, 3J]        from accelerations at the nodes to modes
     logdet  of noise and start
-    pushed  [S, 3J, W]         modes of further columns that act as accelerations at the nodes
+    accelerations  [S, 3J, W]  modes of further columns that act as accelerations at the nodes
     """
 
     dd: np.ndarray
@@ -167,11 +171,13 @@ class Modes:
     felt: np.ndarray
     axes: np.ndarray
     logdet: float
-    pushed: np.ndarray
+    accelerations: np.ndarray
 
-    def beside(self, pushed: np.ndarray) -> Modes:
+    def joined(self, accelerations: np.ndarray) -> Modes:
         """With W columns more, of accelerations [S, 3J, W] at the knots."""
-        return replace(self, pushed=np.concatenate((self.pushed, self.axes @ pushed), -1))
+        return replace(
+            self, accelerations=np.concatenate((self.accelerations, self.axes @ accelerations), -1)
+        )
 
     def total(self, weight: np.ndarray, noise_factor: float = 1.0) -> np.ndarray:
         """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
@@ -179,20 +185,20 @@ class Modes:
         part = np.sqrt(weight[:, None] / (self.felt + noise_factor**-2.0))[..., None]
         flat = (self.md * part).reshape(-1, self.md.shape[-1])
         total = np.tensordot(weight, self.dd, 1) - flat.T @ flat
-        if not self.pushed.shape[-1]:
+        if not self.accelerations.shape[-1]:
             return total
         # the effect of such a column, less the part that process noise explains
-        more = (self.pushed * part).reshape(-1, self.pushed.shape[-1])
+        more = (self.accelerations * part).reshape(-1, self.accelerations.shape[-1])
         across = noise_factor**-2.0 * (more.T @ flat)
         more *= np.sqrt(self.felt).reshape(-1, 1) / noise_factor
         return np.block([[total, across.T], [across, more.T @ more]])
 
     def gram(self, noise_factor: float = 1.0) -> Gram:
-        bent = self.felt[..., None] * self.pushed
-        across = np.swapaxes(self.md, 1, 2) @ self.pushed
+        bent = self.felt[..., None] * self.accelerations
+        across = np.swapaxes(self.md, 1, 2) @ self.accelerations
         dd = np.block([
             [self.dd, across],
-            [np.swapaxes(across, 1, 2), np.swapaxes(self.pushed, 1, 2) @ bent],
+            [np.swapaxes(across, 1, 2), np.swapaxes(self.accelerations, 1, 2) @ bent],
         ])  # fmt: skip
         md = np.concatenate((self.md, bent), -1)
         part = md / (self.felt + noise_factor**-2.0)[..., None]
@@ -286,13 +292,13 @@ def learnt(
     """
     left = (linear.e - linear.j @ d)[..., None]
     products = _by_channel(linear, left, process_noise)
-    seen = np.maximum(linear.cut.used.sum((0, 1)), 1)
+    counted = np.maximum(linear.cut.used.sum((0, 1)), 1)
     knots = (linear.z.shape[-1] - 6) // 3
     inverse = np.linalg.inv(_decay(process_noise.knot * np.arange(knots), process_noise.time))
     least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
 
     def at(sizes: np.ndarray) -> ProcessNoise:
-        return replace(process_noise, noise=np.exp(sizes[:6]), push=np.exp(sizes[6:]))
+        return replace(process_noise, noise=np.exp(sizes[:6]), acceleration=np.exp(sizes[6:]))
 
     def step(sizes: np.ndarray) -> np.ndarray:
         """Logarithms of instrument and process noise [9] after one step."""
@@ -303,12 +309,12 @@ def learnt(
         gap = np.concatenate((np.ones((len(gap), 1, 1)), -gap), 1)  # of [e | Z], what z leaves
         second = gap @ np.swapaxes(gap, 1, 2)
         second[:, 1:, 1:] += covariance
-        noise = products.reshape(6, -1) @ second.reshape(-1) / seen
-        pushed = second[:, 7:, 7:].mean(0).reshape(3, knots, 3, knots)
-        push = np.einsum("ij,cicj->c", inverse, pushed) / knots
-        return np.maximum(0.5 * np.log(np.concatenate((noise, push))), least)
+        noise = products.reshape(6, -1) @ second.reshape(-1) / counted
+        accelerations = second[:, 7:, 7:].mean(0).reshape(3, knots, 3, knots)
+        acceleration = np.einsum("ij,cicj->c", inverse, accelerations) / knots
+        return np.maximum(0.5 * np.log(np.concatenate((noise, acceleration))), least)
 
-    sizes = np.log(np.concatenate((process_noise.noise, process_noise.push)))
+    sizes = np.log(np.concatenate((process_noise.noise, process_noise.acceleration)))
     for _ in range(rounds):
         one = step(sizes)
         two = step(one)

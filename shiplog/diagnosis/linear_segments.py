@@ -14,16 +14,18 @@ class Path:
     """Where each segment was linearised: start [S, 6] and knots [S, 3, J] of acceleration."""
 
     start: np.ndarray
-    push: np.ndarray
+    acceleration: np.ndarray
 
     def at_nodes(self, g: SegmentGrid) -> np.ndarray:
-        return np.einsum("scj,kj->skc", self.push, g.weights)
+        return np.einsum("scj,kj->skc", self.acceleration, g.weights)
 
     @property
     def known(self) -> np.ndarray:
         """[S, 6 + 3J] what a linearisation puts back: the start is free, and its own value its
         mean."""
-        return np.concatenate((np.zeros_like(self.start), self.push.reshape(len(self.push), -1)), 1)
+        return np.concatenate(
+            (np.zeros_like(self.start), self.acceleration.reshape(len(self.acceleration), -1)), 1
+        )
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Linear:
             object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
 
     @property
-    def said(self) -> str:
+    def sentence(self) -> str:
         """How many segments were left out; empty where none was."""
         if not self.lost.any():
             return ""
@@ -59,26 +61,26 @@ class Linear:
 
     def pick(self, keep: np.ndarray) -> Linear:
         """Some of the segments."""
-        path = Path(self.path.start[keep], self.path.push[keep])
+        path = Path(self.path.start[keep], self.path.acceleration[keep])
         parts = (getattr(self, name)[keep] for name in ("e", "z", "j", "lost"))
         return Linear(self.cut.pick(keep), path, *parts)
 
-    def less(self, pushed: np.ndarray) -> Linear:
-        """Without what an acceleration `pushed` [S, 3J] at the knots does to the observations."""
-        return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], pushed))
+    def less(self, accelerations: np.ndarray) -> Linear:
+        """Without what `accelerations` [S, 3J] at the knots does to the observations."""
+        return replace(self, e=self.e - np.einsum("sbcz,sz->sbc", self.z[..., 6:], accelerations))
 
-    def less_numbers(self, numbers: np.ndarray, pushed: np.ndarray) -> Linear:
+    def less_numbers(self, numbers: np.ndarray, accelerations: np.ndarray) -> Linear:
         """Residuals without the effect of the numbers [S, C + W] of each segment, SI: C of the
         columns of `j`, then W of accelerations [S, 3J, W] at the nodes."""
         count = self.j.shape[-1]
         e = self.e - np.einsum("sbnc,sc->sbn", self.j, numbers[:, :count])
-        return replace(self, e=e).less(np.einsum("szw,sw->sz", pushed, numbers[:, count:]))
+        return replace(self, e=e).less(np.einsum("szw,sw->sz", accelerations, numbers[:, count:]))
 
-    def beside(self, other: Linear) -> Linear:
+    def joined(self, other: Linear) -> Linear:
         """These segments and others of the same record."""
-        path = Path(*(_both(self.path, other.path, name) for name in ("start", "push")))
+        path = Path(*(_both(self.path, other.path, name) for name in ("start", "acceleration")))
         parts = (_both(self, other, name) for name in ("e", "z", "j", "lost"))
-        return Linear(self.cut.beside(other.cut), path, *parts)
+        return Linear(self.cut.joined(other.cut), path, *parts)
 
 
 def _both(one: object, other: object, name: str) -> np.ndarray:
@@ -92,4 +94,4 @@ class Wide:
 
     noise: np.ndarray
     start: np.ndarray
-    push: np.ndarray
+    acceleration: np.ndarray

@@ -71,8 +71,8 @@ def _ab2(values: Array, before: Array, first) -> Array:
 
 
 @traced
-def states_along(model, theta, start, push, driven, step):
-    """States [S, K, 6] at the nodes, accelerations `push` [S, K, 3] added."""
+def states_along(model, theta, start, acceleration, driven, step):
+    """States [S, K, 6] at the nodes, an `acceleration` [S, K, 3] added."""
 
     def advance(carry, along):
         state, before, first = carry
@@ -82,7 +82,7 @@ def states_along(model, theta, start, push, driven, step):
         state_next = state + step * _ab2(slope, before, first)
         return (state_next, slope, False), state
 
-    along = (jnp.moveaxis(driven, 1, 0), jnp.moveaxis(push, 1, 0))
+    along = (jnp.moveaxis(driven, 1, 0), jnp.moveaxis(acceleration, 1, 0))
     _, states = jax.lax.scan(advance, (start, jnp.zeros_like(start), True), along)
     return jnp.moveaxis(states, 0, 1)
 
@@ -124,20 +124,20 @@ def first_path(model: Smooth, theta: np.ndarray, segments: Cut, g: SegmentGrid) 
     accelerated = resampled(at, change, knots)
     states = resampled(centre, y, knots)
     per = round(g.knot / (g.step * g.every))
-    said = accelerations(model, theta, states, segments.driven[:, ::per])
+    modelled = accelerations(model, theta, states, segments.driven[:, ::per])
     start = y[:, 0] - 0.5 * (y[:, 1] - y[:, 0])
-    return Path(start, np.moveaxis(accelerated - said, -1, 1))
+    return Path(start, np.moveaxis(accelerated - modelled, -1, 1))
 
 
 def accelerations(
     model: Smooth, theta: np.ndarray, states: np.ndarray, driven: np.ndarray
 ) -> np.ndarray:
     """ν̇ [S, n, 3] at states [S, n, 6]."""
-    said = np.empty((*states.shape[:2], 3))
+    modelled = np.empty((*states.shape[:2], 3))
     for part, filled in chunks(len(states)):
         found = _accelerations(model, theta, filled(states), filled(driven))
-        said[part] = np.asarray(found)[: len(said[part])]
-    return said
+        modelled[part] = np.asarray(found)[: len(modelled[part])]
+    return modelled
 
 
 @traced
@@ -185,7 +185,7 @@ def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: 
     if away.any():
         gap, z, used = gap.copy(), z.copy(), used & ~away[:, None, None]
         gap[away], z[away] = 0.0, 0.0
-    prior = np.concatenate((wide.start, np.repeat(wide.push, path.push.shape[-1])))
+    prior = np.concatenate((wide.start, np.repeat(wide.acceleration, path.acceleration.shape[-1])))
     weight = np.where(used, 1.0 / wide.noise, 0.0)
     scaled = (z * weight[..., None]).reshape(count, -1, size)
     # the start is free about where it stands, the knots about zero
@@ -194,7 +194,9 @@ def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: 
     pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - path.known * prior**-2.0
     step = np.linalg.solve(normal, pull[..., None])[..., 0]
     step[away] = 0.0
-    return Path(path.start + step[:, :6], path.push + step[:, 6:].reshape(path.push.shape))
+    return Path(
+        path.start + step[:, :6], path.acceleration + step[:, 6:].reshape(path.acceleration.shape)
+    )
 
 
 def linear(
@@ -204,13 +206,13 @@ def linear(
     g: SegmentGrid,
     path: Path,
     moved: np.ndarray,
-    shown: np.ndarray,
+    observed: np.ndarray,
     wide: Wide | None = None,
 ) -> Linear:
     """Around a path, by all of θ, of which the last Q are causes' numbers.
 
     moved   [S, K, D, Q]  derivatives of actuators and wind by the causes' numbers
-    shown   [S, B, 6, Q]  derivatives of the measurements by them
+    observed  [S, B, 6, Q]  derivatives of the measurements by them
     wide    standard deviation of the path about its measurement: a path RUN_AWAY times that
             away has diverged; where it is not given, the span of the segments
     """
@@ -220,11 +222,11 @@ def linear(
         used = segments.used & ~lost[:, None, None]
         segments = replace(segments, used=used)
         y, columns = np.where(lost[:, None, None], segments.y, y), columns.copy()
-        columns[lost], shown = 0.0, np.where(lost[:, None, None, None], 0.0, shown)
+        columns[lost], observed = 0.0, np.where(lost[:, None, None, None], 0.0, observed)
     size = 6 + 3 * g.knots
     read = moved.shape[-1]
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
-    j[..., len(theta) - read :] -= shown
+    j[..., len(theta) - read :] -= observed
     e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
     return Linear(segments, path, e, z, j, lost)
 
@@ -292,14 +294,14 @@ def simulated(model, theta, segments, path, g, moved=None):
 def _every(model, theta, segments, path, g, moved):
     many = finer(model, segments.step)
     step = segments.step / many
-    push, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
+    acceleration, hats = path.at_nodes(g), _between(g.weights[None], many)[0]
     per = many * (g.nodes - 1) // g.bins
     ys, columns = [], []
     for part, filled in chunks(len(segments)):
         driven = _between(filled(segments.driven), many)
         states = np.asarray(
             states_along(
-                model, theta, filled(path.start), _between(filled(push), many), driven, step
+                model, theta, filled(path.start), _between(filled(acceleration), many), driven, step
             )
         )
         keep = slice(part.stop - part.start)

@@ -42,7 +42,7 @@ def read(
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
-    shown = np.zeros((*base.y.shape, len(columns.unit)))
+    observed = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it
     for place, cause in enumerate(model.causes):
         if not cause.reads:
@@ -68,6 +68,6 @@ def read(
                 moved[..., -2:, column] = change / apart
             if more.state is not less.state:
                 between = replace(more, state=more.state - less.state)
-                shown[..., column] = segments.averaged(between, rows) / apart
+                observed[..., column] = segments.averaged(between, rows) / apart
         before = corrected((cause,), before, given)
-    return base, moved, shown
+    return base, moved, observed

@@ -30,31 +30,33 @@ class Own:
         self.reference = nominal_reference.assume(model, setting, start, trial.record, False, base)
         self._known: dict[tuple, tuple[Trial, Fit, Fit]] = {}
 
-    def beside(self, decision: Decision) -> tuple[Trial, Decision]:
+    def extended_by(self, decision: Decision) -> tuple[Trial, Decision]:
         """A trial of the network with what is named in it, and the decision there: its numbers
         are the judge's and stay, what else there is of points and hypotheses the network's."""
         key = tuple((n.cause.label, n.numbers.tobytes()) for n in decision.named)
         if key not in self._known:
-            self._known[key] = self._beside(decision)
-        trial, shown, nothing = self._known[key]
-        return trial, replace(decision, shown=shown, nothing=nothing)
+            self._known[key] = self._extended_by(decision)
+        trial, fit, nothing = self._known[key]
+        return trial, replace(decision, fit=fit, nothing=nothing)
 
-    def _beside(self, decision: Decision) -> tuple[Trial, Fit, Fit]:
+    def _extended_by(self, decision: Decision) -> tuple[Trial, Fit, Fit]:
         """The trial, and its fits with what is named and with nothing."""
         causes = (*self.held, *(n.cause for n in decision.named))
-        campaign = nominal_campaign.of_reference(nominal_reference.beside(self.reference, causes))
+        campaign = nominal_campaign.of_reference(
+            nominal_reference.with_causes(self.reference, causes)
+        )
         trial = Trial.of(campaign, self.judge.record, [c.label for c in causes])
         trial, first = evidence.begin(trial, self.numbers)
         trial = trial.leaving_out(self.judge.weight == 0.0)
 
-        def fit(point, included) -> Fit:
+        def fitted(point, included) -> Fit:
             found, _ = evidence.scan(trial, point, (), included, remainder=ANY_NOISE)
             return Fit(point, found, ANY_NOISE)
 
-        nothing = fit(first, tuple(self.numbers))
+        nothing = fitted(first, tuple(self.numbers))
         if not decision.named:
             return trial, nothing, nothing
         numbers = {n.cause.label: n.numbers for n in decision.named}
         both = {**self.numbers, **numbers}
         point = trial.at(both, first, nothing.found.noise_factor)
-        return trial, fit(point, trial.fixed), nothing
+        return trial, fitted(point, trial.fixed), nothing

@@ -35,7 +35,7 @@ class Manoeuvre:
     drive: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
     times: tuple[float, ...] = ()
 
-    def said(self, factor: float) -> str:
+    def text(self, factor: float) -> str:
         """The words, for a ship whose time scale is `factor` times that of a three-metre ship."""
         return self.words.format(*(f"{factor * time:.0f} s" for time in self.times))
 
@@ -98,12 +98,12 @@ def advice(
     alike = {n.cause.label: n for n in named if n.alike}
     if not alike:
         return {}
-    said, factor = sailed(trial, fixed), trial.record.timescale.factor
+    grams, factor = sailed(trial, fixed), trial.record.timescale.factor
     found = {}
     for label, one in alike.items():
         worth = {
-            m.said(factor): min(apart(trial, gram, one, other) for other in one.alike)
-            for m, gram in zip(MANOEUVRES, said, strict=True)
+            m.text(factor): min(apart(trial, gram, one, other) for other in one.alike)
+            for m, gram in zip(MANOEUVRES, grams, strict=True)
             if gram is not None
         }
         if worth:
@@ -131,13 +131,13 @@ def sailed(trial: Trial, fixed: Mapping[str, np.ndarray]) -> list[np.ndarray | N
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
     recorded, kept = simulated(trial, whole)
     rows = segments.begins(recorded)
-    cut, moved, shown = read(ref.model, ref.setting, recorded, rows, numbers)
+    cut, moved, observed = read(ref.model, ref.setting, recorded, rows, numbers)
     grid = segments.grid(recorded)
     path = linearisation.pulled(ref.model, whole, cut, grid, ref.wide, rounds=1)
-    linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, shown)
+    linear = linearisation.linear(ref.model, whole, cut, grid, path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, ref.process_noise), ref.process_noise)
     if ref.misfit is not None:
-        modes = modes.beside(ref.misfit.pushed(cut, grid))
+        modes = modes.joined(ref.misfit.accelerations(cut, grid))
     each = modes.gram().scaled(ref.columns.unit).each
     found: list[np.ndarray | None] = []
     for i in range(len(MANOEUVRES)):
@@ -153,7 +153,7 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
     time = np.arange(0.0, factor * MANOEUVRE_S + STEP_S, STEP_S)
     actuator = np.stack([driven(record, m, time / factor) for m in MANOEUVRES])
     count, rows = actuator.shape[:2]
-    wind = np.broadcast_to(record.true_wind[record.seen].mean(0), (count, rows, 2))
+    wind = np.broadcast_to(record.true_wind[record.measured].mean(0), (count, rows, 2))
     share = np.full((count, rows, 1), record.share[-1])
     series = WindowSeries(
         np.zeros((count, rows, 6)), np.concatenate((actuator, share), -1), np.array(wind),
@@ -185,7 +185,7 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
         time=np.tile(fine, count),
         share=np.full(whole, record.share[-1]),
         starts=np.tile(np.arange(len(fine)) == 0, count),
-        seen=np.ones(whole, dtype=bool),
+        measured=np.ones(whole, dtype=bool),
         state=state,
         actuator=between(actuator),
         wind=felt,
@@ -197,9 +197,9 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
 def driven(record: Record, manoeuvre: Manoeuvre, time: np.ndarray) -> np.ndarray:
     """[n, A] SI: shares of the range of each actuator, nineteen times of twenty."""
     thrust, steering = manoeuvre.drive(time)
-    usual = np.quantile(np.abs(record.actuator[record.seen]), 0.95, axis=0)
+    most = np.quantile(np.abs(record.actuator[record.measured]), 0.95, axis=0)
     columns = []
-    for actuator, most in zip(record.profile.actuators, usual, strict=True):
+    for actuator, own in zip(record.profile.actuators, most, strict=True):
         steers = actuator.kind in ("rudder", "azimuth")
-        columns.append(steering * min(float(most), HARD) if steers else thrust * most)
+        columns.append(steering * min(float(own), HARD) if steers else thrust * own)
     return np.stack(columns, -1)

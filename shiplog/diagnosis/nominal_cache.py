@@ -20,33 +20,33 @@ from shiplog.diagnosis import campaign_characteristics, nominal_reference
 from shiplog.diagnosis.campaign_characteristics import Characteristics
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Path
-from shiplog.diagnosis.nominal_reference import Settled
+from shiplog.diagnosis.nominal_reference import Converged
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-PROCESS_NOISE = ("noise", "push", "start", "coloured", "fade")
+PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
 TIMES = ("time", "bin", "knot")
 
 log = logging.getLogger(__name__)
 
 
-def settled(model: Extended, setting: Setting, start: Start, record: Record) -> Settled:
-    """`nominal_reference.settled`, computed once for a model and a campaign."""
+def converged(model: Extended, setting: Setting, start: Start, record: Record) -> Converged:
+    """`nominal_reference.converged`, computed once for a model and a campaign."""
     kept = disk_cache.folder() / "settled" / f"{_key(model, setting, start, record)}.npz"
     known = _read(kept)
     if known is not None:
-        return _settled(known)
+        return _converged(known)
     log.info("the nominal voyages are fitted once for a model, and kept")
-    found = nominal_reference.settled(model, setting, start, record)
-    _keep(kept, {"theta": found.theta, "start": found.path.start, "push": found.path.push}
-          | _process_noise(found.process_noise))  # fmt: skip
+    found = nominal_reference.converged(model, setting, start, record)
+    path = {"start": found.path.start, "acceleration": found.path.acceleration}
+    _keep(kept, {"theta": found.theta} | path | _process_noise(found.process_noise))
     return found
 
 
 def characteristics(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged
 ) -> Characteristics:
     """`campaign_characteristics.characteristics`, worked out once for a model and a campaign."""
     key = _key(model, setting, start, record)
@@ -90,9 +90,9 @@ def _known_process_noise(arrays: dict) -> ProcessNoise:
     return ProcessNoise(**times, **{n: arrays[f"process_noise_{n}"] for n in PROCESS_NOISE})
 
 
-def _settled(arrays: dict) -> Settled:
-    return Settled(
-        arrays["theta"], Path(arrays["start"], arrays["push"]), _known_process_noise(arrays)
+def _converged(arrays: dict) -> Converged:
+    return Converged(
+        arrays["theta"], Path(arrays["start"], arrays["acceleration"]), _known_process_noise(arrays)
     )
 
 
@@ -120,7 +120,7 @@ def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str
         digest.update(repr(word).encode())
     arrays: Iterable = (
         *leaves, *astuple(start), record.voyage, record.time, record.share, record.starts,
-        record.seen, record.state, record.actuator, record.wind,
+        record.measured, record.state, record.actuator, record.wind,
     )  # fmt: skip
     for array in arrays:
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -31,7 +31,7 @@ from shiplog.diagnosis.campaign_characteristics import (
 from shiplog.diagnosis.campaign_parts import products
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.nominal_reference import Reference, Settled
+from shiplog.diagnosis.nominal_reference import Converged, Reference
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
@@ -96,21 +96,21 @@ class Campaign:
 
 
 def learn(
-    model: Extended, setting: Setting, start: Start, record: Record, at: Settled,
+    model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
     found: Characteristics,
 ) -> Campaign:  # fmt: skip
     """The campaign as a trial's causes see it, which depend on where the trial was."""
     made = nominal_pass(model, setting, start, record, at)
     columns, held, families = made.columns, made.held, made.families
     process_noise, known = found.process_noise, made.columns.known
-    modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).beside(
-        made.pushed
+    modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
+        made.accelerations
     )
     unseen = discrepancy.of(
-        record.profile, at.process_noise.push, len(columns.unit), discrepancy.UNSEEN,
+        record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.UNSEEN,
         segment_nodes.at_knots(made.linear.cut, segments.grid(record)),
     )  # fmt: skip
-    whole = modes.beside(unseen.pushed(made.linear.cut, segments.grid(record)))
+    whole = modes.joined(unseen.accelerations(made.linear.cut, segments.grid(record)))
     unit = np.append(columns.unit, np.ones(unseen.count))
     weight = np.where(made.linear.lost, 0.0, found.weight)
     every = products(whole, made.rows, unit, weight)
@@ -160,7 +160,7 @@ def widened(model: Extended, setting: Setting, start: Start) -> Start:
 
 def of_reference(made: Reference) -> Campaign:
     """A campaign whose voyages do not differ, and whose model has no discrepancy."""
-    none = Discrepancy((), made.process_noise.push)
+    none = Discrepancy((), made.process_noise.acceleration)
     effects = VoyageEffects(np.zeros(len(made.pull)), made.columns.known**-0.5)
     return Campaign(made, effects, none, none, (), np.zeros(0), 0.0, 0.0, (), np.zeros(0))
 
@@ -179,7 +179,7 @@ def assumed(
     if inputs is not None:
         return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
-    at = nominal_reference.settled(
+    at = nominal_reference.converged(
         model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS
     )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts

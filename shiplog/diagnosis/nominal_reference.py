@@ -84,7 +84,7 @@ class Reference:
         return float(np.linalg.slogdet(self.information)[1])
 
     @cached_property
-    def usual(self) -> np.ndarray:
+    def nominal_coefficients(self) -> np.ndarray:
         """[P] coefficients."""
         base = self.columns.base
         return self.theta + self.mean[:base] * self.columns.unit[:base]
@@ -97,13 +97,13 @@ class Reference:
             default=0.0,
         )
 
-    def held(self, noise_factor: float, pulse: np.ndarray | None = None) -> Wide:
+    def held(self, noise_factor: float, intermittent: np.ndarray | None = None) -> Wide:
         """Allowed distance of a path where the process noise has this factor, and with an
         intermittent force."""
-        push = noise_factor * self.process_noise.push
-        if pulse is not None:
-            push = np.hypot(push, pulse)
-        return Wide(self.process_noise.noise, self.wide.start, FREE * push)
+        acceleration = noise_factor * self.process_noise.acceleration
+        if intermittent is not None:
+            acceleration = np.hypot(acceleration, intermittent)
+        return Wide(self.process_noise.noise, self.wide.start, FREE * acceleration)
 
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
@@ -117,12 +117,12 @@ def wide_of(setting: Setting) -> Wide:
     speed, length = setting.scale["speed"], setting.scale["length"]
     turn = speed / length
     at, going, angle, turning = 0.3 * length, speed, 0.3, turn
-    said = setting.profile.sensors.noise
+    known = setting.profile.sensors.noise
     unsaid = {  # for a sensor whose accuracy nobody states
         "position": 0.005 * length, "velocity": 0.03 * speed,
         "heading": 0.003, "yaw_rate": 0.03 * turn,
     }  # fmt: skip
-    of = {name: said(name) or least for name, least in unsaid.items()}
+    of = {name: known(name) or least for name, least in unsaid.items()}
     noise = np.array([of[n] for n in ("position", "velocity") * 2 + ("heading", "yaw_rate")])
     return Wide(
         noise, np.array([at, going, at, going, angle, turning]),
@@ -131,7 +131,7 @@ def wide_of(setting: Setting) -> Wide:
 
 
 @dataclass(frozen=True)
-class Settled:
+class Converged:
     """Where a campaign is linearised, and its noise there.
 
     theta  [P] coefficients; path of each segment; process_noise with the instruments' noise
@@ -142,19 +142,24 @@ class Settled:
     process_noise: ProcessNoise
 
 
-def settled(
+def converged(
     model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS
-) -> Settled:
+) -> Converged:
     """Coefficients moved to where they are linearised, all causes' numbers together with them;
     without rounds they stay where they are."""
     columns = columns_of(model, setting, start)
     wide, g = wide_of(setting), segments.grid(record)
-    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    cut, moved, observed = read(model, setting, record, segments.begins(record))
     base, unit = columns.base, columns.unit
     theta = np.clip(start.values, start.low, start.high)
     of = record.timescale
     process_noise = ProcessNoise(
-        wide.noise, 0.04 * wide.push, UNREST_TIME * of.factor, wide.start, bin=of.bin, knot=of.knot
+        wide.noise,
+        0.04 * wide.acceleration,
+        UNREST_TIME * of.factor,
+        wide.start,
+        bin=of.bin,
+        knot=of.knot,
     )
     path = linear = None
     whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
@@ -165,10 +170,10 @@ def settled(
             before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
             path = linearisation.ahead(linear, whole - before, hold)
         held = anchored(start, theta, columns)
-        linear = linearisation.linear(model, whole, cut, g, path, moved, shown)
+        linear = linearisation.linear(model, whole, cut, g, path, moved, observed)
         found, _ = solved(linear, process_noise, columns, held)
         process_noise = likelihood.learnt(linear, found * unit, process_noise, rounds=ON_THE_WAY)
-        hold = Wide(process_noise.noise, wide.start, FREE * process_noise.push)
+        hold = Wide(process_noise.noise, wide.start, FREE * process_noise.acceleration)
         found, gain = solved(linear, process_noise, columns, held)
         far = float(np.abs(found[:base]).max(initial=0.0))
         if round_ == rounds or (gain < NEAR and far < LONGEST_MOVE):
@@ -179,7 +184,7 @@ def settled(
         edge = np.where(np.isfinite(edge), edge, 0.0)
         theta = np.clip(moved_to, start.low + edge, start.high - edge)
     assert path is not None
-    return Settled(theta, path, process_noise)
+    return Converged(theta, path, process_noise)
 
 
 def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
@@ -211,7 +216,7 @@ def learn(
     setting: Setting,
     start: Start,
     record: Record,
-    at: Settled | None = None,
+    at: Converged | None = None,
     kappa: float | None = None,
     least: float = CAMPAIGN,
     inputs: Network | None = None,
@@ -219,20 +224,20 @@ def learn(
     """From the nominal campaign, linearised at its converged fit `at`. κ is estimated from its own
     voyages unless given, and not below `least`. `inputs`: a network whose inputs the discrepancy is
     a function of."""
-    at = at or settled(model, setting, start, record)
+    at = at or converged(model, setting, start, record)
     columns = columns_of(model, setting, start)
-    cut, moved, shown = read(model, setting, record, segments.begins(record))
+    cut, moved, observed = read(model, setting, record, segments.begins(record))
     whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
     g = segments.grid(record)
-    linear = linearisation.linear(model, whole, cut, g, at.path, moved, shown)
+    linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
     modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
     held = anchored(start, at.theta, columns)
     wrong = None
     if inputs is not None:
         wrong = input_misfit.of(
-            inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.push
+            inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
         )  # fmt: skip
-        modes = modes.beside(wrong.pushed(linear.cut, g))
+        modes = modes.joined(wrong.accelerations(linear.cut, g))
         columns = columns.with_misfit(wrong.count)
         held = np.concatenate((held, np.zeros(wrong.count)))
     voyage = linear.cut.voyage
@@ -240,7 +245,7 @@ def learn(
     by = np.concatenate(([1.0], columns.unit))
     each = np.stack([modes.total((voyage == v).astype(float)) for v in names]) * np.outer(by, by)
     chosen = kappa or inflation(each, columns.known, held, least)
-    information, pull = usual(each.sum(0), chosen, columns.known, held)
+    information, pull = nominal_information(each.sum(0), chosen, columns.known, held)
     return Reference(
         model, setting, at.theta, columns, at.process_noise, wide_of(setting), information, pull,
         held, chosen, linear, modes, freedom(len(names)), misfit=wrong,
@@ -252,7 +257,7 @@ def freedom(voyages: int) -> float:
     return float(max(voyages - 1, 2))
 
 
-def usual(
+def nominal_information(
     total: np.ndarray, kappa: float, known: np.ndarray, held: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information [C, C] and pull [C] of a campaign's products [1 + C, 1 + C], which count for 1/κ
@@ -277,13 +282,13 @@ def inflation(
     if len(each) < 3:
         return CAREFUL_KAPPA
     total = each.sum(0)
-    said, tried = [], [kappa for kappa in KAPPAS if kappa >= least]
+    scores, tried = [], [kappa for kappa in KAPPAS if kappa >= least]
     for kappa in tried:
         score = 0.0
         for left in each:
-            score += marginal(left, *usual(total - left, kappa, known, held))
-        said.append(score)
-    return tried[int(np.argmax(said))]
+            score += marginal(left, *nominal_information(total - left, kappa, known, held))
+        scores.append(score)
+    return tried[int(np.argmax(scores))]
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
@@ -307,7 +312,7 @@ def assume(
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
-    at = settled(model, setting, start, record, rounds=0 if given else ROUNDS)
+    at = converged(model, setting, start, record, rounds=0 if given else ROUNDS)
     kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
     whole = learn(model, setting, start, record, at, kappa, least, inputs)
     columns = whole.columns
@@ -322,7 +327,7 @@ def assume(
     )  # fmt: skip
 
 
-def beside(reference: Reference, causes: Sequence[Cause]) -> Reference:
+def with_causes(reference: Reference, causes: Sequence[Cause]) -> Reference:
     """One that `assume` made, with these causes in its model and no others."""
     setting, columns = reference.setting, reference.columns
     sizes = [cause.sizes(setting) for cause in causes]

@@ -49,7 +49,7 @@ class Columns:
         or of another cause has no nominal size of its own."""
         whole = np.ones(len(self.unit))
         for cause in self.causes:
-            if not cause.usual:
+            if not cause.nominal:
                 whole[self.of[cause.label]] = HELD_INFORMATION
         return whole
 

@@ -23,13 +23,13 @@ AT_REST = 0.02  # of a number's size: it rests
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
 
 
-def settle(
+def converge(
     trial: Trial,
     included: Sequence[str],
     numbers: Mapping[str, np.ndarray],
     path: Path | None,
     lowest: float = -np.inf,
-    remainder: Remainder = evidence.USUAL,
+    remainder: Remainder = evidence.NO_CHANGE_OF_NOISE,
 ) -> tuple[Point, Found]:
     """These causes together, linearised at their numbers until these converge (from where they did
     before, if they have). A step goes too far if the evidence is then below the `lowest` that is
@@ -37,8 +37,8 @@ def settle(
     point, noise_factor, lately = None, 1.0, None
     near: Path | Point | None = path
     key = (tuple(included), remainder)
-    if key in trial.settled:
-        numbers, near, noise_factor = trial.settled[key]
+    if key in trial.converged:
+        numbers, near, noise_factor = trial.converged[key]
         lately = noise_factor
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
@@ -75,7 +75,7 @@ def settle(
                     _within_bounds(trial, base.numbers, base.covariance),
                     base.noise_factor,
                 )
-            trial.settled[key] = (numbers, point.path, noise_factor)
+            trial.converged[key] = (numbers, point.path, noise_factor)
             break
     assert point is not None
     return point, replace(base, name="+".join(included), numbers=numbers)

@@ -19,17 +19,17 @@ RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either 
 class Remainder:
     """What remains together with the causes.
 
-    kind    NOMINAL, RAISED, INTERMITTENT, or a family of the discrepancy
-    size    of a change of that family's weights
-    noisy   whether process noise is raised together with that change
-    pulse   root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force, where it is
-            a device's
+    kind          NOMINAL, RAISED, INTERMITTENT, or a family of the discrepancy
+    size          of a change of that family's weights
+    noisy         whether process noise is raised together with that change
+    intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force, where
+                  it is a device's
     """
 
     kind: str = NOMINAL
     size: float = 1.0
     noisy: bool = False
-    pulse: tuple[float, float, float] | None = None
+    intermittent: tuple[float, float, float] | None = None
 
     @property
     def raises(self) -> bool:
@@ -38,17 +38,17 @@ class Remainder:
 
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
         """The process noise with the intermittent force in it."""
-        if self.pulse is None:
+        if self.intermittent is None:
             return process_noise
-        return replace(process_noise, pulse=np.array(self.pulse))
+        return replace(process_noise, intermittent=np.array(self.intermittent))
 
 
-def expected(noise: float, usual: float, remainder: Remainder) -> float:
+def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     """Log prior density of a level of process noise together with a remainder, less the greatest
     one together with NOMINAL.
 
     noise   factor of the nominal process noise
-    usual   standard deviation of its logarithm from campaign to campaign
+    nominal standard deviation of its logarithm from campaign to campaign
     """
-    spread = RAISED_SPREAD if remainder.raises else usual
-    return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / usual)
+    spread = RAISED_SPREAD if remainder.raises else nominal
+    return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / nominal)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog.diagnosis.fitted import Fit, Found, Told
-from shiplog.diagnosis.relinearisation import settle
+from shiplog.diagnosis.fitted import ExpectedEvidence, Fit, Found
+from shiplog.diagnosis.relinearisation import converge
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import Pulses
-from shiplog.models.causes import Cause, Shown
+from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.models.causes import Cause, ParameterEstimate
 
-PULSES = "side_thrust"
+SIDE_THRUST = "side_thrust"
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class Named:
     freedom: float = math.inf
 
     @property
-    def shown(self) -> dict[str, Shown]:
-        return self.cause.told(self.numbers, self.covariance, self.freedom)
+    def estimates(self) -> dict[str, ParameterEstimate]:
+        return self.cause.estimates(self.numbers, self.covariance, self.freedom)
 
 
 @dataclass(frozen=True)
@@ -55,52 +55,52 @@ class Decision:
 
     verdict    named, none or unknown
     named      in the order they were found
-    pulses     the unrecorded thruster, where it is one of the causes
+    side_force  the unrecorded thruster, where it is one of the causes
     traces     causes below their practical size
     rejected   label → why not
     ranking    label or family → probability, of the first step
-    shown      the hypothesis of the verdict: what is named, or nothing, with its remainder
+    fit        the hypothesis of the verdict: what is named, or nothing, with its remainder
     nothing    no cause, with the same remainder
-    told       label → information of these data about each cause
+    expected   label → expected log Bayes factor of each cause, by its size
     adapted    whether the model's coefficients are fitted again together with the named causes
     """
 
     verdict: str
     named: tuple[Named, ...]
     structure: Structure | None
-    pulses: Pulses | None
+    side_force: SideForce | None
     traces: tuple[Named, ...]
     rejected: Mapping[str, str]
     ranking: Mapping[str, float]
-    shown: Fit
+    fit: Fit
     nothing: Fit
-    told: Mapping[str, Told] = field(default_factory=dict)
+    expected: Mapping[str, ExpectedEvidence] = field(default_factory=dict)
     adapted: bool = False
 
     @property
     def unnamed(self) -> Decision:
-        """The same with nothing named, and the process noise as it is shown."""
-        noise_factor = self.shown.found.noise_factor
+        """The same with nothing named, and the process noise as it is reported."""
+        noise_factor = self.fit.found.noise_factor
         nothing = replace(self.nothing.found, noise_factor=noise_factor)
-        return replace(self, named=(), shown=replace(self.nothing, found=nothing))
+        return replace(self, named=(), fit=replace(self.nothing, found=nothing))
 
 
 def without(trial: Trial, decision: Decision, one: Named) -> Decision:
     """The same verdict with one cause less, the others fitted again."""
     named = tuple(n for n in decision.named if n is not one)
-    shown, remainder = decision.shown, decision.shown.remainder
-    labels = tuple(n for n in shown.included if n != one.cause.label)
+    fit, remainder = decision.fit, decision.fit.remainder
+    labels = tuple(n for n in fit.included if n != one.cause.label)
     again = decision.nothing
     if labels:
-        numbers = {n: shown.found.numbers[n] for n in labels}
-        point, found = settle(trial, labels, numbers, shown.point.path, remainder=remainder)
+        numbers = {n: fit.found.numbers[n] for n in labels}
+        point, found = converge(trial, labels, numbers, fit.point.path, remainder=remainder)
         if found.covariance is None:  # the fit diverged: it has no numbers
             named = ()
         else:
             again = Fit(point, found, remainder)
     kept = _fitted_again(again.found, named)
-    verdict = "named" if kept or decision.pulses else "none"
-    return replace(decision, named=kept, verdict=verdict, shown=again)
+    verdict = "named" if kept or decision.side_force else "none"
+    return replace(decision, named=kept, verdict=verdict, fit=again)
 
 
 def _fitted_again(found: Found, named: Sequence[Named]) -> tuple[Named, ...]:
@@ -122,6 +122,6 @@ def _fitted_again(found: Found, named: Sequence[Named]) -> tuple[Named, ...]:
 def untold(decision: Decision) -> Decision:
     """Of a model that simulates nothing: its error goes with the motion, and has no name."""
     return replace(
-        decision, verdict="unknown", named=(), pulses=None, traces=(),
+        decision, verdict="unknown", named=(), side_force=None, traces=(),
         structure=Structure("motion", 0.0, ()),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from shiplog.diagnosis import evidence, thresholds
-from shiplog.diagnosis.fitted import Fit, Point, Told
+from shiplog.diagnosis.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
@@ -33,16 +33,16 @@ class Search:
     """The moves from set to set.
 
     table     the hypotheses weighed so far
-    told      label → information of these data about it
+    expected  label → expected log Bayes factor of that cause, by its size
     scanned   label → score of that cause by itself, where it was found first
     banned    names of causes without which the search went on
     """
 
     def __init__(
-        self, trial: Trial, point: Point, usual: Mapping[str, float], banned: Sequence[str] = ()
+        self, trial: Trial, point: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
     ) -> None:
-        self.table = Hypotheses(trial, point, usual, banned)
-        self.told: dict[str, Told] = {}
+        self.table = Hypotheses(trial, point, placebo, banned)
+        self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
         self.banned: set[str] = set()
         self._most = MOST_SETS
@@ -97,7 +97,7 @@ class Search:
         candidates = [
             c for c in table.catalogue
             if c.label not in one.causes and c.name not in self.banned
-            and all(c.beside(label) for label in one.causes)
+            and all(c.compatible(label) for label in one.causes)
         ]  # fmt: skip
         _, found = evidence.scan(
             table.trial, fit.point, candidates, table.included(one.causes),
@@ -108,22 +108,25 @@ class Search:
             self.scanned |= {
                 f.name: table.score(one.evidence + f.evidence, (f.name,), NOMINAL) for f in found
             }
-            if not self.told:
-                self.told = {f.name: f.told for f in found if f.told is not None}
+            if not self.expected:
+                self.expected = {f.name: f.expected for f in found if f.expected is not None}
                 self._say_what_would_not_show()
-        said = []
+        additions = []
         for f in found:
             if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
                 continue
             labels = tuple(sorted((*one.causes, f.name)))
             numbers = {**one.found.numbers, **f.numbers}
             score = table.score(one.evidence + f.evidence, labels, one.kind)
-            said.append((labels, numbers, score))
-        return said[:CONTENDERS]
+            additions.append((labels, numbers, score))
+        return additions[:CONTENDERS]
 
     def _say_what_would_not_show(self) -> None:
         """Log the causes that these voyages cannot reveal, before any is searched for."""
-        shares = {name: told.together(thresholds.SHOWS_NATS) for name, told in self.told.items()}
+        shares = {
+            name: expected.together(thresholds.SHOWS_NATS)
+            for name, expected in self.expected.items()
+        }
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))

@@ -38,8 +38,8 @@ def in_each_channel(waves: np.ndarray) -> np.ndarray:
     return out
 
 
-def pushed(features: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `push` [3] is the
-    unit of size."""
-    scaled = np.moveaxis(features * push[:, None], 2, 1)
+def accelerations(features: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """[S, 3J, W]: acceleration of each weight at the knots, channel by channel; `acceleration` [3]
+    is the unit of size."""
+    scaled = np.moveaxis(features * acceleration[:, None], 2, 1)
     return scaled.reshape(len(scaled), -1, scaled.shape[-1])

@@ -41,7 +41,7 @@ class Cut:
         """Some of the segments."""
         return replace(self, **{name: getattr(self, name)[keep] for name in PER_SEGMENT})
 
-    def beside(self, other: Cut) -> Cut:
+    def joined(self, other: Cut) -> Cut:
         """These segments and others of the same record."""
         both = {n: np.concatenate((getattr(self, n), getattr(other, n))) for n in PER_SEGMENT}
         return replace(self, **both)
@@ -98,9 +98,9 @@ def cut(record: Record, rows: np.ndarray) -> Cut:
 def measured(record: Record, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """State [S, B, 6], averaged over bins, and whether most of a bin was measured."""
     g = grid(record)
-    whole, ends, per = _in_bins(record.seen[:, None].astype(float), rows, g)
-    seen = whole + ends[:, 1:] > 0.5 * (per + 1)
-    return averaged(record, rows), np.repeat(seen, 6, axis=-1)
+    whole, ends, per = _in_bins(record.measured[:, None].astype(float), rows, g)
+    measured = whole + ends[:, 1:] > 0.5 * (per + 1)
+    return averaged(record, rows), np.repeat(measured, 6, axis=-1)
 
 
 def averaged(record: Record, rows: np.ndarray) -> np.ndarray:

@@ -55,10 +55,10 @@ def trial_of(
     else:
         # where the coefficients converge depends on the nominal voyages alone: it can be kept
         before = setting_of(run, nominal, nominal)
-        usual, _ = catalogue.testable(before)
-        plain, _ = model_of(run, usual, before)
+        testable, _ = catalogue.testable(before)
+        plain, _ = model_of(run, testable, before)
         start = nominal_campaign.widened(plain, before, start)
-        at = nominal_cache.settled(plain, before, start, nominal)
+        at = nominal_cache.converged(plain, before, start, nominal)
         found = nominal_cache.characteristics(plain, before, start, nominal, at)
         campaign = nominal_campaign.learn(model, setting, start, nominal, at, found)
     return Setup(Trial.of(campaign, recorded, tuple(held)), untested)

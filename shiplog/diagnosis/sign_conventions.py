@@ -21,8 +21,8 @@ from shiplog.voyages.windows import Windows
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
     """The change of convention with the smallest mean L on these windows, in words, and that L."""
     tried = [
-        (said, float(np.minimum(simulator.losses(turned), RUNAWAY).mean()))
-        for said, turned in other(simulator.profile, cut)
+        (words, float(np.minimum(simulator.losses(turned), RUNAWAY).mean()))
+        for words, turned in other(simulator.profile, cut)
     ]
     return min(tried, key=lambda pair: pair[1])
 

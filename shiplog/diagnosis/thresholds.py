@@ -1,7 +1,7 @@
 """Every number that a verdict depends on: name, unit, reason. No other module decides by a number.
 
 Eight decide between hypotheses. The others say when there is nothing to decide on, and what is
-listed beside a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
+listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
 factor.
 """
 
@@ -40,7 +40,7 @@ BASELINE = 0.5
 # time that it is on, while a force that merely varies is between as often as above.
 BETWEEN = 0.5
 
-# --- whether there is a verdict, and what is listed beside it
+# --- whether there is a verdict, and what is listed with it
 
 # Seconds of unbroken record, below which there is no verdict: eight segments of a three-metre ship,
 # which is as many as a nominal campaign needs.
@@ -73,5 +73,6 @@ ACTS = 1.0 / 3.0
 # by so many standard deviations of its estimate.
 EXTERNAL_SPREADS = 3.0
 
-# Ratio. What the model usually leaves of this ship, times this, is allowed beside those forces.
-EXTERNAL_USUAL = 5.0
+# Ratio. What the model usually leaves of this ship, times this, is allowed in addition to those
+# forces.
+EXTERNAL_MISFIT = 5.0

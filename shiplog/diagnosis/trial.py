@@ -90,7 +90,7 @@ class Trial:
     first: Point | None = None
     begun: bool = False
     readings: Readings = field(default_factory=Readings)
-    settled: dict[tuple[tuple[str, ...], Remainder], tuple[Numbers, Path, float]] = field(
+    converged: dict[tuple[tuple[str, ...], Remainder], tuple[Numbers, Path, float]] = field(
         default_factory=dict
     )
 
@@ -103,7 +103,7 @@ class Trial:
         knots = segment_nodes.at_knots(segments.cut(record, rows), grid)
         known = len(reference.columns.unit)
         unseen = discrepancy.of(
-            record.profile, reference.process_noise.push, known, discrepancy.UNSEEN, knots
+            record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, knots
         )
         parts = tuple(parts_of(record.voyage[rows]))
         voyage = record.voyage[rows[[part[0] for part in parts]]]
@@ -123,7 +123,7 @@ class Trial:
         return {family.name: family.columns for family in both}
 
     @property
-    def usual_spread(self) -> float:
+    def nominal_spread(self) -> float:
         """Standard deviation of the logarithm of the process noise from campaign to campaign."""
         return max(self.campaign.noise, LEAST_SPREAD)
 
@@ -147,11 +147,11 @@ class Trial:
         Raises np.linalg.LinAlgError where the model diverges only with these numbers: it is that
         hypothesis that fails.
         """
-        ref, pulse = self.reference, None if remainder is None else remainder.pulse
+        ref, intermittent = self.reference, None if remainder is None else remainder.intermittent
         wide = ref.wide
         if noise_factor is not None:
-            wide = ref.held(noise_factor, None if pulse is None else np.array(pulse))
-        cut, moved, shown = self.readings.of(ref, self.record, self.rows, numbers)
+            wide = ref.held(noise_factor, None if intermittent is None else np.array(intermittent))
+        cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         if isinstance(near, Point):
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
@@ -161,7 +161,7 @@ class Trial:
                 ref.model, whole, cut, self.grid, wide, near, rounds=1 if near else 2
             )
         linear = linearisation.linear(
-            ref.model, whole, cut, self.grid, path, moved, shown, ref.wide
+            ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )
         return self._judged(
             Point(numbers, path, linear, likelihood.weighed(linear, ref.process_noise))
@@ -178,20 +178,20 @@ class Trial:
         ref = self.reference
         rows = np.setdiff1d(residual_acceleration.covering(self.record), self.rows)
         numbers = dict(point.numbers)
-        cut, moved, shown = read(ref.model, ref.setting, self.record, rows, numbers)
+        cut, moved, observed = read(ref.model, ref.setting, self.record, rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
         path = linearisation.pulled(ref.model, whole, cut, self.grid, ref.wide)
         between = linearisation.linear(
-            ref.model, whole, cut, self.grid, path, moved, shown, ref.wide
+            ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )
-        return point.linear.beside(between)
+        return point.linear.joined(between)
 
     def left(self, linear: Linear, d: np.ndarray) -> tuple[Linear, np.ndarray]:
         """A pass of the trial without what the misfit's weights among the numbers d [C] do, and
         the numbers of its own columns."""
         misfit, count = self.reference.misfit, self.reference.columns.linearised
         if misfit is not None:
-            linear = linear.less(misfit.pushed(linear.cut, self.grid) @ d[count:])
+            linear = linear.less(misfit.accelerations(linear.cut, self.grid) @ d[count:])
         return linear, d[:count]
 
     def leaving_out(self, segments_out: np.ndarray) -> Self:

@@ -54,7 +54,7 @@ def decided(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
 ) -> Decided:  # fmt: skip
-    """As `setup.trial_of`; `cut` are the voyages' windows, and `reach` is told each stage."""
+    """As `setup.trial_of`; `cut` are the voyages' windows, and `reach` is called at each stage."""
 
     def once(numbers: Mapping[str, np.ndarray] | None = None) -> Decided:
         made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers)
@@ -65,7 +65,7 @@ def decided(
         names = _names(done)
         if not names:
             break
-        before, done = names, once({n: done.decision.shown.found.numbers[n] for n in names})
+        before, done = names, once({n: done.decision.fit.found.numbers[n] for n in names})
         if set(before) == set(_names(done)):
             break
     return done

@@ -41,10 +41,10 @@ class Products:
         self._volumes: dict[tuple, float] = {}
 
     def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
-        """Products of the point, and the wanted factors λ: one pass serves every λ, but that of a
-        pulse together with the process noise, whose axes turn with it."""
+        """Products of the point, and the wanted factors λ: one pass serves every λ, but that of an
+        intermittent force together with the process noise, whose axes turn with it."""
         process_noise = remainder.in_noise(self._campaign.reference.process_noise)
-        if process_noise.pulse is not None:
+        if process_noise.intermittent is not None:
             found = likelihood.modes(point.weighed, process_noise.times(noise_factor))
             return self._with_families(found, point), 1.0
         for of, found in self._modes:
@@ -58,8 +58,8 @@ class Products:
     def _with_families(self, modes: Modes, point: Point) -> Modes:
         cut, misfit = point.linear.cut, self._campaign.reference.misfit
         if misfit is not None:
-            modes = modes.beside(misfit.pushed(cut, self._grid))
-        return modes.beside(self._unseen.pushed(cut, self._grid))
+            modes = modes.joined(misfit.accelerations(cut, self._grid))
+        return modes.joined(self._unseen.accelerations(cut, self._grid))
 
     def of_parts(
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
@@ -73,7 +73,7 @@ class Products:
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
     ) -> tuple[np.ndarray, float]:
         """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
-        key = (noise, weight.tobytes(), remainder.pulse)
+        key = (noise, weight.tobytes(), remainder.intermittent)
         for of, known, total, volume in self._totals:
             if of() is point.weighed and known == key:
                 return total, volume
@@ -94,7 +94,7 @@ class Products:
     ) -> float:
         """log |C| at one level of process noise, the same for every hypothesis: that of the first
         point. How far a model lets noise be felt is no evidence of a cause."""
-        key = (noise_factor, remainder.pulse, weight.tobytes())
+        key = (noise_factor, remainder.intermittent, weight.tobytes())
         if key not in self._volumes:
             modes, by = self.modes(first, noise_factor, remainder)
             total = self.total(first, noise_factor, weight, remainder)

@@ -52,12 +52,12 @@ def in_ship_time(
 ) -> tuple[Record | None, Record]:
     """Both campaigns with the time scale of this ship at the working speed of its nominal
     voyages."""
-    usual = recorded if nominal is None else nominal
-    if not len(usual) or not len(recorded):  # too little for a verdict, which is reported later
+    reference = recorded if nominal is None else nominal
+    if not len(reference) or not len(recorded):  # too little for a verdict, which is reported later
         return nominal, recorded
     _, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
-    shorter = min(one.seconds for one in (usual, recorded))
-    working = float(np.quantile(np.linalg.norm(usual.state[:, [1, 3]], axis=1), WORKING))
+    shorter = min(one.seconds for one in (reference, recorded))
+    working = float(np.quantile(np.linalg.norm(reference.state[:, [1, 3]], axis=1), WORKING))
     of = timescale.of_ship(main.length, working, shorter)
     changed = None if nominal is None else replace(nominal, timescale=of)
     return changed, replace(recorded, timescale=of)
@@ -102,9 +102,9 @@ def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[s
     return constants_of(causes, setting) | dict(held)
 
 
-def setting_of(run: Run, usual: Record, recorded: Record) -> Setting:
-    """Ship and place of a diagnosis; its speed is that of the `usual` voyages."""
-    speed = float(np.sqrt((usual.state[:, [1, 3]] ** 2).sum(1).mean()))
+def setting_of(run: Run, nominal: Record, recorded: Record) -> Setting:
+    """Ship and place of a diagnosis; its speed is that of the `nominal` voyages."""
+    speed = float(np.sqrt((nominal.state[:, [1, 3]] ** 2).sum(1).mean()))
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
     places, spacing = _places(recorded, PLACES)
     scale = {

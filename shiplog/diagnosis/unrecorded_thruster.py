@@ -23,7 +23,7 @@ NOISE_FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of process no
 
 
 @dataclass(frozen=True)
-class Pulses:
+class SideForce:
     """The unrecorded thruster: log likelihood, its gain over process noise that is raised in each
     channel by itself, place [m ahead of midship], root mean square force [N], and acceleration of
     1 N [3]."""
@@ -35,22 +35,22 @@ class Pulses:
     unit: np.ndarray
 
 
-def pulses_of(
+def estimate_side_force(
     linear: Linear, d: np.ndarray, ref: Reference, process_noise: ProcessNoise, weight: np.ndarray,
-    usual: np.ndarray | None = None,
-) -> Pulses:  # fmt: skip
+    nominal: np.ndarray | None = None,
+) -> SideForce:  # fmt: skip
     """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
     as no other process noise does. Estimated from the residual.
 
     d       [C] numbers of the pass; weight [S] of its segments
-    usual   acceleration [3] of nominal process noise at one place; None without any
+    nominal acceleration [3] of nominal process noise at one place; None without any
     """
     kept = weight > 0.0  # a segment that says nothing has no likelihood
     linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
     alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
     startless = likelihood.startless(likelihood.weighed(alone, process_noise), process_noise)
-    plain = replace(process_noise, pulse=None)
+    plain = replace(process_noise, intermittent=None)
 
     def value(process_noise: ProcessNoise) -> float:
         each, volume = startless.square(process_noise)
@@ -58,8 +58,12 @@ def pulses_of(
 
     def raised(factors: np.ndarray) -> float:
         side = math.exp(0.5 * (factors[1] + factors[2]))
-        pulse = None if usual is None else usual * side
-        return value(replace(plain, push=plain.push * np.exp(factors), pulse=pulse))
+        intermittent = None if nominal is None else nominal * side
+        return value(
+            replace(
+                plain, acceleration=plain.acceleration * np.exp(factors), intermittent=intermittent
+            )
+        )
 
     # from day to day one channel's noise is raised by more than another's, with no device at work,
     # and the nominal noise at one place is raised there
@@ -72,11 +76,11 @@ def pulses_of(
 
     def of(lever: float, force: float) -> float:
         unit = across + lever * length * turning
-        return value(replace(plain, pulse=unit * force))
+        return value(replace(plain, intermittent=unit * force))
 
     levers = np.linspace(-0.45, 0.45, 7)
     # in newtons that matter: from the nominal process noise upwards
-    ordinary = plain.push[1] / abs(across[1])
+    ordinary = plain.acceleration[1] / abs(across[1])
     sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
     lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
     finer = minimize(  # together with the place itself a part of the force would be another cause's
@@ -86,7 +90,7 @@ def pulses_of(
     )  # fmt: skip
     lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
     one = -float(finer.fun)
-    return Pulses(one, one - by_channel, lever, force, across + lever * turning)
+    return SideForce(one, one - by_channel, lever, force, across + lever * turning)
 
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:

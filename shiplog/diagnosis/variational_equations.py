@@ -31,36 +31,36 @@ def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
     width = at_theta + p
     out = np.zeros((count, bins, 6, width))
     now, before = np.empty((6, width)), np.empty((6, width))
-    push, change = np.empty((3, width)), np.empty((6, width))
+    acceleration, change = np.empty((3, width)), np.empty((6, width))
     for s in range(count):
         now[:] = 0.0
         before[:] = 0.0
         for i in range(6):
             now[i, i] = 1.0
         for k in range(nodes - 1):
-            push[:] = 0.0
+            acceleration[:] = 0.0
             for j in range(knots):
                 if hats[k, j] != 0.0:
                     for c in range(3):
-                        push[c, 6 + c * knots + j] = hats[k, j]
+                        acceleration[c, 6 + c * knots + j] = hats[k, j]
             for c in range(3):
                 for i in range(p):
-                    push[c, at_theta + i] = by_theta[s, k, c, i]
+                    acceleration[c, at_theta + i] = by_theta[s, k, c, i]
                 for d in range(driving):
                     slope = by_driven[s, k, c, d]
                     for i in range(q):
-                        push[c, at_moved + i] += slope * moved[s, k, d, i]
+                        acceleration[c, at_moved + i] += slope * moved[s, k, d, i]
             cos, sin = np.cos(states[s, k, 4]), np.sin(states[s, k, 4])
             u, v = states[s, k, 1], states[s, k, 3]
             north, east = -(sin * u + cos * v), cos * u - sin * v
             new, old = (step, 0.0) if k == 0 else (1.5 * step, -0.5 * step)
-            _slope(now, cos, sin, north, east, by_state[s, k], push, change)
+            _slope(now, cos, sin, north, east, by_state[s, k], acceleration, change)
             _step(now, before, change, out[s, k // per], new, old, 0.5 / per)
     return out
 
 
 @numba.njit(cache=True, fastmath={"contract"})
-def _slope(now, cos, sin, north, east, a, push, change):
+def _slope(now, cos, sin, north, east, a, acceleration, change):
     """δ̇ [6, W] into `change`."""
     x, du, y, dv, heading, dr = now[0], now[1], now[2], now[3], now[4], now[5]
     for i in range(now.shape[1]):
@@ -70,7 +70,7 @@ def _slope(now, cos, sin, north, east, a, push, change):
     for i in range(now.shape[1]):
         change[4, i] = dr[i]
     for c in range(3):
-        row, force = change[2 * c + 1], push[c]
+        row, force = change[2 * c + 1], acceleration[c]
         ax, au, ay, av, ah, ar = a[c, 0], a[c, 1], a[c, 2], a[c, 3], a[c, 4], a[c, 5]
         for i in range(now.shape[1]):
             row[i] = force[i] + au * du[i] + av * dv[i] + ar * dr[i] + ah * heading[i]

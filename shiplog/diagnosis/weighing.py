@@ -12,8 +12,8 @@ from shiplog.diagnosis import evidence, fits
 from shiplog.diagnosis.fitted import Fit, Found, Level, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis
-from shiplog.diagnosis.relinearisation import settle
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, expected
+from shiplog.diagnosis.relinearisation import converge
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -45,16 +45,16 @@ def weigh(
     if labels:
         lowest = table.nothing.evidence - FAILED_NATS
         both = table.fixed | dict(numbers)
-        point, base = settle(trial, included, both, at.path, lowest, RAISING)
+        point, base = converge(trial, included, both, at.path, lowest, RAISING)
         if not math.isfinite(base.evidence):
             return
         near = base.noise_factor
     levels = evidence.levels(trial, point, included, near, RAISING)
     if near is not None and near > RAISED_FROM:  # the noise may be nominal again
         levels.append(evidence.level(trial, point, 1.0, included, RAISING))
-    usual = best(trial, levels, NOMINAL).noise_factor
-    if abs(math.log(usual)) > 2.0 * trial.usual_spread:  # its prior favours the nominal noise
-        levels += nominal_levels(trial, point, included, usual)
+    nominal = best(trial, levels, NOMINAL).noise_factor
+    if abs(math.log(nominal)) > 2.0 * trial.nominal_spread:  # its prior favours the nominal noise
+        levels += nominal_levels(trial, point, included, nominal)
     for kind in (NOMINAL, RAISED):
         one = best(trial, levels, kind)
         found = Found("+".join(labels), one.value, one.noise_factor,
@@ -70,10 +70,10 @@ def weigh(
 
 
 def nominal_levels(
-    trial: Trial, point: Point, included: Sequence[str], usual: float
+    trial: Trial, point: Point, included: Sequence[str], nominal: float
 ) -> list[Level]:
     """Levels about the best one under `nominal`, with their values under `raised`."""
-    levels = evidence.levels(trial, point, included, usual)
+    levels = evidence.levels(trial, point, included, nominal)
     return [
         replace(one, value=one.value + raised_over_nominal(trial, one.noise_factor))
         for one in levels
@@ -92,8 +92,8 @@ def best(trial: Trial, levels: Sequence[Level], kind: str) -> Level:
 
 def raised_over_nominal(trial: Trial, noise: float) -> float:
     """Log prior density of a level of noise under `raised` over that under `nominal`."""
-    usual = trial.usual_spread
-    return expected(noise, usual, RAISING) - expected(noise, usual, Remainder())
+    nominal = trial.nominal_spread
+    return noise_prior(noise, nominal, RAISING) - noise_prior(noise, nominal, Remainder())
 
 
 # --- families of the discrepancy, and an intermittent force
@@ -108,14 +108,14 @@ def changed(
     family counts only if it is more probable with nominal noise than raised noise alone;
     otherwise its functions are a fit to noise.
     """
-    usual, raised = [], []
+    nominal, raised = [], []
     for level in levels:  # made under `raised`
         gained, size = fits.changed(trial, point, level, included, family, RAISING)
         value, noise = level.value + gained, level.noise_factor
-        usual.append((value - raised_over_nominal(trial, noise), size, noise))
+        nominal.append((value - raised_over_nominal(trial, noise), size, noise))
         raised.append((value, size, noise))
-    noisy = max(usual)[0] > max(level.value for level in levels)
-    value, size, noise = max(raised if noisy else usual)
+    noisy = max(nominal)[0] > max(level.value for level in levels)
+    value, size, noise = max(raised if noisy else nominal)
     return Change(Remainder(family, size, noisy), value, noise)
 
 
@@ -143,7 +143,7 @@ def _weigh_change(
         return
     here, _ = evidence.scan(trial, point, (), included, one.noise, remainder)
     if labels:
-        again, base = settle(trial, included, here.numbers, point.path, remainder=remainder)
+        again, base = converge(trial, included, here.numbers, point.path, remainder=remainder)
         if math.isfinite(base.evidence) and base.evidence > one.value:
             table.put(labels, base.evidence, Fit(again, base, remainder))
             return

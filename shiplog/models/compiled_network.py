@@ -79,10 +79,10 @@ class Network:
         for w, b in pairs[:-1]:
             hidden = jnp.tanh(hidden @ w.T + b)
         w, b = pairs[-1]
-        said = (hidden @ w.T + b) * self.out_std + self.out_mean
+        output = (hidden @ w.T + b) * self.out_std + self.out_mean
         if self.bent is None:
-            return said
-        return said + self.features(state, actuator, true_wind) @ self.bent
+            return output
+        return output + self.features(state, actuator, true_wind) @ self.bent
 
     def features(self, state: Array, actuator: Array, true_wind: Array) -> Array:
         """φ [..., F], of unit size together; of the wind's components always: an angle jumps."""

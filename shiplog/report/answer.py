@@ -29,7 +29,7 @@ INPUTS = ("wind", "motion", "controls", "stochastic")
 class DiagnosedTrial:
     """The verdict and the objects behind it.
 
-    seen    trial and decision of the simulated model; of a network, not those of its MMG
+    simulated  trial and decision of the simulated model; of a network, not those of its MMG
     whole   that trial, linearised on overlapping segments
     held    the held-out windows; None where no interval is long enough for one
     after   the extended model; None without a named cause
@@ -39,7 +39,7 @@ class DiagnosedTrial:
     folder: Path
     decision: Decision | None = None
     trial: Trial | None = None
-    seen: tuple[Trial, Decision] | None = None
+    simulated: tuple[Trial, Decision] | None = None
     whole: Linear | None = None
     held: HeldOut | None = None
     after: ExtendedSimulator | None = None
@@ -69,7 +69,7 @@ class Context:
     dropped: Mapping[str, str] = field(default_factory=dict)
     lost: str = ""
     notes: Sequence[str] = ()
-    pushed: Sequence[Interval] = ()
+    external: Sequence[Interval] = ()
     segment: float = timescale.SEGMENT_S
     uncovered: Sequence[Interval] = ()
     wrong: Sequence[dict] = ()
@@ -97,17 +97,17 @@ def verdict(
     unavailable = verdicts.rejected_json(context.untested)
     advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
-    if decision.pulses is not None:
-        times = error_location.pulses(trial, decision, decision.pulses)
+    if decision.side_force is not None:
+        times = error_location.active_intervals(trial, decision, decision.side_force)
         sure = decision.ranking.get("unknown:intermittent", 0.0)
-        causes.append(verdicts.pulses_json(decision, times, sure))
+        causes.append(verdicts.side_force_json(decision, times, sure))
     word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
     sentence = f"{context.lost}: no cause can be named."
     if not context.lost:
         sentence = verdicts.sentence(
-            word, causes, structure, found, decision.shown.found.noise_factor, context.alone,
+            word, causes, structure, found, decision.fit.found.noise_factor, context.alone,
             ranking, context.wrong,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
@@ -122,7 +122,7 @@ def verdict(
         rejected=verdicts.rejected_json(rejected),
         traces=tuple(verdicts.trace_json(n) for n in decision.traces),
         structure=structure if word == "unknown" else None,
-        intervals=(*context.pushed, *context.uncovered),
+        intervals=(*context.external, *context.uncovered),
         gain=found if causes else None,
         without="" if held is None else held.left_out,
         wrong=tuple(context.wrong),
@@ -159,8 +159,8 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
     if decision.verdict == "unknown" and not context.lost and family in INPUTS and unseen:
         return "coverage"
     # less than a segment in all is listed, but is no answer for the trial
-    pushed = sum(one.end_s - one.start_s for one in context.pushed)
-    if decision.verdict == "none" and pushed >= context.segment:
+    external_s = sum(one.end_s - one.start_s for one in context.external)
+    if decision.verdict == "none" and external_s >= context.segment:
         return "external"
     return decision.verdict
 

@@ -16,7 +16,7 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis.measurement_correction import corrected
 from shiplog.diagnosis.residual_acceleration import around
-from shiplog.diagnosis.result import PULSES, Decision
+from shiplog.diagnosis.result import SIDE_THRUST, Decision
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import listed
 from shiplog.report import page, viewer
@@ -58,7 +58,7 @@ def exhibit(done: DiagnosedTrial) -> Exhibit:
 
 def _measured(record: Record) -> pl.DataFrame:
     """About a row a second."""
-    rows = np.flatnonzero(record.seen)
+    rows = np.flatnonzero(record.measured)
     rows = rows[:: max(1, round(1.0 / record.step))]
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
     return pl.DataFrame(index | _columns(record.state[rows]))
@@ -69,8 +69,8 @@ def _measured(record: Record) -> pl.DataFrame:
 
 def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     """Unexplained and named force at the knots, and what the latter is of."""
-    assert done.seen is not None and done.whole is not None
-    (trial, decision), whole = done.seen, done.whole
+    assert done.simulated is not None and done.whole is not None
+    (trial, decision), whole = done.simulated, done.whole
     ref, record = trial.reference, trial.record
     nothing = decision.nothing
     nominal = ref.mean * ref.columns.unit
@@ -84,10 +84,10 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     mass = external_forces.masses(ref.model.stand_in, np.array(list(ref.coefficients.values()))).T
     names = [n.cause.label for n in decision.named if n.cause.kind != "sensor"]
     force = _caused(trial, decision, rows) @ mass.T
-    if decision.pulses is not None:
-        names.append(PULSES)
+    if decision.side_force is not None:
+        names.append(SIDE_THRUST)
         assert done.trial is not None and done.decision is not None
-        force = force + _pulses(done.trial, done.decision)[rows]
+        force = force + _side_force(done.trial, done.decision)[rows]
     if not names:
         force = np.full_like(force, np.nan)
     index = {"voyage": [record.names[i] for i in record.voyage[rows]], "time": record.time[rows]}
@@ -127,14 +127,14 @@ def _caused(trial: Trial, decision: Decision, rows: np.ndarray) -> np.ndarray:
     return acceleration(fixed | named) - acceleration(fixed)
 
 
-def _pulses(trial: Trial, decision: Decision) -> np.ndarray:
+def _side_force(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
-    assert decision.pulses is not None
-    force, _ = intermittent.pulse_force(trial, decision.shown, decision.pulses)
+    assert decision.side_force is not None
+    force, _ = intermittent.force_at_nodes(trial, decision.fit, decision.side_force)
     apart = round(trial.record.timescale.knot / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
     whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force
-    return whole[:, None] * np.array([0.0, 1.0, decision.pulses.lever])
+    return whole[:, None] * np.array([0.0, 1.0, decision.side_force.lever])
 
 
 # --- windows --------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.next_manoeuvre import Advice
 from shiplog.diagnosis.omitted_inputs import Dependence
-from shiplog.diagnosis.result import PULSES, Decision, Named
+from shiplog.diagnosis.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
@@ -88,12 +88,12 @@ DEPENDS = {
 
 
 def cause_json(named: Named, advice: Advice | None = None) -> dict:
-    shown = named.shown
+    estimates = named.estimates
     content = {
         "name": named.cause.name,
         "probability": min(max(named.probability, 0.0), 1.0),
-        "parameters": {k: v.as_json() for k, v in shown.items()} | _which(named),
-        "sentence": named.cause.sentence(shown),
+        "parameters": {k: v.as_json() for k, v in estimates.items()} | _which(named),
+        "sentence": named.cause.sentence(estimates),
         "equation": equation(named),
         "indistinguishable_from": list(dict.fromkeys(n.split(":")[0] for n in named.alike)),
     }
@@ -128,13 +128,13 @@ def _which(named: Named) -> dict:
 def equation(named: Named) -> str:
     """The equation with its numbers, of the fit and of the contract's parameters."""
     values = {p.name: float(v) for p, v in zip(named.cause.parameters, named.numbers, strict=False)}
-    values |= {k: v.value for k, v in named.shown.items()}
+    values |= {k: v.value for k, v in named.estimates.items()}
     return named.cause.equation.format(**values)
 
 
-def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
+def side_force_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
     """An unrecorded thruster. `times`: voyage, start_s, end_s, force_N, sd_N."""
-    found = decision.pulses
+    found = decision.side_force
     assert found is not None
     strongest = max(times, key=lambda t: abs(t["force_N"]), default=None)
     peak, sd = (found.force, found.force) if strongest is None else (
@@ -144,7 +144,7 @@ def pulses_json(decision: Decision, times: Sequence[dict], probability: float) -
     size = {"value": peak, "low": low, "high": high, "unit": "N"}
     where = "ahead of" if found.lever >= 0.0 else "abaft"
     return {
-        "name": PULSES,
+        "name": SIDE_THRUST,
         "probability": probability,
         "parameters": {"force": size},
         "times": list(times),
@@ -162,8 +162,8 @@ def trace_json(named: Named) -> dict:
     """A cause that is present, but too small to matter."""
     return {
         "name": named.cause.name,
-        "parameters": {k: v.as_json() for k, v in named.shown.items()},
-        "sentence": f"Present, but below practical size: {named.cause.sentence(named.shown)}",
+        "parameters": {k: v.as_json() for k, v in named.estimates.items()},
+        "sentence": f"Present, but below practical size: {named.cause.sentence(named.estimates)}",
     }
 
 
@@ -191,19 +191,19 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     number alone, and as a share of the realistic size. Undetectable numbers are left out."""
     by, nats = {c.label: c for c in causes}, thresholds.SHOWS_NATS
     found = []
-    for label, told in decision.told.items():
-        cause, least = by[label], told.least(nats)
+    for label, expected in decision.expected.items():
+        cause, least = by[label], expected.least(nats)
         sizes = least * cause.sizes(setting)
         if len(cause.parameters) == len(sizes):
             parts = zip(cause.parameters, sizes, least, strict=True)
-            shown = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
+            numbers = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
         else:  # a number for each rudder, or for each point of the map
-            shown = cause.shown(sizes)
-        numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in shown.items()}
+            numbers = cause.displayed(sizes)
+        numbers = {k: {"value": float(v), "unit": unit} for k, (v, unit) in numbers.items()}
         found.append(
             {
                 "name": cause.name,
-                "share": told.together(nats),
+                "share": expected.together(nats),
                 "parameters": numbers,
             }
         )

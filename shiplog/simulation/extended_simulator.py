@@ -235,7 +235,7 @@ def as_record(
         time=elapsed.reshape(rows),
         share=share.reshape(rows),
         starts=starts.reshape(rows),
-        seen=np.ones(rows, dtype=bool),
+        measured=np.ones(rows, dtype=bool),
         state=windows.state.reshape(rows, 6),
         actuator=windows.actuator.reshape(rows, -1),
         wind=wind.reshape(rows, 2),

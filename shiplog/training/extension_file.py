@@ -35,10 +35,10 @@ def read(folder: RunFolder, own: Sequence[Cause] = ()) -> Extension | None:
     path = folder.path / "extension.json"
     if not path.is_file():
         return None
-    told = run_files.json_of(path)
+    content = run_files.json_of(path)
     known = {cause.label for cause in (*CATALOGUE, *own)}
     try:
-        entries = [(str(entry["label"]), str(entry["name"])) for entry in told["causes"]]
+        entries = [(str(entry["label"]), str(entry["name"])) for entry in content["causes"]]
     except (KeyError, TypeError) as error:
         raise run_files.unreadable(path, error) from error
     lacking = [label for label, name in entries if not {label, name} & known]
@@ -52,7 +52,7 @@ def read(folder: RunFolder, own: Sequence[Cause] = ()) -> Extension | None:
         )
     arrays = run_files.arrays(folder.path / "extension.safetensors")
     try:
-        return Extension.of(told, arrays, own)
+        return Extension.of(content, arrays, own)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise run_files.unreadable(path, error) from error
 
@@ -66,11 +66,11 @@ def extend(
     partial = out.with_name(f"{out.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     shutil.copytree(folder.path, partial, ignore=shutil.ignore_patterns(*ANEW))
-    told, arrays = Extension.kept(simulator, len(simulator.model.base.names))
+    content, arrays = Extension.kept(simulator, len(simulator.model.base.names))
     own = any(cause.user for cause in simulator.model.causes)
     for i, path in enumerate(own_files if own else ()):
         shutil.copy(path, partial / f"extension-{i}.py")
-    files.write_json(partial / "extension.json", told | {"base": folder.name})
+    files.write_json(partial / "extension.json", content | {"base": folder.name})
     run_files.save_arrays(partial / "extension.safetensors", arrays)
     partial.rename(out)
     return out

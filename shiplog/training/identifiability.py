@@ -41,28 +41,28 @@ def note(
     meaning: Callable[[str], str],
 ) -> list[str]:
     """Sentences for a report: correlated, undetermined and limited parameters."""
-    said = []
+    sentences = []
     for i, j, value in trades(found)[:MOST_PAIRS]:
-        said.append(
+        sentences.append(
             f"{meaning(names[i])} ({names[i]}) and {meaning(names[j])} ({names[j]}) trade against "
             f"each other here: correlation {value:+.2f}."
         )
     more = len(trades(found)) - MOST_PAIRS
     if more > 0:
-        said.append(f"{more} more pairs correlate above {TRADING}.")
+        sentences.append(f"{more} more pairs correlate above {TRADING}.")
     quiet = [names[int(i)] for i in np.flatnonzero(silent(found, spread))]
     if quiet:
-        said.append(
+        sentences.append(
             f"These data say nothing about {', '.join(quiet)}: they stand where they started."
         )
     low, high = bounds
     room = 1e-3 * spread
     stuck = found.free & ((found.values < low + room) | (found.values > high - room))
     for i in np.flatnonzero(stuck):
-        said.append(
+        sentences.append(
             f"{names[int(i)]} ran into the limit of its physical range at {found.values[i]:g}: "
             "something else in the model is missing, or a sensor is wrong."
         )
     if not found.converged:
-        said.append(f"The identification did not converge: {found.message}.")
-    return said
+        sentences.append(f"The identification did not converge: {found.message}.")
+    return sentences

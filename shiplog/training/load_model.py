@@ -175,9 +175,9 @@ class NetworkRun(Run):
 
     def judge(self) -> Base:
         ship = mmg.begin(self.profile, self.config.physics)
-        usual = ship.start
-        start = Start(usual.values, usual.spread, usual.low, usual.high)
-        return Base(ship.model, start, ship.model, usual.values)
+        nominal = ship.start
+        start = Start(nominal.values, nominal.spread, nominal.low, nominal.high)
+        return Base(ship.model, start, ship.model, nominal.values)
 
     def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
         return prediction_interval.seeds_spread(simulated)
@@ -242,10 +242,10 @@ class PhysicalRun(Run):
         return force_breakdown.along(self.simulator(self.config.seeds[0]), seconds, self.profile)
 
     def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:
-        neutral = self._usual().neutral
+        neutral = self._nominal().neutral
         return earlier_runs.kept(self.identified(seed)["name"].to_list(), count, names, neutral)
 
-    def _usual(self) -> Parameters:
+    def _nominal(self) -> Parameters:
         """Coefficients of its equations as published or estimated."""
         return self.kind.equations.begin(self.profile, self.config.physics, None).start
 
@@ -254,19 +254,19 @@ class PhysicalRun(Run):
         return own.model, own.theta, own.covariance
 
     def _plain_base(self) -> Base:
-        usual = self._usual()
+        nominal = self._nominal()
         seed = self.config.seeds[0]
         simulator, known = self.simulator(seed), self.identified(seed)
-        more = len(simulator.theta) - len(usual.names)
-        place = self._kept(seed, known.height, usual.names)
+        more = len(simulator.theta) - len(nominal.names)
+        place = self._kept(seed, known.height, nominal.names)
         # a hybrid's network stays as it was trained, and so do terms that the run did not have
         start = Start(
             simulator.theta,
             np.concatenate(
                 (place.vector(known["spread"].to_numpy(), HELD_SPREAD), np.full(more, HELD_SPREAD))
             ),
-            np.concatenate((usual.low, np.full(more, -np.inf))),
-            np.concatenate((usual.high, np.full(more, np.inf))),
+            np.concatenate((nominal.low, np.full(more, -np.inf))),
+            np.concatenate((nominal.high, np.full(more, np.inf))),
         )
         return self._standing_in(simulator.model, start)
 

@@ -125,11 +125,11 @@ def choose_network(
     if best == 0.0:
         # A silent network: the physics as they are, in the hybrid's form.
         simulator, done = fitted(ready.data, found, 1e-9)
-        said = "The network adds nothing that survives held-out windows: it is kept silent."
+        sentence = "The network adds nothing that survives held-out windows: it is kept silent."
     else:
         simulator, done = candidates.get(best) or fitted(ready.data, found, best)
-        said = (
+        sentence = (
             f"Network of strength {best:g}: L {whole[best].mean():.0f} on {len(whole[best])} "
             f"held-out windows, physics alone {whole[0.0].mean():.0f}."
         )
-    return Chosen(best, whole), simulator, done, f"Seed {seed}: {said}", validated.get(best)
+    return Chosen(best, whole), simulator, done, f"Seed {seed}: {sentence}", validated.get(best)

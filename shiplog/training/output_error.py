@@ -96,9 +96,9 @@ def identify(
         message = "converged" if converged else _unsettled(done, model.names, free, most)
         after = _used(losses(model, values, data), weight)
         now = _noise(after, data)
-        settled = abs(now / noise - 1.0) < 0.05
+        steady = abs(now / noise - 1.0) < 0.05
         noise = now
-        if settled:
+        if steady:
             break
     total = weight.sum()
     return Identified(
@@ -221,10 +221,10 @@ class _Problem:
         keep = values > 1e-14 * max(values[-1], 1e-300)
         root = np.where(keep, np.sqrt(np.maximum(values, 0.0)), 0.0)
         inverse = np.where(keep, 1.0 / np.where(keep, root, 1.0), 0.0)
-        seen = inverse * (vectors.T @ pull)
-        rest = np.sqrt(max(cost - float(seen @ seen), 0.0))
+        projected = inverse * (vectors.T @ pull)
+        rest = np.sqrt(max(cost - float(projected @ projected), 0.0))
         self._jacobian = np.vstack((root[:, None] * vectors.T, np.eye(count), np.zeros(count)))
-        self._residual = np.concatenate((seen, x, [rest]))
+        self._residual = np.concatenate((projected, x, [rest]))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         self._evaluate(x)
@@ -260,16 +260,16 @@ def covariance(
     starting values plausibly are: that stays `spread`."""
     found = normal(model, values, data, _indices(free))
     scale = spread[free]
-    told = found.gram * np.outer(scale, scale) / noise  # by the data
+    measured_information = found.gram * np.outer(scale, scale) / noise  # by the data
     firm = np.eye(len(scale)) / factor**2  # the ridge
-    information = told + firm
+    information = measured_information + firm
     pulls = _used(found.pull, data.weight) * scale / noise * np.sqrt(data.weight)[:, None]
     inverse = np.linalg.inv(information)
     # Few windows say little about how their gradients vary: the expected scatter counts as much
     # more windows as there are parameters that the data determine.
-    determined = float(np.trace(told @ inverse))
+    determined = float(np.trace(measured_information @ inverse))
     count = float(data.weight.sum())
-    scatter = (count * pulls.T @ pulls + determined * told) / (count + determined)
+    scatter = (count * pulls.T @ pulls + determined * measured_information) / (count + determined)
     meat = count / max(count - 1.0, 1.0) * scatter + firm @ firm
     sandwich = inverse @ meat @ inverse
     whole = np.zeros((len(values), len(values)))

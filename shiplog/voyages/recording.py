@@ -44,7 +44,7 @@ class Record:
     time       [n]     s into the voyage
     share      [n]     of the campaign's running time, 0 to 1
     starts     [n]     bool: begins an unbroken stretch
-    seen       [n]     bool: measured; the other rows are bridged
+    measured   [n]     bool; the other rows are bridged
     state      [n, 6]  channels.STATE at midship, heading unwrapped within a stretch
     actuator   [n, A]
     wind       [n, 2]  apparent wind, where it comes from: ahead and to starboard [m/s]
@@ -57,7 +57,7 @@ class Record:
     time: np.ndarray
     share: np.ndarray
     starts: np.ndarray
-    seen: np.ndarray
+    measured: np.ndarray
     state: np.ndarray
     actuator: np.ndarray
     wind: np.ndarray
@@ -70,7 +70,7 @@ class Record:
 
     @property
     def seconds(self) -> float:
-        return float(self.seen.sum()) * self.step
+        return float(self.measured.sum()) * self.step
 
     @property
     def firsts(self) -> np.ndarray:
@@ -140,7 +140,16 @@ class Record:
         keep = np.isin(self.voyage, [self.names.index(v) for v in voyages])
         arrays = {
             name: getattr(self, name)[keep]
-            for name in ("voyage", "time", "share", "starts", "seen", "state", "actuator", "wind")
+            for name in (
+                "voyage",
+                "time",
+                "share",
+                "starts",
+                "measured",
+                "state",
+                "actuator",
+                "wind",
+            )
         }
         return replace(self, **arrays)
 
@@ -167,11 +176,11 @@ def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
     time = table["time"].to_physical().to_numpy()
     names = [*(c.name for c in channels.STATE), *profile.actuator_names, *profile.wind_names]
     values = table.select(pl.col(names).cast(pl.Float64).fill_null(np.nan)).to_numpy().copy()
-    seen = ((mark & int(channels.UNUSABLE)) == 0) & np.isfinite(values).all(1)
+    measured = ((mark & int(channels.UNUSABLE)) == 0) & np.isfinite(values).all(1)
     starts = (mark & int(Quality.JUMP)) != 0
-    keep = seen.copy()
-    for a, b in stretches(~seen):
-        keep[a : b + 1] = b - a < FILLED and a > 0 and b < len(seen) - 1
+    keep = measured.copy()
+    for a, b in stretches(~measured):
+        keep[a : b + 1] = b - a < FILLED and a > 0 and b < len(measured) - 1
     count = len(profile.actuator_names)
     angles = [4, *(6 + i for i, a in enumerate(profile.actuators) if a.kind == "azimuth")]
     if profile.has_wind:
@@ -180,7 +189,7 @@ def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
     rows = np.flatnonzero(keep)
     begins = np.diff(rows, prepend=-2) != 1
     begins |= starts[rows]
-    known = np.flatnonzero(seen)
+    known = np.flatnonzero(measured)
     for column in angles:
         values[known, column] = np.unwrap(values[known, column])
     filled = np.stack(
@@ -190,7 +199,7 @@ def _voyage(table: pl.DataFrame, profile: Profile) -> dict[str, np.ndarray]:
     return {
         "time": (time[rows] - time[0]) * 1e-9 if len(time) else time[rows].astype(float),
         "starts": begins,
-        "seen": seen[rows],
+        "measured": measured[rows],
         "state": filled[:, :6],
         "actuator": filled[:, 6 : 6 + count],
         "wind": wind,

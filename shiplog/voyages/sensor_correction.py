@@ -128,7 +128,7 @@ def _record(table: pl.DataFrame, profile: Profile) -> tuple[Record, np.ndarray]:
     none = np.zeros(len(rows))
     record = Record(
         profile=profile, names=("",), voyage=none.astype(int), time=none, share=none,
-        starts=starts, seen=rows >= 0, state=state,
+        starts=starts, measured=rows >= 0, state=state,
         actuator=np.zeros((len(rows), 0)), wind=np.zeros((len(rows), 2)),
     )  # fmt: skip
     return record, rows

@@ -87,14 +87,14 @@ def desk(known, tmp_path, monkeypatch):
 def judge(arguments, code, words, capsys) -> str:
     """Run a command line; its sentences."""
     found = cli.run([os.fsdecode(a) if isinstance(a, Path) else str(a) for a in arguments])
-    said = capsys.readouterr()
-    said = said.out + said.err
-    assert found == code, said
-    assert "Traceback" not in said and "unexpected fault" not in said, said
-    missing = [word for word in words if word not in " ".join(said.split())]
-    assert not missing, said
+    output = capsys.readouterr()
+    output = output.out + output.err
+    assert found == code, output
+    assert "Traceback" not in output and "unexpected fault" not in output, output
+    missing = [word for word in words if word not in " ".join(output.split())]
+    assert not missing, output
     assert not list((disk_cache.folder() / "faults").glob("*"))
-    return said
+    return output
 
 
 def halves(desk: Desk) -> bytes:
@@ -342,10 +342,10 @@ def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys,
 
     monkeypatch.setattr(catalogue, "entries", broken)
     assert cli.run(["voyages", "--store", str(desk.store)]) == 1
-    said = capsys.readouterr().err
-    assert "Traceback" not in said
+    output = capsys.readouterr().err
+    assert "Traceback" not in output
     (trace,) = (desk.folder / "cache" / "shiplog" / "faults").iterdir()
-    first, _ = said.split("\n", 1)
+    first, _ = output.split("\n", 1)
     assert "ZeroDivisionError: division by zero" in first and str(trace) in first
     text = trace.read_text()
     assert "in broken" in text and "Traceback" in text

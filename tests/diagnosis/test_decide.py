@@ -8,11 +8,11 @@ from shiplog.diagnosis import decide as deciding
 from shiplog.diagnosis import fits, thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)
-PULSES = Pulses(0.0, 60.0, 0.3, 4.0, np.array([0.0, 0.01, 0.004]))
+SIDE_THRUST = SideForce(0.0, 60.0, 0.3, 4.0, np.array([0.0, 0.01, 0.004]))
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +35,8 @@ def test_one_name(trial):
     assert one.probability == pytest.approx(0.95)
     assert one.numbers == pytest.approx([weighed.SIZE])
     assert one.covariance.shape == (1, 1)
-    assert found.structure is None and found.pulses is None
-    assert found.shown.included == ("drag",)
+    assert found.structure is None and found.side_force is None
+    assert found.fit.included == ("drag",)
 
 
 def test_two_names_each_with_its_own_part_of_the_covariance(trial):
@@ -55,7 +55,7 @@ def test_neither_of_two_is_named(trial):
     assert (found.verdict, named(found)) == ("undecided", [])
     assert list(found.ranking)[:2] == ["drag", "load"]
     # neither is shown: the numbers are of nothing
-    assert found.shown.included == ()
+    assert found.fit.included == ()
 
 
 def test_a_name_that_is_sure_beside_one_that_is_not(trial):
@@ -91,7 +91,7 @@ def test_a_kind_of_remainder_is_unknown_and_says_its_family(trial, kind, family)
     assert found.structure.evidence == pytest.approx(37.0)
     assert set(found.structure.acts_on) <= {"surge", "sway", "yaw_rate"}
     # what is drawn afterwards includes it
-    assert found.shown.remainder == found.nothing.remainder == Remainder(kind, 3.0)
+    assert found.fit.remainder == found.nothing.remainder == Remainder(kind, 3.0)
 
 
 def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
@@ -136,13 +136,15 @@ def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, mon
     sure = {((), INTERMITTENT): 0.98, ((), NOMINAL): 0.02}
     for device, wanted in ((True, "named"), (False, "unknown")):
         monkeypatch.setattr(deciding, "is_device", lambda *_, device=device: device)
-        found = verdict(trial, sure, pulses=PULSES)
+        found = verdict(trial, sure, side_force=SIDE_THRUST)
         assert found.verdict == wanted
-        assert (found.pulses is PULSES) == device
+        assert (found.side_force is SIDE_THRUST) == device
         assert (found.structure is None) == device
-        pulse = PULSES.unit * PULSES.force  # that the process noise has from then on
-        assert found.shown.remainder.pulse == (tuple(pulse) if device else None)
-        assert found.nothing.remainder == found.shown.remainder
+        intermittent = (
+            SIDE_THRUST.unit * SIDE_THRUST.force
+        )  # that the process noise has from then on
+        assert found.fit.remainder.intermittent == (tuple(intermittent) if device else None)
+        assert found.nothing.remainder == found.fit.remainder
 
 
 def test_a_refuted_name_is_not_named_and_its_reason_is_kept(trial):

@@ -284,11 +284,11 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
     assert columns.tolist() == list(range(7, 7 + found.count))
 
     monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: at)
-    pushed = found.pushed(None, None)  # type: ignore[arg-type]
-    assert pushed.shape == (4, 15, found.count)
+    accelerations = found.accelerations(None, None)  # type: ignore[arg-type]
+    assert accelerations.shape == (4, 15, found.count)
     features = np.concatenate([f.features(at) for f in found.families], -1)
     for channel in range(3):
-        own = pushed[:, 5 * channel : 5 * channel + 5]
+        own = accelerations[:, 5 * channel : 5 * channel + 5]
         assert own == pytest.approx(PUSH[channel] * features[..., channel, :])
 
 

@@ -27,9 +27,9 @@ def found(record) -> tuple[Stretch, ...]:
 
 def under(sailed, force, noise=1.0):
     """Its record with `force` (X, Y in N, N in N m) on it from START to END."""
-    push = np.zeros((len(sailed.time), 3))
-    push[(sailed.time >= START) & (sailed.time < END)] = force
-    return afloat.record(sailed, afloat.pushed(sailed, push), noise)
+    acceleration = np.zeros((len(sailed.time), 3))
+    acceleration[(sailed.time >= START) & (sailed.time < END)] = force
+    return afloat.record(sailed, afloat.sailed_with(sailed, acceleration), noise)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_full_thrust_is_that_of_the_open_water_diagram(sailed):
 
 
 def test_the_sentence_says_how_much_and_which_way():
-    said = Stretch("v", 70.0, 85.0, "sway", -24.0, 600.0)
-    assert said.sentence.startswith("A force of 24 N to port (600 % of full thrust) for 15 s")
-    assert said.as_json()["kind"] == "external"
-    assert said.as_json()["end_s"] == 85.0
+    output = Stretch("v", 70.0, 85.0, "sway", -24.0, 600.0)
+    assert output.sentence.startswith("A force of 24 N to port (600 % of full thrust) for 15 s")
+    assert output.as_json()["kind"] == "external"
+    assert output.as_json()["end_s"] == 85.0

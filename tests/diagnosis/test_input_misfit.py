@@ -63,7 +63,7 @@ def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
     """Of the column, above nothing; of usual process noise."""
     modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     if own is not None:
-        modes = modes.beside(own.pushed(linear.cut, GRID))
+        modes = modes.joined(own.accelerations(linear.cut, GRID))
     total = modes.total(np.ones(len(linear.cut)))
     known = np.eye(len(total) - 1)
     without = np.delete(np.delete(total, 1, 0), 1, 1)
@@ -75,7 +75,7 @@ def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
 def learned(linear: Linear) -> input_misfit.Misfit:
     modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     one = np.ones(1)
-    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.push)
+    return input_misfit.of(network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.acceleration)
 
 
 def test_what_it_bends_the_network_by_is_what_it_pushes():
@@ -89,8 +89,8 @@ def test_what_it_bends_the_network_by_is_what_it_pushes():
     apart = plain.bend(own.bends(weights)).acceleration(none, *given) - plain.acceleration(
         none, *given
     )
-    pushed = (own.pushed(cut, GRID) @ weights).reshape(len(cut), 3, KNOTS)
-    assert np.moveaxis(pushed, 1, -1) == pytest.approx(np.asarray(apart), abs=1e-9)
+    accelerations = (own.accelerations(cut, GRID) @ weights).reshape(len(cut), 3, KNOTS)
+    assert np.moveaxis(accelerations, 1, -1) == pytest.approx(np.asarray(apart), abs=1e-9)
     twice = plain.bend(own.bends(weights)).bend(own.bends(weights))
     assert twice.bent == pytest.approx(2.0 * own.bends(weights))
     assert plain.bend(np.zeros((0, 3))) is plain

@@ -9,7 +9,7 @@ import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis import intermittent, likelihood, segments, unrecorded_thruster
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 COUNT = 24
 LEVER = 0.3  # lengths ahead of midship at which the force acts
@@ -29,19 +29,21 @@ def passed(force: float):
     knots = segments.grid(record).knots
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
     on = np.random.default_rng(4).random((COUNT, knots)) < 0.3
-    pushed = force * unit[None, :, None] * on[:, None]
+    accelerations = force * unit[None, :, None] * on[:, None]
     return straight.passed(
-        record, straight.columns_of(()), pushed=pushed.reshape(COUNT, -1), seed=5
+        record, straight.columns_of(()), accelerations=accelerations.reshape(COUNT, -1), seed=5
     )
 
 
 def test_pushes_at_one_place_are_found_there(reference):
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight)
+    found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
     assert found.gain > 30.0
     assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.05)
-    quiet = unrecorded_thruster.pulses_of(passed(0.0), none, reference, PROCESS_NOISE, weight)
+    quiet = unrecorded_thruster.estimate_side_force(
+        passed(0.0), none, reference, PROCESS_NOISE, weight
+    )
     assert quiet.gain < 3.0
 
 
@@ -49,12 +51,17 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
     """Sway and yaw pushed more than usual, apart from each other, and surge as usual."""
     record = straight.sailed(COUNT)
     knots = segments.grid(record).knots
-    more = replace(PROCESS_NOISE, push=PROCESS_NOISE.push * np.array([1e-3, 2.0, 2.0]))
+    more = replace(
+        PROCESS_NOISE, acceleration=PROCESS_NOISE.acceleration * np.array([1e-3, 2.0, 2.0])
+    )
     drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
-    pushed = drawn @ np.linalg.cholesky(more.kernel(knots)).T
-    linear = straight.passed(record, straight.columns_of(()), pushed=pushed, seed=5)
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    assert unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight).gain < 0.0
+    assert (
+        unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight).gain
+        < 0.0
+    )
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
@@ -67,10 +74,10 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
               for v in (linear.e, linear.z, linear.j)]  # fmt: skip
     away = replace(linear, cut=replace(linear.cut, used=used), lost=lost,
                    e=zeroed[0], z=zeroed[1], j=zeroed[2])  # fmt: skip
-    found = unrecorded_thruster.pulses_of(
+    found = unrecorded_thruster.estimate_side_force(
         away, none, reference, PROCESS_NOISE, np.where(lost, 0.0, 1.0)
     )
-    without = unrecorded_thruster.pulses_of(
+    without = unrecorded_thruster.estimate_side_force(
         linear.pick(~lost), none, reference, PROCESS_NOISE, np.ones(COUNT - 1)
     )
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
@@ -80,14 +87,18 @@ def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
     """Bursts at one place: a force at that place unless they are usual there."""
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight)
-    usual = found.force * found.unit
-    again = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight, usual)
+    found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
+    nominal = found.force * found.unit
+    again = unrecorded_thruster.estimate_side_force(
+        linear, none, reference, PROCESS_NOISE, weight, nominal
+    )
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
     # beside a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
-    other = unrecorded_thruster.pulses_of(linear, none, reference, PROCESS_NOISE, weight, elsewhere)
+    other = unrecorded_thruster.estimate_side_force(
+        linear, none, reference, PROCESS_NOISE, weight, elsewhere
+    )
     assert other.gain > 20.0
 
 
@@ -99,27 +110,27 @@ UNIT = np.array([0.0, 0.01, 0.004])
 @pytest.fixture
 def asked(monkeypatch):
     """What is left of the nominal campaign when the force is asked for, and the weights."""
-    said = {}
+    output = {}
 
-    def pulses_of(linear, d, reference, process_noise, weight):
+    def estimate_side_force(linear, d, reference, process_noise, weight):
         left = likelihood.weighed(linear, process_noise).dd[:, 0, 0]
-        said.update(left=left, weight=weight)
+        output.update(left=left, weight=weight)
         assert not d.any()
-        return Pulses(0.0, said.get("gain", 7.0), 0.3, 2.0, UNIT)
+        return SideForce(0.0, output.get("gain", 7.0), 0.3, 2.0, UNIT)
 
-    monkeypatch.setattr(unrecorded_thruster, "pulses_of", pulses_of)
-    return said
+    monkeypatch.setattr(unrecorded_thruster, "estimate_side_force", estimate_side_force)
+    return output
 
 
 def test_what_usually_pushes_at_one_place_is_asked_of_the_nominal_campaign(asked):
     record, columns = straight.sailed(12), straight.columns_of(CAUSES)
     made = straight.campaign(record, straight.passed(record, columns), columns)
     grid = segments.grid(record)
-    assert intermittent.usual_push(made, grid) == pytest.approx(2.0 * UNIT)
+    assert intermittent.nominal_side_force(made, grid) == pytest.approx(2.0 * UNIT)
     assert asked["weight"].sum() == 12.0
-    assert intermittent.usual_push(replace(made, weight=np.zeros(12)), grid) is None
+    assert intermittent.nominal_side_force(replace(made, weight=np.zeros(12)), grid) is None
     asked["gain"] = -1.0  # it pushes in each channel by itself
-    assert intermittent.usual_push(made, grid) is None
+    assert intermittent.nominal_side_force(made, grid) is None
 
 
 def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
@@ -130,9 +141,9 @@ def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
     numbers[columns.of["drag"]] = 5.0
     left = {}
     for own in (numbers, 0.0 * numbers):
-        given = straight.passed(record, columns, own, told=3.0)
+        given = straight.passed(record, columns, own, sensitivity=3.0)
         made = straight.campaign(record, given, columns, deviation=0.02, size=0.1)
-        intermittent.usual_push(made, segments.grid(record))
+        intermittent.nominal_side_force(made, segments.grid(record))
         left[bool(own.any())] = asked["left"]
         before = likelihood.weighed(given, straight.PROCESS_NOISE).dd[:, 0, 0]
         assert not own.any() or before.min() > 3.0 * left[True].max()

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 from shiplog.diagnosis import likelihood
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.nominal_reference import inflation, marginal, usual
+from shiplog.diagnosis.nominal_reference import inflation, marginal, nominal_information
 from shiplog.diagnosis.segments import Cut
 from shiplog.voyages.timescale import KNOT
 
@@ -40,10 +40,12 @@ def covariance(process_noise: ProcessNoise, knots: int) -> np.ndarray:
     whole[:6, :6] = np.diag(process_noise.start**2)
     for channel in range(3):
         part = slice(6 + channel * knots, 6 + (channel + 1) * knots)
-        whole[part, part] = process_noise.push[channel] ** 2 * stays
-    if process_noise.pulse is not None:
-        stays = np.exp(-np.abs(at[:, None] - at) / process_noise.pulse_time)
-        whole[6:, 6:] += np.kron(np.outer(process_noise.pulse, process_noise.pulse), stays)
+        whole[part, part] = process_noise.acceleration[channel] ** 2 * stays
+    if process_noise.intermittent is not None:
+        stays = np.exp(-np.abs(at[:, None] - at) / process_noise.intermittent_time)
+        whole[6:, 6:] += np.kron(
+            np.outer(process_noise.intermittent, process_noise.intermittent), stays
+        )
     return whole
 
 
@@ -79,7 +81,7 @@ def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
         yield given.e[s].ravel()[used], j, c
 
 
-PULSED = replace(PROCESS_NOISE, pulse=np.array([0.0, 0.9, -0.4]), pulse_time=12.0)
+PULSED = replace(PROCESS_NOISE, intermittent=np.array([0.0, 0.9, -0.4]), intermittent_time=12.0)
 COLOURED = replace(
     PROCESS_NOISE, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
@@ -118,7 +120,7 @@ def test_a_square_of_errors_alone_is_that_of_their_gram(process_noise):
     for other in (
         process_noise,
         process_noise.times(3.0),
-        replace(process_noise, pulse=np.array([0.1, 2.0, 0.7])),
+        replace(process_noise, intermittent=np.array([0.1, 2.0, 0.7])),
     ):
         each, volume = likelihood.startless(weighed, process_noise).square(other)
         wanted = _gram(weighed, other)
@@ -153,13 +155,13 @@ def test_units_scale_columns_and_not_the_error():
 
 def test_columns_beside_bend_the_observations_as_their_acceleration_does():
     given = linear(3)
-    pushed = np.random.default_rng(9).standard_normal((3, 9, 4))
+    accelerations = np.random.default_rng(9).standard_normal((3, 9, 4))
     found = (
         likelihood.modes(likelihood.weighed(given, PROCESS_NOISE), PROCESS_NOISE)
-        .beside(pushed)
+        .joined(accelerations)
         .gram()
     )
-    columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], pushed)
+    columns = np.einsum("sbcz,szw->sbcw", given.z[..., 6:], accelerations)
     written_out = replace(given, j=np.concatenate((given.j, columns), -1))
     direct = _gram(likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE)
     assert found.each == pytest.approx(direct.each, rel=1e-6, abs=1e-6)
@@ -171,16 +173,20 @@ def test_columns_beside_bend_the_observations_as_their_acceleration_does():
         each = _gram(
             likelihood.weighed(written_out, PROCESS_NOISE), PROCESS_NOISE.times(noise_factor)
         ).each
-        whole = modes.beside(pushed[..., :1]).beside(pushed[..., 1:]).total(weight, noise_factor)
+        whole = (
+            modes.joined(accelerations[..., :1])
+            .joined(accelerations[..., 1:])
+            .total(weight, noise_factor)
+        )
         wanted = np.einsum("s,sij->ij", weight, each)
         assert whole == pytest.approx(wanted, rel=1e-6, abs=1e-6)
 
 
 def test_less_an_acceleration_is_less_what_it_does():
     given = linear(3)
-    pushed = np.random.default_rng(9).standard_normal((3, 9))
-    moved = replace(given, e=given.e + np.einsum("sbcz,sz->sbc", given.z[..., 6:], pushed))
-    assert moved.less(pushed).e == pytest.approx(given.e, abs=1e-12)
+    accelerations = np.random.default_rng(9).standard_normal((3, 9))
+    moved = replace(given, e=given.e + np.einsum("sbcz,sz->sbc", given.z[..., 6:], accelerations))
+    assert moved.less(accelerations).e == pytest.approx(given.e, abs=1e-12)
 
 
 def test_the_total_is_the_weighted_sum():
@@ -245,17 +251,17 @@ def test_a_pulse_pushes_all_channels_together():
     """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the process
     noise's own only within a channel."""
     kernel = PULSED.kernel(4)
-    push, pulse = PULSED.push, np.array([0.0, 0.9, -0.4])
+    acceleration, intermittent = PULSED.acceleration, np.array([0.0, 0.9, -0.4])
     for a in range(3):
         for b in range(3):
             for i, k in ((0, 0), (0, 2), (3, 1)):
                 far = abs(i - k) * KNOT
-                value = pulse[a] * pulse[b] * np.exp(-far / 12.0)
+                value = intermittent[a] * intermittent[b] * np.exp(-far / 12.0)
                 if a == b:
-                    value += push[a] ** 2 * np.exp(-far / 5.0)
+                    value += acceleration[a] ** 2 * np.exp(-far / 5.0)
                 assert kernel[4 * a + i, 4 * b + k] == pytest.approx(value, abs=1e-7)
     noise_factor = PULSED.times(3.0).kernel(4) - PULSED.kernel(4)
-    assert noise_factor[0, 0] == pytest.approx(8.0 * push[0] ** 2)  # the pulse stays
+    assert noise_factor[0, 0] == pytest.approx(8.0 * acceleration[0] ** 2)  # the pulse stays
     assert abs(noise_factor[0, 4]) < 1e-12
 
 
@@ -274,10 +280,10 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     noise = NOISE * rng.standard_normal(given.e.shape)
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
     e[~given.cut.used] = 1e3  # nobody looks there
-    begin = replace(PROCESS_NOISE, noise=NOISE * 3.0, push=PROCESS_NOISE.push / 3.0)
+    begin = replace(PROCESS_NOISE, noise=NOISE * 3.0, acceleration=PROCESS_NOISE.acceleration / 3.0)
     found = likelihood.learnt(replace(given, e=e), d, begin, rounds=25)
     assert found.noise == pytest.approx(NOISE, rel=0.15)
-    assert found.push == pytest.approx(PROCESS_NOISE.push, rel=0.15)
+    assert found.acceleration == pytest.approx(PROCESS_NOISE.acceleration, rel=0.15)
     assert found.time == PROCESS_NOISE.time and (found.start == PROCESS_NOISE.start).all()
     assert (found.coloured <= 0.2).all()
 
@@ -293,16 +299,18 @@ def test_sizes_learnt_are_the_likeliest():
     z = rng.multivariate_normal(np.zeros(len(kernel)), kernel, len(given.e))
     noise = NOISE * rng.standard_normal(given.e.shape)
     given = replace(given, e=np.einsum("sbcz,sz->sbc", given.z, z) + noise)
-    begin = replace(PROCESS_NOISE, noise=NOISE * 10.0, push=PROCESS_NOISE.push / 10.0)
+    begin = replace(
+        PROCESS_NOISE, noise=NOISE * 10.0, acceleration=PROCESS_NOISE.acceleration / 10.0
+    )
     found = likelihood.learnt(given, np.zeros(2), begin, rounds=5)
 
     def log_density(sizes):
-        tried = replace(found, noise=sizes[:6], push=sizes[6:])
+        tried = replace(found, noise=sizes[:6], acceleration=sizes[6:])
         return sum(
             multivariate_normal.logpdf(e, np.zeros(len(e)), c) for e, _, c in dense(given, tried)
         )
 
-    at = np.concatenate((found.noise, found.push))
+    at = np.concatenate((found.noise, found.acceleration))
     here = log_density(at)
     for i in range(9):
         for by in (0.98, 1.02):
@@ -359,7 +367,7 @@ def test_a_campaign_counts_for_a_part_of_itself():
     rng = np.random.default_rng(5)
     j = rng.standard_normal((40, 4))
     total, known, held = j.T @ j, np.array([1.0, 2.0, 0.5]), np.array([0.1, 0.0, -0.2])
-    information, pull = usual(total, 4.0, known, held)
+    information, pull = nominal_information(total, 4.0, known, held)
     plain = np.linalg.inv(total[1:, 1:] / 4.0 + np.diag(known))
     assert np.linalg.inv(information) == pytest.approx(plain)
     assert np.linalg.solve(information, pull) == pytest.approx(plain @ (total[1:, 0] / 4.0 + held))

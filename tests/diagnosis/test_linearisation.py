@@ -88,10 +88,10 @@ def test_the_integration_is_of_second_order():
 def test_a_push_is_an_acceleration():
     """Constant push of a body without forces: ½ p t², but for the first step, which is Euler's."""
     nodes, step = 61, 0.2
-    push = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
+    acceleration = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
         linearisation.states_along(
-            Coasting(), np.zeros(1), np.zeros((1, 6)), push, np.zeros((1, nodes, 3)), step
+            Coasting(), np.zeros(1), np.zeros((1, 6)), acceleration, np.zeros((1, nodes, 3)), step
         )
     )
     t = step * np.arange(nodes)
@@ -126,10 +126,10 @@ def test_a_bin_is_the_mean_of_what_was_measured():
 
 
 def test_bins_that_were_hardly_seen_do_not_count():
-    seen = np.ones(len(SEEN), dtype=bool)
-    seen[302:320] = False  # most of the first bin of the second segment
-    seen[325:330] = False  # a quarter of the next
-    used = segments.cut(replace(SEEN, seen=seen), ROWS).used
+    viewed = np.ones(len(SEEN), dtype=bool)
+    viewed[302:320] = False  # most of the first bin of the second segment
+    viewed[325:330] = False  # a quarter of the next
+    used = segments.cut(replace(SEEN, measured=viewed), ROWS).used
     assert not used[1, 0].any()
     assert used.sum() == used.size - 6
 
@@ -165,7 +165,7 @@ def linearised():
     }  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:  # a wider step than a derivative's averages noise
         patch.setattr(measurement_correction, "READ_STEP", 0.02)
-        cut, moved, shown = measurement_correction.read(model, SETTING, SEEN, ROWS, numbers)
+        cut, moved, observed = measurement_correction.read(model, SETTING, SEEN, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()
     return (
@@ -173,7 +173,7 @@ def linearised():
         numbers,
         theta,
         at,
-        linearisation.linear(model, theta, cut, GRID, at, moved, shown),
+        linearisation.linear(model, theta, cut, GRID, at, moved, observed),
     )
 
 
@@ -190,7 +190,7 @@ def gap(model, theta, at: Path, numbers) -> np.ndarray:
 
 def test_residual_with_the_path_put_back(linearised):
     model, numbers, theta, at, found = linearised
-    z = np.concatenate((np.zeros((4, 6)), at.push.reshape(4, -1)), 1)
+    z = np.concatenate((np.zeros((4, 6)), at.acceleration.reshape(4, -1)), 1)
     back = np.einsum("sbcz,sz->sbc", found.z, z)
     assert found.e == pytest.approx(gap(model, theta, at, numbers) + back, abs=1e-12)
 
@@ -207,9 +207,9 @@ def test_columns_of_the_start(linearised, column):
 @pytest.mark.parametrize(("channel", "knot"), [(0, 0), (1, 7), (2, 3), (2, 15)])
 def test_columns_of_the_knots(linearised, channel, knot):
     model, numbers, theta, at, found = linearised
-    h = np.zeros_like(at.push)
+    h = np.zeros_like(at.acceleration)
     h[:, channel, knot] = 1e-5
-    more, less = (replace(at, push=at.push + s) for s in (h, -h))
+    more, less = (replace(at, acceleration=at.acceleration + s) for s in (h, -h))
     slope = (gap(model, theta, more, numbers) - gap(model, theta, less, numbers)) / 2e-5
     column = found.z[..., 6 + channel * GRID.knots + knot]
     assert np.abs(column).max() > 0.1
@@ -254,7 +254,7 @@ def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
 
 
 def test_nothing_is_left_of_what_the_model_made():
-    at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     found = linearisation.linear(Toy(), THETA, cut, GRID, at, *none)
@@ -267,7 +267,7 @@ def test_nothing_is_left_of_what_the_model_made():
 def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     """One in a second serves the toy, whose rudder goes slowly: what it bends by is within 1 % of
     what every node's slopes say, and what is constant stays exact."""
-    at = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
     cut = simulated(at)
     none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     exact, found = (
@@ -289,36 +289,40 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
 def test_a_path_is_pulled_onto_a_known_push():
     """Smooth accelerations of 0.02 m/s²: the path goes where they went, and finds them."""
     t = KNOT * np.arange(GRID.knots)
-    push = np.stack((0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t)))
-    true = Path(SEEN.state[ROWS], np.tile(push, (4, 1, 1)))
+    acceleration = np.stack(
+        (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
+    )
+    true = Path(SEEN.state[ROWS], np.tile(acceleration, (4, 1, 1)))
     cut = simulated(true)
     found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
     y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
     assert y == pytest.approx(cut.y, abs=1e-4)
     assert found.start == pytest.approx(true.start, abs=2e-3)
     # within, where bins on both sides see a knot
-    assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
+    assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
 
 
 def test_a_path_is_pulled_on_a_longer_grid_too():
     """Segments of 60 s with knots of 4 s: the same pushes, found through `reading` and all."""
-    seen = replace(SEEN, timescale=Timescale(60.0, 4.0, 4.0))
-    g, rows = segments.grid(seen), segments.begins(seen)
+    viewed = replace(SEEN, timescale=Timescale(60.0, 4.0, 4.0))
+    g, rows = segments.grid(viewed), segments.begins(viewed)
     t = g.knot * np.arange(g.knots)
-    push = np.stack((0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t)))
-    true = Path(SEEN.state[rows], np.tile(push, (2, 1, 1)))
-    cut, moved, shown = measurement_correction.read(Toy(), SETTING, seen, rows)
-    assert cut.y.shape == shown.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
+    acceleration = np.stack(
+        (0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t))
+    )
+    true = Path(SEEN.state[rows], np.tile(acceleration, (2, 1, 1)))
+    cut, moved, observed = measurement_correction.read(Toy(), SETTING, viewed, rows)
+    assert cut.y.shape == observed.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
     y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
     cut = replace(cut, y=y)
     tight = replace(WIDE, noise=0.01 * WIDE.noise)
     found = linearisation.pulled(Toy(), THETA, cut, g, tight, rounds=3)
-    assert found.push[..., 1:-1] == pytest.approx(true.push[..., 1:-1], abs=2e-3)
-    assert not linearisation.linear(Toy(), THETA, cut, g, found, moved, shown, WIDE).lost.any()
+    assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
+    assert not linearisation.linear(Toy(), THETA, cut, g, found, moved, observed, WIDE).lost.any()
 
 
 def test_what_was_not_used_does_not_pull():
-    true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)
     used = cut.used.copy()
     used[:, 6:8] = False
@@ -333,21 +337,25 @@ def test_a_linearisation_expects_where_its_path_will_be_pulled():
     """Nothing pushes it, but the rudder turns it by a tenth less than the model has it: pulled,
     the path says so by a push. Once the model has it right there is none, and what is expected
     before that is linearised there is off by what is not linear: a tenth of the tenth."""
-    true = replace(path(), push=np.zeros((4, 3, GRID.knots)))
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)
     wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
     stood = linearisation.pulled(Toy(), wrong, cut, GRID, tight)
-    size = np.abs(stood.push[:, 2]).max()
+    size = np.abs(stood.acceleration[:, 2]).max()
     assert size > 1e-4
     nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
     linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing)
     found = linearisation.ahead(linear, THETA - wrong, tight)
-    assert np.abs(found.push[:, 2]).max() < 0.1 * size
+    assert np.abs(found.acceleration[:, 2]).max() < 0.1 * size
     assert found.start == pytest.approx(true.start, abs=1e-3)
     stays = linearisation.ahead(linear, np.zeros(4), tight)
-    assert stays.push == pytest.approx(stood.push, abs=0.1 * size)
-    firm = linearisation.ahead(linear, np.zeros(4), replace(tight, push=1e-6 * WIDE.push))
-    assert np.abs(firm.push[:, 2]).max() < 0.1 * size  # held about none, not about where it stood
+    assert stays.acceleration == pytest.approx(stood.acceleration, abs=0.1 * size)
+    firm = linearisation.ahead(
+        linear, np.zeros(4), replace(tight, acceleration=1e-6 * WIDE.acceleration)
+    )
+    assert (
+        np.abs(firm.acceleration[:, 2]).max() < 0.1 * size
+    )  # held about none, not about where it stood
 
 
 # --- a trap: recorded actuators held instead of interpolated
@@ -374,10 +382,10 @@ def test_a_delay_is_what_it_is_and_zero_is_zero(late):
     """Holding the recorded rudder over a step would show as 0.05 s here."""
     record = weaving(late)
     model = Toy((RudderDelay(),))
-    cut, moved, shown = measurement_correction.read(model, SETTING, record, ROWS)
+    cut, moved, observed = measurement_correction.read(model, SETTING, record, ROWS)
     theta = np.concatenate((THETA, [0.0]))
     at = Path(record.state[ROWS], np.zeros((4, 3, GRID.knots)))
-    found = linearisation.linear(model, theta, cut, GRID, at, moved, shown)
+    found = linearisation.linear(model, theta, cut, GRID, at, moved, observed)
     rows = found.e[..., 4:].ravel()  # heading and yaw rate
     start = found.z[..., 4:, 4:6].reshape(len(rows), 2)
     owned = np.zeros((len(rows), 8))  # each segment has a start of its own
@@ -459,9 +467,9 @@ def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
     for i, h in enumerate(1e-5 * np.eye(6)):
         more, less = (replace(at, start=at.start + s) for s in (h, -h))
         assert found.z[..., i] == pytest.approx((y(theta, more) - y(theta, less)) / 2e-5, abs=2e-6)
-    h = np.zeros_like(at.push)
+    h = np.zeros_like(at.acceleration)
     h[:, 1, 7] = 1e-5
-    more, less = (replace(at, push=at.push + s) for s in (h, -h))
+    more, less = (replace(at, acceleration=at.acceleration + s) for s in (h, -h))
     slope = (y(theta, more) - y(theta, less)) / 2e-5
     assert found.z[..., 6 + GRID.knots + 7] == pytest.approx(slope, abs=2e-5)
 
@@ -478,8 +486,10 @@ def test_a_ship_that_needs_no_finer_steps_keeps_its_numbers():
     # the last row of what drives is the share of the campaign, before the wind
     plain = replace(cut, driven=np.delete(cut.driven, 3, axis=-1))
     ((_, filled),) = linearisation.chunks(4)  # as many at a time, so that rounding is the same
-    start, push, driven = map(filled, (at.start, at.at_nodes(GRID), plain.driven))
-    states = np.asarray(linearisation.states_along(model, theta, start, push, driven, cut.step))[:4]
+    start, acceleration, driven = map(filled, (at.start, at.at_nodes(GRID), plain.driven))
+    states = np.asarray(
+        linearisation.states_along(model, theta, start, acceleration, driven, cut.step)
+    )[:4]
     pairs = 0.5 * (states[:, 1:] + states[:, :-1])
     wanted = pairs.reshape(4, GRID.bins, -1, 6).mean(2)
     for substeps in (1, 2):
@@ -496,25 +506,25 @@ def test_a_segment_that_runs_away_is_left_out_and_counted(wide):
     theta = np.array([7.0])
     found = linearisation.linear(Stiff(4), theta, cut, GRID, at, *nothing(cut), wide)
     assert found.lost.tolist() == [False, False, True, False]
-    assert found.said == "1 of 4 segments were left out: the model diverges there."
+    assert found.sentence == "1 of 4 segments were left out: the model diverges there."
     for values in (found.e, found.z, found.j):
         assert np.isfinite(values).all() and not values[2].any() and values[[0, 1, 3]].any()
     assert not found.cut.used[2].any() and found.cut.used[[0, 1, 3]].all()
     assert cut.used.all()  # what was cut stays as it was
     others = np.array([True, True, False, True])
     alone = linearisation.linear(
-        Stiff(4), theta, cut.pick(others), GRID, Path(at.start[others], at.push[others]),
+        Stiff(4), theta, cut.pick(others), GRID, Path(at.start[others], at.acceleration[others]),
         *nothing(cut.pick(others)), wide,
     )  # fmt: skip
     assert np.array_equal(found.pick(others).e, alone.e)
-    assert not alone.lost.any() and alone.said == ""
-    assert found.beside(alone).lost.tolist() == [False, False, True, *[False] * 4]
+    assert not alone.lost.any() and alone.sentence == ""
+    assert found.joined(alone).lost.tolist() == [False, False, True, *[False] * 4]
 
 
 def test_what_was_left_out_carries_no_information():
     cut, at, _ = coasting(segments_on=(2,))
     found = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
-    process_noise = likelihood.ProcessNoise(WIDE.noise, WIDE.push, WIDE.start, 4.0)
+    process_noise = likelihood.ProcessNoise(WIDE.noise, WIDE.acceleration, WIDE.start, 4.0)
     whole = likelihood.weighed(found, process_noise)
     part = likelihood.weighed(found.pick(np.array([True, True, False, True])), process_noise)
     assert not whole.dd[2].any() and not whole.zd[2].any() and not whole.zz[2].any()
@@ -527,12 +537,12 @@ def test_numbers_of_each_segment_are_taken_off_it_alone():
     cut, at, _ = coasting()
     linear = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
     rng = np.random.default_rng(3)
-    pushed = rng.standard_normal((4, linear.z.shape[-1] - 6, 2))
+    accelerations = rng.standard_normal((4, linear.z.shape[-1] - 6, 2))
     numbers = np.array([[0.4, 0.0, 0.0], [0.0, 1.0, -2.0], [0.0, 0.0, 0.0], [0.3, 0.5, 0.0]])
-    left = linear.less_numbers(numbers, pushed)
+    left = linear.less_numbers(numbers, accelerations)
     for i, (own, one, two) in enumerate(numbers):
-        push = pushed[i, :, 0] * one + pushed[i, :, 1] * two
-        wanted = linear.e[i] - linear.j[i, ..., 0] * own - linear.z[i, ..., 6:] @ push
+        acceleration = accelerations[i, :, 0] * one + accelerations[i, :, 1] * two
+        wanted = linear.e[i] - linear.j[i, ..., 0] * own - linear.z[i, ..., 6:] @ acceleration
         assert left.e[i] == pytest.approx(wanted, abs=1e-12)
     assert np.array_equal(left.j, linear.j) and left.cut is linear.cut
 
@@ -541,7 +551,7 @@ def test_a_path_that_runs_away_does_not_move_and_leaves_the_others_alone():
     cut, at, _ = coasting(segments_on=(2,))
     theta = np.array([7.0])
     found = linearisation.pulled(Stiff(4), theta, cut, GRID, WIDE, at)
-    assert np.array_equal(found.start[2], at.start[2]) and np.isfinite(found.push).all()
+    assert np.array_equal(found.start[2], at.start[2]) and np.isfinite(found.acceleration).all()
     free, _, _ = coasting()
     alone = linearisation.pulled(Stiff(4), theta, free, GRID, WIDE, at)
     assert found.start[[0, 1, 3]] == pytest.approx(alone.start[[0, 1, 3]], abs=1e-12)

@@ -84,8 +84,8 @@ def test_the_whole_current_is_found_though_the_network_learned_in_it(afloat):
     (hidden,) = afloat.case.causes
     assert one.cause.label == hidden.name == "current"
     for name, truth in hidden.parameters.items():
-        shown = one.shown[name]
-        assert shown.low <= truth["value"] <= shown.high
+        displayed = one.estimates[name]
+        assert displayed.low <= truth["value"] <= displayed.high
 
 
 def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat):
@@ -99,33 +99,33 @@ def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat
     d = fits.solved(trial, fit)
     left, own_numbers = trial.left(afloat.point.linear, d)
     weights = d[count:]
-    pushed = ref.misfit.pushed(afloat.point.linear.cut, trial.grid) @ weights
+    accelerations = ref.misfit.accelerations(afloat.point.linear.cut, trial.grid) @ weights
     wanted = afloat.point.linear.e - np.einsum(
-        "sbcz,sz->sbc", afloat.point.linear.z[..., 6:], pushed
+        "sbcz,sz->sbc", afloat.point.linear.z[..., 6:], accelerations
     )
     assert left.e == pytest.approx(wanted) and own_numbers == pytest.approx(d[:count])
-    assert np.abs(pushed).max() > 0.0
+    assert np.abs(accelerations).max() > 0.0
     moved = fits.coefficients(trial, fit)
     assert moved == pytest.approx(ref.theta + d[: ref.columns.base])
 
 
 def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
     """And stays: what is fitted again beside it is the network's bends, on the judge's segments."""
-    trial, seen = afloat.network.beside(afloat.decision)
+    trial, seen = afloat.network.extended_by(afloat.decision)
     assert seen.named == afloat.decision.named
     (one,) = seen.named
-    assert seen.shown.point.numbers["current"] == pytest.approx(one.numbers)
-    assert seen.shown.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
+    assert seen.fit.point.numbers["current"] == pytest.approx(one.numbers)
+    assert seen.fit.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
     assert seen.nothing.point.numbers == {} and seen.nothing.included == ()
     ref, base = trial.reference, trial.reference.model.base
-    d = fits.solution(trial, seen.shown).solution
+    d = fits.solution(trial, seen.fit).solution
     weights = d[ref.columns.linearised : len(ref.columns.unit)]
-    assert fits.coefficients(trial, seen.shown) == pytest.approx(ref.misfit.bends(weights))
+    assert fits.coefficients(trial, seen.fit) == pytest.approx(ref.misfit.bends(weights))
     assert np.abs(weights).max() > 0.0 and base.bent is None
     assert (trial.rows == afloat.trial.rows).all()
-    assert afloat.network.beside(afloat.decision)[0] is trial
+    assert afloat.network.extended_by(afloat.decision)[0] is trial
     less = afloat.trial.leaving_out(np.arange(len(trial.rows)) == 3)
-    again, _ = network_base.Own(afloat.run, less).beside(afloat.decision)
+    again, _ = network_base.Own(afloat.run, less).extended_by(afloat.decision)
     assert (again.weight == 0.0).nonzero()[0].tolist() == [3]
 
 
@@ -141,8 +141,8 @@ def test_each_voyage_is_left_out_of_the_bends_and_of_the_numbers(afloat):
         assert np.abs(one - whole).max() > 1e-3 * np.abs(whole).max()
     assert np.abs(bends - bent).max() > 1e-3 * np.abs(whole).max()
     assert not np.allclose(numbers["current"], others["current"], rtol=1e-6)
-    out = decision.shown.point.linear.cut.voyage == 0
-    alone, _ = fits.without(afloat.trial, decision.shown, out)
+    out = decision.fit.point.linear.cut.voyage == 0
+    alone, _ = fits.without(afloat.trial, decision.fit, out)
     assert numbers["current"] == pytest.approx(alone["current"])
 
 
@@ -184,9 +184,9 @@ def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
     found = judge.gain(replace(done.decision, adapted=False))
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
     assert [c["name"] for c in done.verdict.causes] == ["current"]
-    said = [n for n in done.verdict.notes if "MMG" in n]
-    assert "run is a network" in said[0] and verdicts.less(found.reduction) in said[1]
-    trial, decision = done.seen
+    output = [n for n in done.verdict.notes if "MMG" in n]
+    assert "run is a network" in output[0] and verdicts.less(found.reduction) in output[1]
+    trial, decision = done.simulated
     assert trial.reference.model.base.weights and done.whole.j.shape[-1] == 2  # the current's
     assert done.trial.reference.model.base is not trial.reference.model.base
     assert (done.folder / "diagnosis.rrd").is_file() and decision.named

@@ -32,7 +32,7 @@ def test_each_manoeuvre_is_within_what_the_ship_did():
     profile = SimpleNamespace(actuators=[SimpleNamespace(kind=k) for k in kinds])
     rows = 200
     actuator = np.linspace(-1.0, 1.0, rows)[:, None] * np.array([0.5, 10.0, 3.0, 2.0])
-    record = SimpleNamespace(profile=profile, actuator=actuator, seen=np.ones(rows, dtype=bool))
+    record = SimpleNamespace(profile=profile, actuator=actuator, measured=np.ones(rows, dtype=bool))
     time = np.arange(0.0, next_manoeuvre.MANOEUVRE_S, 0.5)
     for manoeuvre in next_manoeuvre.MANOEUVRES:
         driven = next_manoeuvre.driven(record, manoeuvre, time)

@@ -19,7 +19,7 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.campaign_prior import prior
-from shiplog.diagnosis.nominal_reference import Settled
+from shiplog.diagnosis.nominal_reference import Converged
 from shiplog.models.starting_values import Start
 
 
@@ -114,8 +114,8 @@ def learned(model):
     record = straight.sailed(24)
     numbers = np.zeros(len(columns.unit))
     numbers[columns.of["drag"]] = 0.5
-    given = straight.passed(record, columns, numbers, told=0.3)
-    at = Settled(np.zeros(2), given.path, PROCESS_NOISE)
+    given = straight.passed(record, columns, numbers, sensitivity=0.3)
+    at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
     patch = pytest.MonkeyPatch()
     patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
     patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
@@ -189,11 +189,11 @@ def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, 
     found, _ = learned
     columns = nominal_reference.columns_of(model, SETTING, START)
     record = straight.sailed(24)
-    given = straight.passed(record, columns, told=0.3)
+    given = straight.passed(record, columns, sensitivity=0.3)
     monkeypatch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
     monkeypatch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
     less = replace(found, deviation={n: v for n, v in found.deviation.items() if n != "drag"})
-    at = Settled(np.zeros(2), given.path, PROCESS_NOISE)
+    at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
     made = nominal_campaign.learn(model, SETTING, START, record, at, less)
     own = made.effects.deviation[columns.of["drag"]]
     assert own == pytest.approx([voyage_effects.UNSEEN_DEVIATION])

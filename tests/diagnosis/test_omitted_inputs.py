@@ -91,8 +91,8 @@ def test_nothing_is_found_where_nothing_is(seed):
 def test_what_the_model_sees_is_no_finding():
     """A residual of speed and rudder is the model's own misfit."""
     knots = campaign()
-    seen = knots["surge"].to_numpy() * knots["yaw_rate"].to_numpy()
-    assert not any(row.significant for row in asked(planted(knots, seen, "surge")).values())
+    observed = knots["surge"].to_numpy() * knots["yaw_rate"].to_numpy()
+    assert not any(row.significant for row in asked(planted(knots, observed, "surge")).values())
 
 
 @pytest.mark.parametrize(("variable", "columns"), [("position", ["x0", "y0"]), ("time", ["share"])])

@@ -14,11 +14,11 @@ from shiplog.diagnosis.remainder import SIZES
 SHARE = 0.5
 
 
-def campaign(changed: float, part: int = 2, told: float = 0.6):
+def campaign(changed: float, part: int = 2, sensitivity: float = 0.6):
     """Four parts of three segments; one of them has `drag`, in its realistic size of 0.5."""
     columns = straight.columns_of(CAUSES)
     record = straight.sailed(12)
-    given = straight.passed(record, columns, told=told)
+    given = straight.passed(record, columns, sensitivity=sensitivity)
     numbers = np.zeros(columns.linearised)
     numbers[columns.of["drag"]] = 0.5 * changed
     inside = np.arange(3 * part, 3 * part + 3)
@@ -59,10 +59,10 @@ def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
     best = 0.0
     for left_out, gram in enumerate(made.voyages):
         information, pull = made.prior_without(left_out)
-        usual = np.arange(1 + count)
-        plain = marginal(SHARE * gram[np.ix_(usual, usual)], information, pull)
+        nominal = np.arange(1 + count)
+        plain = marginal(SHARE * gram[np.ix_(nominal, nominal)], information, pull)
         for size in sizes:
-            both = np.concatenate((usual, 1 + at))
+            both = np.concatenate((nominal, 1 + at))
             known = np.eye(count + len(at)) / size**2
             known[:count, :count] = information
             towards = np.concatenate((pull, np.zeros(len(at))))
@@ -81,7 +81,7 @@ def test_what_parts_differ_by_is_no_placebo():
     """The deviation that a campaign was given: a part may have so much of its own."""
     columns = straight.columns_of(CAUSES)
     record = straight.sailed(12)
-    given = straight.passed(record, columns, told=0.6)
+    given = straight.passed(record, columns, sensitivity=0.6)
     at = columns.of["drag"]
     for part, value in enumerate((-1.0, 1.0, -0.6, 0.6)):
         inside = np.arange(3 * part, 3 * part + 3)

@@ -14,7 +14,7 @@ from shiplog.models.mmg import body
 from shiplog.voyages.recording import Record
 
 PROCESS_NOISE = ProcessNoise(
-    noise=np.full(6, 3e-4), push=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)
+    noise=np.full(6, 3e-4), acceleration=np.array([2e-3, 1e-3, 4e-4]), time=5.0, start=np.ones(6)
 )
 
 
@@ -58,7 +58,7 @@ def test_the_posterior_is_kriging():
     )
     t = 2.0 * np.arange(16)
     for channel in range(3):
-        prior = PROCESS_NOISE.push[channel] ** 2 * np.exp(
+        prior = PROCESS_NOISE.acceleration[channel] ** 2 * np.exp(
             -np.abs(t[:, None] - t) / PROCESS_NOISE.time
         )
         gain = prior[:, :15] @ np.linalg.inv(prior[:15, :15] + 3e-4**2 * np.eye(15))
@@ -116,7 +116,7 @@ def test_a_force_that_no_model_has_is_found_with_its_uncertainty():
     """A push that swells and ebbs, through helm, wind and noise, by the project's own MMG."""
     sailed = afloat.voyage(150.0)
     swell = np.sin(2.0 * np.pi * sailed.time / 50.0)[:, None] * np.array([3.0, -2.0, 1.0])
-    record = afloat.record(sailed, afloat.pushed(sailed, swell))
+    record = afloat.record(sailed, afloat.sailed_with(sailed, swell))
     white = replace(afloat.PROCESS_NOISE.times(10.0), noise=afloat.NOISE / np.sqrt(20.0))  # of 2 s
     found = residual_acceleration.posterior(afloat.linear(record), np.zeros(0), white, record)
     zero = np.zeros(1)

@@ -16,10 +16,10 @@ from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.unrecorded_thruster import Pulses
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.diagnosis.weighing import weigh
 
-TOLD = 0.6
+SENSITIVITY = 0.6
 NOMINAL_SEED, TRIAL_SEED = 1, 2
 
 
@@ -37,10 +37,12 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
     """
     columns = straight.columns_of(causes)
     nominal, record = straight.sailed(12), straight.sailed(8, seed=3)
-    usual = straight.campaign(
-        nominal, straight.passed(nominal, columns, seed=NOMINAL_SEED, told=TOLD), columns
+    campaign = straight.campaign(
+        nominal,
+        straight.passed(nominal, columns, seed=NOMINAL_SEED, sensitivity=SENSITIVITY),
+        columns,
     )
-    given = straight.passed(record, columns, seed=TRIAL_SEED, told=TOLD, **changes)
+    given = straight.passed(record, columns, seed=TRIAL_SEED, sensitivity=SENSITIVITY, **changes)
     if alike is not None:
         one, other, share = alike
         j = given.j.copy()
@@ -48,7 +50,7 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
         j[..., columns.of[other]] += j[..., columns.of[one]]
         given = replace(given, j=j)
     given = replace(given, e=given.e + given.j @ numbers_of(columns, hidden))
-    trial = straight.trial(usual, record, given, tuple(fixed or {}))
+    trial = straight.trial(campaign, record, given, tuple(fixed or {}))
     return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
 
 
@@ -79,7 +81,7 @@ def test_a_hidden_cause_is_found_and_sized(one):
     assert (
         one.table.alone["drag"] > 20.0 > max(v for k, v in one.table.alone.items() if k != "drag")
     )
-    assert set(one.told) == {cause.label for cause in CAUSES}
+    assert set(one.expected) == {cause.label for cause in CAUSES}
     decision, found = decide(one)
     assert decision.verdict == "named"
     assert [n.cause.label for n in decision.named] == ["drag"]
@@ -183,7 +185,7 @@ def test_an_intermittent_force_is_asked_for_beside_no_family(monkeypatch):
     more = pushes()
     for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
         asked.clear()
-        trial, point = trial_with({}, pushed=more)
+        trial, point = trial_with({}, accelerations=more)
         monkeypatch.setattr(
             fits, "changed", lambda *given, gain=gain, last=last: (
                 (gain, 3.0) if given[4] == last else real(*given)
@@ -199,9 +201,9 @@ def test_an_intermittent_force_is_asked_for_beside_no_family(monkeypatch):
 
 @pytest.mark.parametrize("gain", [40.0, -1.0])
 def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
-    trial, point = trial_with({}, pushed=pushes())
+    trial, point = trial_with({}, accelerations=pushes())
     table = search_of(trial, point).table
-    table.intermittent = lambda fit: Pulses(0.0, gain, 0.0, 1.0, np.zeros(3))
+    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 1.0, np.zeros(3))
     weigh(table, (), {}, point)
     if gain < 0.0:
         assert ((), INTERMITTENT) not in table.found
@@ -216,22 +218,22 @@ def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the
     gain, noisy, monkeypatch
 ):
     """What gains a little beside noise that explains much is fitted to that noise."""
-    trial, point = trial_with({}, pushed=pushes())
+    trial, point = trial_with({}, accelerations=pushes())
     trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
     monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
     levels = weighing.nominal_levels(trial, point, (), 1.0)
     raised = max(level.value for level in levels)
-    usual = weighing.best(trial, levels, NOMINAL).value
+    quiet = weighing.best(trial, levels, NOMINAL).value
     wanted = max(
         level.value - 0.5 * (math.log(level.noise_factor) / 0.05) ** 2
         + 0.5 * math.log(level.noise_factor) ** 2 + math.log(1.0 / 0.05)
         for level in levels
     )  # fmt: skip
-    assert usual == pytest.approx(wanted)
-    assert usual + 2.0 < raised < usual + 60.0
+    assert quiet == pytest.approx(wanted)
+    assert quiet + 2.0 < raised < quiet + 60.0
     change = weighing.changed(trial, point, (), levels, "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
-    assert change.value == pytest.approx((raised if noisy else usual) + gain)
+    assert change.value == pytest.approx((raised if noisy else quiet) + gain)
 
 
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():
@@ -242,8 +244,8 @@ def test_a_force_of_the_place_is_unknown_and_depends_on_position():
     weights = np.zeros(plain.unseen.count)
     first = plain.unseen.families[0].columns[0]
     weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
-    pushed = plain.unseen.pushed(point.linear.cut, plain.grid) @ weights
-    found = searched({}, pushed=pushed)
+    accelerations = plain.unseen.accelerations(point.linear.cut, plain.grid) @ weights
+    found = searched({}, accelerations=accelerations)
     decision, weighed = decide(found)
     assert decision.named == ()
     assert decision.verdict == "unknown"

@@ -25,13 +25,13 @@ def made():
     """A campaign of 12 segments, a trial of 8 in two voyages, and their columns."""
     columns = straight.columns_of(CAUSES)
     nominal, record = straight.sailed(12), straight.sailed(8, seed=3)
-    usual = straight.campaign(
-        nominal, straight.passed(nominal, columns, told=0.3), columns, share=SHARE
+    nominal = straight.campaign(
+        nominal, straight.passed(nominal, columns, sensitivity=0.3), columns, share=SHARE
     )
     numbers = np.zeros(columns.linearised)
     numbers[columns.of["drag"]] = DRAG
-    given = straight.passed(record, columns, numbers, seed=2, told=0.3)
-    return usual, record, given
+    given = straight.passed(record, columns, numbers, seed=2, sensitivity=0.3)
+    return nominal, record, given
 
 
 @pytest.fixture
@@ -47,20 +47,20 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
     covariance_of_usual = np.linalg.inv(ref.information)
     mean = covariance_of_usual @ ref.pull
     parts = trial.parts if parts is None else parts
-    e, usual, extra, change, blocks = [], [], [], [], []
+    e, nominal, extra, change, blocks = [], [], [], [], []
     cut, linear = point.linear.cut, point.linear
-    seen = ref.misfit.pushed(cut, trial.grid)
-    unseen = trial.unseen.pushed(cut, trial.grid)
+    observed = ref.misfit.accelerations(cut, trial.grid)
+    unseen = trial.unseen.accelerations(cut, trial.grid)
     for s, (error, j, z, c) in enumerate(straight.dense(linear, PROCESS_NOISE.times(noise))):
         unit = columns.unit[: j.shape[1]]
-        both = np.concatenate((j * unit, z @ seen[s]), 1)
+        both = np.concatenate((j * unit, z @ observed[s]), 1)
         every = np.concatenate((both, z @ unseen[s]), 1)
         e.append(error)
-        usual.append(both)
+        nominal.append(both)
         extra.append(both[:, [i for n in included for i in columns.of[n]]])
         change.append(every[:, [i for n in families for i in trial.families[n]]])
         blocks.append(c)
-    whole_e, j = np.concatenate(e), np.concatenate(usual)
+    whole_e, j = np.concatenate(e), np.concatenate(nominal)
     rows = len(e[0])
     covariance = np.zeros((len(whole_e),) * 2)
     for s, c in enumerate(blocks):
@@ -81,11 +81,11 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
 def nats(trial, point, noise, included=(), families=(), size=1.0) -> float:
     """log of a power of the likelihood, times the prior, integrated: a Gaussian whose covariance
     is 1/share as large. Constants that no hypothesis changes are left out."""
-    e, j, x, d, c, mean, usual, before, size, _ = gaussian(
+    e, j, x, d, c, mean, nominal, before, size, _ = gaussian(
         trial, point, noise, included, families, size
     )
     share = trial.reference.counts
-    whole = c / share + j @ usual @ j.T + x @ x.T + size**2 * d @ d.T
+    whole = c / share + j @ nominal @ j.T + x @ x.T + size**2 * d @ d.T
     return float(multivariate_normal(j @ mean + x @ before, whole).logpdf(e))
 
 
@@ -94,7 +94,7 @@ def level(trial, point, noise, included=(), kind=NOMINAL, size=1.0):
 
 
 def of_noise(trial, noise, beside=Remainder()):  # noqa: B008
-    return remainder.expected(noise, trial.usual_spread, beside)
+    return remainder.noise_prior(noise, trial.nominal_spread, beside)
 
 
 HYPOTHESES = (
@@ -108,14 +108,14 @@ def test_hypotheses_differ_as_dense_gaussians_do(trial, noise):
     """Log marginal likelihoods of 8 segments of 90 observations, nothing subtracted but that of
     nothing; every part has numbers of its own."""
     point = trial.at({})
-    nothing, usual = level(trial, point, noise), nats(trial, point, noise)
+    nothing, nominal = level(trial, point, noise), nats(trial, point, noise)
     differences = []
     for included, kind, size in HYPOTHESES[1:]:
         found = level(trial, point, noise, included, kind, size).value - nothing.value
         found -= of_noise(trial, noise, Remainder(kind)) - of_noise(trial, noise)
         families = () if kind == NOMINAL else (kind,)
-        wanted = nats(trial, point, noise, included, families, size) - usual
-        assert found == pytest.approx(wanted, abs=1e-5 * abs(usual) / 100.0)
+        wanted = nats(trial, point, noise, included, families, size) - nominal
+        assert found == pytest.approx(wanted, abs=1e-5 * abs(nominal) / 100.0)
         differences.append(found)
     if noise == 1.0:
         assert differences[0] > 5.0 > differences[1]  # the hidden one, and another
@@ -141,8 +141,8 @@ def test_numbers_are_the_dense_posteriors(trial):
     found, covariance = evidence.numbers_of(
         trial, level(trial, point, 1.0, included), point, included
     )
-    e, j, x, _, c, mean, usual, _, _, _ = gaussian(trial, point, 1.0, included)
-    whole = c / SHARE + j @ usual @ j.T + x @ x.T
+    e, j, x, _, c, mean, nominal, _, _, _ = gaussian(trial, point, 1.0, included)
+    whole = c / SHARE + j @ nominal @ j.T + x @ x.T
     gain = np.linalg.solve(whole, x).T
     unit = trial.reference.columns.unit
     unit = np.concatenate([unit[trial.reference.columns.of[n]] for n in included])
@@ -186,17 +186,17 @@ def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, fami
 
 def test_a_change_that_is_there_is_found_at_its_size(made):
     """A push that depends on the place, three times the process noise, in the trial alone."""
-    usual, record, _ = made
+    nominal, record, _ = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "position")
     rng = np.random.default_rng(5)
     weights = np.zeros(plain.unseen.count)
     first = plain.unseen.families[0].columns[0]
     weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
-    pushed = plain.unseen.pushed(plain.at({}).linear.cut, plain.grid) @ weights
+    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
     columns = straight.columns_of(CAUSES)
-    given = straight.passed(record, columns, seed=2, told=0.3, pushed=pushed)
-    trial = straight.trial(usual, record, given)
+    given = straight.passed(record, columns, seed=2, sensitivity=0.3, accelerations=accelerations)
+    trial = straight.trial(nominal, record, given)
     point = trial.at({})
     base = level(trial, point, 1.0)
     gained = {
@@ -209,16 +209,18 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
 
 
 def test_a_change_acts_on_the_channels_that_it_pushes(made):
-    usual, record, _ = made
+    nominal, record, _ = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     weights = np.zeros(plain.unseen.count)
     at = (family.columns - plain.unseen.families[0].columns[0])[3 * EVEN["time"] :]
     each = len(at) // 3  # channel by channel: sway's are in the middle
     weights[at[each : 2 * each]] = 20.0
-    pushed = plain.unseen.pushed(plain.at({}).linear.cut, plain.grid) @ weights
-    given = straight.passed(record, straight.columns_of(CAUSES), seed=2, told=0.3, pushed=pushed)
-    trial = straight.trial(usual, record, given)
+    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    given = straight.passed(
+        record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=accelerations
+    )
+    trial = straight.trial(nominal, record, given)
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), (), 1.0)
     assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
@@ -230,17 +232,17 @@ def test_a_change_acts_on_the_channels_that_it_pushes(made):
 def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, own, low, high):
     """A cause that pushes as a function of time does, and so much besides as nothing else does.
     What is not pushed at the knots, where process noise pushes too, is felt far more."""
-    usual, record, given = made
+    nominal, record, given = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
     at = family.columns - plain.unseen.families[0].columns[0]
-    pushed = plain.unseen.pushed(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
-    does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], pushed)
+    accelerations = plain.unseen.accelerations(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
+    does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], accelerations)
     weight = does.std((0, 1)) + 1e-12
     rest = np.random.default_rng(11).standard_normal(does.shape) * weight
     j, columns = given.j.copy(), straight.columns_of(CAUSES)
     j[..., columns.of["drag"][0]] = 30.0 * (does + own * rest)
-    trial = straight.trial(usual, record, replace(given, j=j))
+    trial = straight.trial(nominal, record, replace(given, j=j))
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
@@ -253,11 +255,11 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
 
 
 def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
-    usual = max(trial.campaign.noise, remainder.LEAST_SPREAD)
-    top = norm(0.0, usual).logpdf(0.0)
+    nominal = max(trial.campaign.noise, remainder.LEAST_SPREAD)
+    top = norm(0.0, nominal).logpdf(0.0)
     for noise in (0.5, 1.0, 1.3, 4.0):
         at = math.log(noise)
-        wanted = norm(0.0, usual).logpdf(at) - top
+        wanted = norm(0.0, nominal).logpdf(at) - top
         for beside in (Remainder(), Remainder("wind", 3.0)):
             assert of_noise(trial, noise, beside) == pytest.approx(wanted)
         wanted = norm(0.0, remainder.RAISED_SPREAD).logpdf(at) - top
@@ -266,18 +268,18 @@ def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
 
 
 def test_campaigns_are_never_quite_alike(made):
-    usual, record, given = made
-    trial = straight.trial(replace(usual, noise=0.0), record, given)
+    nominal, record, given = made
+    trial = straight.trial(replace(nominal, noise=0.0), record, given)
     wanted = -0.5 * (math.log(1.2) / remainder.LEAST_SPREAD) ** 2
     assert of_noise(trial, 1.2) == pytest.approx(wanted)
 
 
 def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     """With starts that are known, since what a start is felt by is restricted likelihood."""
-    usual, record, given = made
+    nominal, record, given = made
     sure = replace(PROCESS_NOISE, start=np.full(6, 1e-5))
-    ref = replace(usual.reference, process_noise=sure)
-    trial = straight.trial(replace(usual, reference=ref), record, given)
+    ref = replace(nominal.reference, process_noise=sure)
+    trial = straight.trial(replace(nominal, reference=ref), record, given)
     point = trial.at({})
     found, wanted = [], []
     for noise in (1.0, 1.4):
@@ -303,13 +305,15 @@ def gaussian_of(trial, point, noise, process_noise):
 
 def test_the_best_level_is_the_one_that_was_drawn(made):
     """Twice the process noise in the trial: found under a raised remainder, between the steps."""
-    usual, record, _ = made
+    nominal, record, _ = made
     rng = np.random.default_rng(8)
     plain = straight.trial(*made)
     kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.knots))
     more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.knots)) @ kernel.T
-    given = straight.passed(record, straight.columns_of(CAUSES), seed=2, told=0.3, pushed=more)
-    trial = straight.trial(usual, record, given)
+    given = straight.passed(
+        record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=more
+    )
+    trial = straight.trial(nominal, record, given)
     raised = Remainder(RAISED)
     levels = evidence.levels(trial, trial.at({}), remainder=raised)
     best = max(levels, key=lambda one: one.value)
@@ -324,13 +328,13 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
 
 def test_segments_left_out_say_nothing(made):
     """Numbers without some segments are those of a trial in which these show something else."""
-    usual, record, given = made
+    nominal, record, given = made
     out = np.zeros(8, dtype=bool)
     out[4:] = True
     spoilt = replace(given, e=np.where(out[:, None, None], 50.0 * given.e + 1.0, given.e))
     found = []
     for one in (given, spoilt):
-        trial = straight.trial(usual, record, one)
+        trial = straight.trial(nominal, record, one)
         point = trial.at({})
         fit = Fit(point, evidence.fit(trial, point, ("drag", "two"), 1.0, Remainder()), Remainder())
         found.append(fits.without(trial, fit, out))
@@ -338,17 +342,17 @@ def test_segments_left_out_say_nothing(made):
     for label in ("drag", "two"):
         assert again[label] == pytest.approx(numbers[label], rel=1e-9)
     assert others == pytest.approx(coefficients, rel=1e-9)
-    trial = straight.trial(usual, record, spoilt)
+    trial = straight.trial(nominal, record, spoilt)
     whole = fits.without(trial, fit, np.zeros(8, dtype=bool))[0]
     assert whole["drag"] != pytest.approx(numbers["drag"], rel=0.1)
 
 
 def test_a_few_segments_do_not_decide(made):
     """One of eight shows what no ship does: it counts for little, the others as they did."""
-    usual, record, given = made
+    nominal, record, given = made
     spoilt = given.e.copy()
     spoilt[3] += 40.0 * straight.NOISE * np.random.default_rng(1).standard_normal((15, 6))
-    trial = straight.trial(usual, record, replace(given, e=spoilt))
+    trial = straight.trial(nominal, record, replace(given, e=spoilt))
     weight = evidence.robust(trial, trial.at({}))
     assert weight[3] < 0.05
     assert (np.delete(weight, 3) > 0.9).all()
@@ -356,15 +360,15 @@ def test_a_few_segments_do_not_decide(made):
 
 def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
     """What is left of each segment in units of its covariance: weights are by its median."""
-    usual, record, given = made
-    trial = straight.trial(usual, record, given)
+    nominal, record, given = made
+    trial = straight.trial(nominal, record, given)
     point = trial.at({})
     best = max(evidence.levels(trial, point), key=lambda one: one.value)
     left = best.solution[: len(trial.reference.pull)]
     ref, chi2 = trial.reference, []
-    seen = ref.misfit.pushed(given.cut, trial.grid)
+    observed = ref.misfit.accelerations(given.cut, trial.grid)
     for s, (e, j, z, c) in enumerate(straight.dense(given, PROCESS_NOISE.times(best.noise_factor))):
-        both = np.concatenate((j * ref.columns.unit[: j.shape[1]], z @ seen[s]), 1)
+        both = np.concatenate((j * ref.columns.unit[: j.shape[1]], z @ observed[s]), 1)
         r = e - both @ left
         chi2.append(r @ np.linalg.solve(c, r))
     wanted = np.minimum(1.0, 1.5 * np.median(chi2) / np.array(chi2))
@@ -400,9 +404,9 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     """At the start they are left out; later it is the hypothesis that fails."""
     lost = np.zeros(8, dtype=bool)
     lost[2] = True
-    usual, record, given = made
+    nominal, record, given = made
     away = replace(given, lost=lost)
-    trial, point = evidence.begin(straight.Straight.of(usual, record, given=away), {})
+    trial, point = evidence.begin(straight.Straight.of(nominal, record, given=away), {})
     assert (trial.weight > 0.0).tolist() == (~lost).tolist()
     assert trial.begun and point.linear.lost.tolist() == lost.tolist()
     trial.at({"drag": np.array([0.1])})  # the same one again is no failure

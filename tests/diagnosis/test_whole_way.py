@@ -40,7 +40,7 @@ from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.held_out import HeldOut
-from shiplog.diagnosis.relinearisation import settle, within
+from shiplog.diagnosis.relinearisation import converge, within
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError
 from shiplog.training.run_config import Config, Physics
@@ -110,9 +110,9 @@ def sea(tmp_path_factory):
     )
 
 
-def judged(campaign, seen):
+def judged(campaign, observed):
     """A trial of a record, and the decision before anything was held out."""
-    trial, point = evidence.begin(Trial.of(campaign, seen), {})
+    trial, point = evidence.begin(Trial.of(campaign, observed), {})
     found = search.Search(trial, point, placebo.placebos(campaign))
     found.run()
     return trial, decide(found)[0]
@@ -164,7 +164,7 @@ def compass(sea, trials):
 
 def test_a_current_is_named_and_sized(sea):
     (named,) = sea.done.decision.named
-    shown, true = named.shown, truth(sea.case)
+    shown, true = named.estimates, truth(sea.case)
     assert sea.done.verdict.verdict == "named"
     assert named.cause.label == "current"
     assert named.probability > 0.9
@@ -215,13 +215,15 @@ def shaped(v: dict) -> None:
 
 
 def test_the_answer_has_the_shape_of_the_contract(sea):
-    told = json.loads((sea.work / "out" / "verdict.json").read_text("utf-8"))
-    shaped(told)
-    assert told["causes"][0]["name"] == "current"
-    assert set(told["causes"][0]["parameters"]) == {"speed", "direction"}
-    assert told["base"] == {"run": "mmg", "before_effect": True}
-    said = [one["probability"] for one in told["ranking"]]  # of each answer, whatever else is true
-    assert told["ranking"][0]["name"] == "current" and said[0] > 0.9
+    content = json.loads((sea.work / "out" / "verdict.json").read_text("utf-8"))
+    shaped(content)
+    assert content["causes"][0]["name"] == "current"
+    assert set(content["causes"][0]["parameters"]) == {"speed", "direction"}
+    assert content["base"] == {"run": "mmg", "before_effect": True}
+    said = [
+        one["probability"] for one in content["ranking"]
+    ]  # of each answer, whatever else is true
+    assert content["ranking"][0]["name"] == "current" and said[0] > 0.9
     assert said == sorted(said, reverse=True) and min(said) >= 0.0 and max(said) <= 1.0
     report = (sea.work / "out" / "report.md").read_text("utf-8")
     assert "steady current" in report and "Gain" in report
@@ -229,10 +231,10 @@ def test_the_answer_has_the_shape_of_the_contract(sea):
 
 def test_too_little_is_said_and_nothing_named(sea):
     done = pipeline.diagnose_run(sea.run.path, sea.store, ["short"], sea.work / "short")
-    told = json.loads((sea.work / "short" / "verdict.json").read_text("utf-8"))
-    shaped(told)
-    assert done.verdict.verdict == "coverage" and told["causes"] == []
-    assert "Too little" in told["sentence"] and "100 s" in told["sentence"]
+    content = json.loads((sea.work / "short" / "verdict.json").read_text("utf-8"))
+    shaped(content)
+    assert done.verdict.verdict == "coverage" and content["causes"] == []
+    assert "Too little" in content["sentence"] and "100 s" in content["sentence"]
 
 
 def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
@@ -243,10 +245,10 @@ def test_a_model_without_a_path_is_a_verdict(sea, monkeypatch):
 
     monkeypatch.setattr(setup, "trial_of", singular)
     done = pipeline.diagnose_run(sea.run.path, sea.store, ["trial_1"], sea.work / "away")
-    told = json.loads((sea.work / "away" / "verdict.json").read_text("utf-8"))
-    shaped(told)
-    assert (done.verdict.verdict, told["causes"]) == ("undecided", [])
-    assert "diverges" in told["sentence"] and "evaluate" in told["sentence"]
+    content = json.loads((sea.work / "away" / "verdict.json").read_text("utf-8"))
+    shaped(content)
+    assert (done.verdict.verdict, content["causes"]) == ("undecided", [])
+    assert "diverges" in content["sentence"] and "evaluate" in content["sentence"]
 
 
 def test_voyages_of_another_ship_are_refused(sea, tmp_path):
@@ -274,16 +276,16 @@ def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
     physics = Physics(fit=False, without=("propeller", "rudder"))
     run, _ = identify_run(Config(model="mmg", split=split, physics=physics), store, tmp_path / "r")
     done = pipeline.diagnose_run(run.path, store, ["trial_2"], tmp_path / "out")
-    told = done.verdict.as_json()
-    shaped(told)
-    assert told["base"] == {"run": "r", "before_effect": False}
-    why = {one["name"]: one["reason"] for one in told["unavailable"]}
+    content = done.verdict.as_json()
+    shaped(content)
+    assert content["base"] == {"run": "r", "before_effect": False}
+    why = {one["name"]: one["reason"] for one in content["unavailable"]}
     for name in ("wind_force", "wind_direction_offset", "wind_speed_scale"):
         assert "no wind is recorded" in why[name]
     tested = {c.label for c in done.trial.reference.model.causes}
     assert tested >= {"current", "clock_offset:gnss", "fouling", "payload"}
     assert not tested & {"wind_force", "clock_offset:wind", "wind_speed_scale"}
-    assert not any(one["name"] == "unknown:wind" for one in told["ranking"])
+    assert not any(one["name"] == "unknown:wind" for one in content["ranking"])
 
 
 def test_a_model_that_simulates_nothing_names_nothing(sea):
@@ -313,9 +315,9 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
     found, loss = sign_conventions.best(model, turned)
     assert said in found
     assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
-    told = HeldOut(turned, model, sea.done.trial).lost(None)
+    why = HeldOut(turned, model, sea.done.trial).lost(None)
     if "sign" in said:  # the others do not double the error of so short a trial
-        assert said in told and f"L is {loss:.0f}" in told
+        assert said in why and f"L is {loss:.0f}" in why
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 
@@ -346,7 +348,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
     trial = sea.done.trial
     grams = dict(
         zip(
-            (m.said(1.0) for m in next_manoeuvre.MANOEUVRES),
+            (m.text(1.0) for m in next_manoeuvre.MANOEUVRES),
             next_manoeuvre.sailed(trial, {}),
             strict=True,
         )
@@ -376,7 +378,7 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
     unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
     knots, count = 16, 300
-    process_noise = replace(afloat.PROCESS_NOISE, pulse=1.7 * unit)
+    process_noise = replace(afloat.PROCESS_NOISE, intermittent=1.7 * unit)
     z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it seen, as well as a knot can be
     drawn = np.zeros((count, 6 + 3 * knots, 1))
     drawn[:, 6:, 0] = rng.multivariate_normal(
@@ -401,8 +403,10 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     )  # fmt: skip
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
     # an earlier force is no matter
-    noise = replace(process_noise, pulse=np.array([9.0, 9.0, 9.0]))
-    found = unrecorded_thruster.pulses_of(linear, np.zeros(0), reference, noise, np.ones(count))
+    noise = replace(process_noise, intermittent=np.array([9.0, 9.0, 9.0]))
+    found = unrecorded_thruster.estimate_side_force(
+        linear, np.zeros(0), reference, noise, np.ones(count)
+    )
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0
@@ -410,9 +414,11 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
 
 def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
     """By as much as the process noise and it together may push, twice."""
-    ref, pulse = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
-    plain, pulsed = ref.held(1.5), ref.held(1.5, pulse)
-    assert pulsed.push**2 == pytest.approx(plain.push**2 + (2.0 * pulse) ** 2)
+    ref, intermittent = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
+    plain, pulsed = ref.held(1.5), ref.held(1.5, intermittent)
+    assert pulsed.acceleration**2 == pytest.approx(
+        plain.acceleration**2 + (2.0 * intermittent) ** 2
+    )
 
 
 def test_causes_settle_from_where_they_rested_before(compass):
@@ -430,7 +436,7 @@ def test_causes_settle_from_where_they_rested_before(compass):
     asked.clear()
     rests = []
     for begin in (0.5, -0.5):
-        _, found = settle(again, (label,), {label: np.array([begin])}, point.path)
+        _, found = converge(again, (label,), {label: np.array([begin])}, point.path)
         rests.append((len(asked), *found.numbers[label]))
         asked.clear()
     assert rests[0][0] > 2 and rests[1][0] == 1
@@ -459,14 +465,14 @@ def test_a_number_held_at_a_bound_moves_the_others():
 def test_nothing_hidden_is_nothing_named(still):
     _, decision = still
     assert (decision.verdict, labels(decision)) == ("none", [])
-    assert decision.pulses is None and decision.structure is None
+    assert decision.side_force is None and decision.structure is None
     assert max(decision.ranking, key=decision.ranking.get) == "none"
 
 
 def test_a_heading_offset_is_named_and_sized(compass):
     _, decision = compass
     assert (decision.verdict, labels(decision)) == ("named", ["heading_offset"])
-    angle = decision.named[0].shown["angle"]
+    angle = decision.named[0].estimates["angle"]
     assert angle.value == pytest.approx(truth(hidden("heading_offset"))["angle"], rel=0.08, abs=0.1)
     assert angle.low < angle.value < angle.high
 
@@ -476,7 +482,7 @@ def test_a_cause_of_the_users_own_is_named(sea, trials):
     towards = {"tether_north": 8000.0, "tether_east": -6000.0}
     _, decision = judged(sea.campaign, trials("none", tether=1.5, **towards))
     assert labels(decision) == ["far_tether"]
-    shown = decision.named[0].shown
+    shown = decision.named[0].estimates
     assert shown["north"].value == pytest.approx(1.2, abs=0.12)
     assert shown["east"].value == pytest.approx(-0.9, abs=0.12)
     assert decision.named[0].cause.user
@@ -485,18 +491,18 @@ def test_a_cause_of_the_users_own_is_named(sea, trials):
 # --- without any key: what must change with the data, and what must not
 
 
-def turned(seen):
+def turned(observed):
     """The pond turned by 90 deg: what was north is east."""
-    state = seen.state.copy()
-    state[:, 0], state[:, 2] = -seen.state[:, 2], seen.state[:, 0]
+    state = observed.state.copy()
+    state[:, 0], state[:, 2] = -observed.state[:, 2], observed.state[:, 0]
     state[:, 4] += 0.5 * math.pi
-    return replace(seen, state=state)
+    return replace(observed, state=state)
 
 
 def test_turning_the_pond_turns_the_current(sea):
     _, decision = judged(sea.campaign, turned(sea.done.trial.record))
     assert labels(decision) == ["current"]
-    before, after = (d.named[0].shown for d in (sea.done.decision, decision))
+    before, after = (d.named[0].estimates for d in (sea.done.decision, decision))
     assert apart(after["direction"].value, before["direction"].value + 90.0) < 2.0
     assert after["speed"].value == pytest.approx(before["speed"].value, rel=0.02)
 
@@ -519,10 +525,12 @@ def test_taken_out_of_the_data_it_is_gone(sea, compass):
 
 def test_more_noise_makes_no_surer(sea):
     """White noise as large as the instruments' own, on top of it: the same name, less evidence."""
-    seen = sea.done.trial.record
+    observed = sea.done.trial.record
     sigma = np.array([0.02, 0.01, 0.02, 0.01, math.radians(0.1), math.radians(0.1)])
     rng = np.random.default_rng(0)
-    noisy = replace(seen, state=seen.state + sigma * rng.standard_normal(seen.state.shape))
+    noisy = replace(
+        observed, state=observed.state + sigma * rng.standard_normal(observed.state.shape)
+    )
     _, decision = judged(sea.campaign, noisy)
     assert labels(decision) == ["current"]
     assert decision.named[0].evidence < 1.02 * sea.done.decision.named[0].evidence
@@ -559,16 +567,16 @@ def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
 def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     """The column is the velocity's derivative. Were it that of what was measured, noise would pass
     for what the data tell: of noise as the sensor has it, 0.01 m/s, two fifths of it at most."""
-    seen, ref = sea.done.trial.record, sea.campaign.reference
+    observed, ref = sea.done.trial.record, sea.campaign.reference
     rows, column = sea.done.trial.rows, ref.columns.of["clock_offset:velocity"][0]
     column -= ref.columns.base
-    noise = np.zeros_like(seen.state)
-    noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(seen))
-    quiet = measurement_correction.read(ref.model, ref.setting, seen, rows)[2][..., 1, column]
-    noisy = replace(seen, state=seen.state + noise)
+    noise = np.zeros_like(observed.state)
+    noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(observed))
+    quiet = measurement_correction.read(ref.model, ref.setting, observed, rows)[2][..., 1, column]
+    noisy = replace(observed, state=observed.state + noise)
     loud = measurement_correction.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
     assert (loud - quiet).std() < 0.4 * quiet.std()
-    change = np.diff(segments.cut(seen, rows).y[..., 1], axis=1) / timescale.BIN
+    change = np.diff(segments.cut(observed, rows).y[..., 1], axis=1) / timescale.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
     assert np.corrcoef(between.ravel(), change.ravel())[0, 1] > 0.75
 
@@ -576,18 +584,18 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
 def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
     """(y_T - y_0) / T of a step by h: -h exp(-t/T) / T from the step on. With a lead's difference
     in it, a step would be a spike, and a rudder recorded in steps would tell of no lag."""
-    seen, ref = sea.done.trial.record, sea.campaign.reference
+    observed, ref = sea.done.trial.record, sea.campaign.reference
     (lag,) = (c for c in ref.model.causes if c.label == "rudder_lag")
     time = measurement_correction.READ_STEP * lag.sizes(ref.setting)[0]
     column = ref.columns.of["rudder_lag"][0] - ref.columns.base
-    step = np.zeros_like(seen.actuator)
+    step = np.zeros_like(observed.actuator)
     step[1000:, 0] = 0.2
-    stepped = replace(seen, actuator=step)
+    stepped = replace(observed, actuator=step)
     moved = measurement_correction.read(ref.model, ref.setting, stepped, np.array([900]))[1][
         0, :, 0, column
     ]
     # straight from row to row: the step is half a row before
-    t = (900 - 1000 + 0.5 + timescale.NODE_ROWS * np.arange(len(moved))) * seen.step
+    t = (900 - 1000 + 0.5 + timescale.NODE_ROWS * np.arange(len(moved))) * observed.step
     assert np.abs(moved[t < -0.15]).max() == 0.0
     after = (t > 0.15) & (t < 5.0 * time)
     assert moved[after] == pytest.approx(-0.2 * np.exp(-t[after] / time) / time, rel=0.02)
@@ -598,18 +606,18 @@ def test_what_a_lag_would_change_is_after_a_step_and_not_before(sea):
 
 def test_one_wild_segment_does_not_decide(sea):
     """A shove of 0.3 m/s for some seconds in one segment: it counts less, the others decide."""
-    seen = sea.done.trial.record
+    observed = sea.done.trial.record
     trial = sea.done.trial
     row = trial.rows[5]
     t = 0.1 * np.arange(300)
-    state = seen.state.copy()
+    state = observed.state.copy()
     state[row : row + 300, 3] += 0.3 * np.exp(-0.5 * ((t - 15.0) / 2.0) ** 2)
-    shoved, decision = judged(sea.campaign, replace(seen, state=state))
+    shoved, decision = judged(sea.campaign, replace(observed, state=state))
     assert shoved.weight[5] < 0.5 * trial.weight[5]
     assert np.median(shoved.weight) == 1.0
     assert "current" in labels(decision)
     (current,) = (n for n in decision.named if n.cause.label == "current")
-    assert current.shown["speed"].value == pytest.approx(truth(sea.case)["speed"], rel=0.06)
+    assert current.estimates["speed"].value == pytest.approx(truth(sea.case)["speed"], rel=0.06)
 
 
 def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
@@ -621,7 +629,7 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
 
     monkeypatch.setattr(evidence, "levels", broken)
     path = decision.nothing.point.path
-    _, found = settle(replace(trial, settled={}), ("current",), {"current": np.zeros(2)}, path)
+    _, found = converge(replace(trial, converged={}), ("current",), {"current": np.zeros(2)}, path)
     assert found.evidence == -np.inf
 
 
@@ -633,17 +641,17 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, low
     at, seemed = [], 1000.0
     rests = seemed - 1.5 * relinearisation.STEP_NATS
 
-    def told(*_):
+    def scanned(*_):
         high = at[-1] > 0.15
         found = {"heading_offset": np.array([0.1])}
         return Found("nothing", seemed if high else rests, 1.0, found, np.eye(1) * 1e-4), []
 
     point = decision.nothing.point
     monkeypatch.setattr(Trial, "at", lambda _, n, *more: at.append(n["heading_offset"][0]) or point)
-    monkeypatch.setattr(evidence, "scan", told)
-    monkeypatch.setattr(evidence, "fit", lambda *given: told(*given)[0])
+    monkeypatch.setattr(evidence, "scan", scanned)
+    monkeypatch.setattr(evidence, "fit", lambda *given: scanned(*given)[0])
     begin = {"heading_offset": np.array([0.16])}
-    _, found = settle(replace(trial, settled={}), ("heading_offset",), begin, None, lowest)
+    _, found = converge(replace(trial, converged={}), ("heading_offset",), begin, None, lowest)
     assert found.evidence == (rests if holds else -np.inf)
 
 
@@ -654,13 +662,13 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
         one, cause=next(c for c in trial.reference.model.causes if c.label == "current")
     )
     both = {one.cause.label: one.numbers, other.cause.label: one.numbers}
-    shown = replace(decision.shown, found=replace(decision.shown.found, numbers=both))
-    two = replace(decision, named=(one, other), shown=shown)
+    shown = replace(decision.fit, found=replace(decision.fit.found, numbers=both))
+    two = replace(decision, named=(one, other), fit=shown)
     gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
-    monkeypatch.setattr(decisions, "settle", lambda *_, **__: (decision.shown.point, gone))
+    monkeypatch.setattr(decisions, "converge", lambda *_, **__: (decision.fit.point, gone))
     left = decisions.without(trial, two, other)
     assert left.named == () and left.verdict == "none"
-    assert left.shown is decision.nothing
+    assert left.fit is decision.nothing
 
 
 def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
@@ -677,16 +685,16 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
         return point
 
     monkeypatch.setattr(Trial, "at", bounded)
-    trial = replace(trial, settled={})
-    _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
+    trial = replace(trial, converged={})
+    _, found = converge(trial, ("heading_offset",), {"heading_offset": np.array([0.8])}, path)
     assert away == [0.8, 0.4] and abs(found.numbers["heading_offset"][0]) < 0.02
     assert -30.0 < found.evidence - decision.nothing.found.evidence < thresholds.SHOWS_NATS
     away.clear()
-    trial.settled.clear()
-    _, found = settle(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
+    trial.converged.clear()
+    _, found = converge(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
     # nothing at rest is so high: each step went too far
     low = decision.nothing.found.evidence + 900.0
     begin = {"heading_offset": np.array([0.01])}
-    _, found = settle(trial, ("heading_offset",), begin, path, low)
+    _, found = converge(trial, ("heading_offset",), begin, path, low)
     assert found.evidence == -np.inf

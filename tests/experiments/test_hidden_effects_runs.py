@@ -215,8 +215,10 @@ def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, mon
         return stubs(jobs=jobs)
 
     monkeypatch.setattr(without, "Settings", settings)
-    shown = without.table(out, ("nothing", "placebo"), 1)
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in shown.splitlines()[-2:]]
+    displayed = without.table(out, ("nothing", "placebo"), 1)
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in displayed.splitlines()[-2:]
+    ]
     assert rows == [["nothing", "2", "2", "0", "0"], ["placebo", "2", "0", "0", "2"]]
     assert asked == ["nothing", "placebo"]
     assert {folder.name for folder in (tmp_path / "out-without").iterdir()} == set(asked)

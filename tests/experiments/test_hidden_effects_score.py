@@ -163,9 +163,9 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
 def test_the_gain_is_set_against_the_oracles_where_there_is_one():
     """None where nothing is named, the truth itself gains nothing, or nobody asked."""
     better = [named("current", gain={"reduction": r}) for r in (0.6, 0.8, 0.76)]
-    told = [replace(answer(CURRENT, verdict), oracle=0.8) for verdict in (*better, NONE)]
+    estimated = [replace(answer(CURRENT, verdict), oracle=0.8) for verdict in (*better, NONE)]
     gyro = replace(answer(CURRENT, better[0]), oracle=0.01)
-    rows = measured([*told, gyro, answer(CURRENT, better[0])])
+    rows = measured([*estimated, gyro, answer(CURRENT, better[0])])
     assert rows["held-out gain over the oracle's: median"][:2] == ("95 %", "3")
     assert rows["held-out gain over the oracle's: worst tenth"][:2] == ("75 %", "3")
 
@@ -176,8 +176,8 @@ def test_the_truth_in_the_catalogues_own_numbers():
     scale = {"speed": 0.6, "length": 3.0, "mass": 244.6, "moment": 733.8}
     setting = Setting(profile, scale, np.zeros((12, 2)), 1.0)
 
-    def numbers_of(name, **told):
-        parameters = {k: {"value": v} for k, v in told.items()}
+    def numbers_of(name, **estimated):
+        parameters = {k: {"value": v} for k, v in estimated.items()}
         return oracle.true_cause({"name": name, "parameters": parameters}, setting)
 
     for towards, want in (

@@ -114,15 +114,15 @@ def test_the_acceleration_of_a_known_motion_is_the_models_and_what_was_added_is_
 
 def test_both_sides_are_averaged_alike():
     """A rudder that jumps and pushes at once: nothing is left, though no bin shows when."""
-    pushed = np.zeros((1, 151))
-    pushed[0, 70:] = 0.1  # at the nodes, every 0.2 s
-    pushed[0, 70] = 0.05
-    steps = 0.1 * (pushed[0, 1:] + pushed[0, :-1])
+    accelerated = np.zeros((1, 151))
+    accelerated[0, 70:] = 0.1  # at the nodes, every 0.2 s
+    accelerated[0, 70] = 0.05
+    steps = 0.1 * (accelerated[0, 1:] + accelerated[0, :-1])
     velocity = np.concatenate(([0.0], np.cumsum(steps)))
     y = np.zeros((1, 15, 6))
     y[0, :, 1] = rivals.of_bins(velocity[None], 15)[0]
     driven = np.zeros((1, 151, 4))
-    driven[..., 0] = pushed
+    driven[..., 0] = accelerated
     left = rivals.beyond(Sled(0.0), np.zeros(3), y, rivals.of_bins(driven, 15))
     assert left[..., 0] == pytest.approx(np.zeros((1, 13)), abs=0.004)  # of 0.1
 

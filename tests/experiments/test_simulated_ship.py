@@ -841,8 +841,8 @@ def test_the_command_writes_a_case(tmp_path, monkeypatch, capsys):
     command.main(["case", "8", folder, "--key", key, "--cause", "tether", "--seconds", "500"])
     names = {p.name for p in (tmp_path / "logs").iterdir()}
     assert names == {"nominal_1.mcap", "trial_1.mcap", "trial_2.mcap"}
-    told = json.loads((tmp_path / "key.json").read_text())
-    assert told["verdict"] == "unknown" and told["structure"] == {"family": "position"}
+    estimated = json.loads((tmp_path / "key.json").read_text())
+    assert estimated["verdict"] == "unknown" and estimated["structure"] == {"family": "position"}
     with pytest.raises(SystemExit):
         command.main(["case", "8", folder, "--key", f"{folder}/key.json"])
     assert "elsewhere" in capsys.readouterr().err

@@ -417,9 +417,9 @@ def test_a_prior_is_not_the_middle_of_what_is_hidden(name):
 def test_every_number_of_the_laws_is_drawn():
     """None of a blind ship's numbers is the sample logs': whoever adds one must draw it."""
     for part in ("shallow", "bank", "hull", "air", "noise"):
-        usual = getattr(Laws(), part)
-        for one in fields(usual):
+        ordinary = getattr(Laws(), part)
+        for one in fields(ordinary):
             if one.name in ("bed", "fading"):
                 continue
             mine = [getattr(getattr(of(seed), part), one.name) for seed in range(40)]
-            assert getattr(usual, one.name) not in mine, f"{part}.{one.name}"
+            assert getattr(ordinary, one.name) not in mine, f"{part}.{one.name}"

@@ -381,8 +381,8 @@ def ros_bag(v: Voyage, writer, store) -> None:
                 header, turned, np.zeros(9), vector(0.0, 0.0, -RATE), np.zeros(9),
                 vector(0.0, 0.0, 9.8), np.zeros(9),
             )  # fmt: skip
-            said = (fix, types["geometry_msgs/msg/TwistStamped"](header, twist), imu)
-            for (topic, kind), message in zip(topics.items(), said, strict=True):
+            output = (fix, types["geometry_msgs/msg/TwistStamped"](header, twist), imu)
+            for (topic, kind), message in zip(topics.items(), output, strict=True):
                 ros1 = not hasattr(writer, "metapath")
                 encode = store.serialize_ros1 if ros1 else store.serialize_cdr
                 writer.write(lines[topic], ns, encode(message, kind))
@@ -503,10 +503,10 @@ def test_10_logger_with_date_and_time_apart_and_gnss_slower_than_the_rest(tmp_pa
     for i in range(len(v.t)):
         fix = i % 5 == 0
         gnss = (v.latitude[i], v.longitude[i], SPEED * 3.6, v.course_deg[i])
-        shown = [f"{value:.9f}" if fix else "" for value in gnss]
+        displayed = [f"{value:.9f}" if fix else "" for value in gnss]
         lines.append(
             "\t".join(
-                ["09.04.2021", iso(v.unix[i], "%H:%M:%S"), *shown, f"{v.heading_deg[i]:.5f}",
+                ["09.04.2021", iso(v.unix[i], "%H:%M:%S"), *displayed, f"{v.heading_deg[i]:.5f}",
                  f"{v.rudder[i]:.5f}", f"{v.rps[i] * 60:.5f}"]
             )
         )  # fmt: skip
@@ -532,6 +532,6 @@ def test_a_converted_log_says_in_json_what_became_of_it(tmp_path):
     from commands import call
 
     (tmp_path / "empty.csv").write_text("a,b\n")
-    code, said, _ = call("convert", tmp_path / "empty.csv", "--out", tmp_path, "--json", "-")
+    code, output, _ = call("convert", tmp_path / "empty.csv", "--out", tmp_path, "--json", "-")
     assert code == 1
-    assert list(json.loads(said)["refused"]) == [str(tmp_path / "empty.csv")]
+    assert list(json.loads(output)["refused"]) == [str(tmp_path / "empty.csv")]

@@ -129,9 +129,9 @@ def test_what_reads_leaves_the_motion_and_what_moves_does_not(cause, base):
     plain = acceleration(model, values, np.zeros(cause.count), state, actuator, wind)
     assert np.isfinite(changed).all()
     assert (np.abs(changed - plain).max() > 1e-6) != cause.reads
-    seen = closed.record(TWIN)
-    after = cause.read(seen, sized(cause))
-    same = all(np.array_equal(getattr(after, n), getattr(seen, n)) for n in CHANGED)
+    observed = closed.record(TWIN)
+    after = cause.read(observed, sized(cause))
+    same = all(np.array_equal(getattr(after, n), getattr(observed, n)) for n in CHANGED)
     assert same != cause.reads
 
 
@@ -142,12 +142,12 @@ CHANGED = ("state", "actuator", "wind")
 @SHIPS
 def test_zero_leaves_a_record_as_it_was(cause, profile):
     cause = cause.on(setting(profile))
-    seen = closed.record(profile, heading=0.1, bias=0.01, wind_angle=0.2)
-    after = cause.read(seen, np.zeros(cause.count))
+    observed = closed.record(profile, heading=0.1, bias=0.01, wind_angle=0.2)
+    after = cause.read(observed, np.zeros(cause.count))
     for name in CHANGED:
-        assert getattr(after, name) == pytest.approx(getattr(seen, name), abs=1e-12)
-    for name in ("time", "starts", "seen", "voyage", "share"):
-        assert getattr(after, name) is getattr(seen, name)
+        assert getattr(after, name) == pytest.approx(getattr(observed, name), abs=1e-12)
+    for name in ("time", "starts", "measured", "voyage", "share"):
+        assert getattr(after, name) is getattr(observed, name)
 
 
 # --- sensors: the test bends them by hand ---------------------------------------------------------
@@ -195,14 +195,14 @@ def test_bent_instruments_are_put_right(label, profile):
 def test_inverse_undoes_read(cause, profile):
     """What the instruments will show, of what was. A lag forgets nothing but its first seconds."""
     cause = cause.on(setting(profile))
-    seen = closed.record(profile)
+    observed = closed.record(profile)
     numbers = sized(cause)
-    back = cause.read(cause.read(seen, numbers), cause.inverse(numbers))
+    back = cause.read(cause.read(observed, numbers), cause.inverse(numbers))
     rough = cause.label.startswith(("clock", "rudder_delay", "rudder_lag"))
     rows = slice(100, -40) if rough else slice(None)
     for name in CHANGED:
         assert getattr(back, name)[rows] == pytest.approx(
-            getattr(seen, name)[rows], abs=2e-3 if rough else 1e-12
+            getattr(observed, name)[rows], abs=2e-3 if rough else 1e-12
         ), name
 
 
@@ -221,14 +221,14 @@ def test_instruments_are_put_right_one_after_another():
 
 def steered(values: np.ndarray, starts: tuple[int, ...] = (0,)) -> Record:
     """Both rudders recorded at these values [n], the screw at 5 rev/s."""
-    seen = closed.record(TWIN)
+    observed = closed.record(TWIN)
     count = len(values)
     actuator = np.stack((values, -2.0 * values, np.full(count, 5.0)), -1)
     begins = np.zeros(count, dtype=bool)
     begins[list(starts)] = True
     return Record(
         TWIN, ("one",), np.zeros(count, dtype=int), 0.1 * np.arange(count), np.zeros(count),
-        begins, np.ones(count, dtype=bool), seen.state[:count], actuator, seen.wind[:count],
+        begins, np.ones(count, dtype=bool), observed.state[:count], actuator, observed.wind[:count],
     )  # fmt: skip
 
 
@@ -267,13 +267,13 @@ def test_delay_of_a_ramp():
 def test_two_rudders_have_two_offsets_and_one_has_one():
     two, one = RudderOffset().on(setting(TWIN)), RudderOffset().on(setting(SINGLE))
     assert (two.count, one.count) == (2, 1)
-    assert list(two.shown(np.array([0.1, -0.2]))) == ["port", "starboard"]
-    assert list(one.shown(np.array([0.1]))) == ["angle"]
-    seen = closed.record(TWIN)
-    moved = two.read(seen, np.array([0.1, -0.2])).actuator - seen.actuator
+    assert list(two.displayed(np.array([0.1, -0.2]))) == ["port", "starboard"]
+    assert list(one.displayed(np.array([0.1]))) == ["angle"]
+    observed = closed.record(TWIN)
+    moved = two.read(observed, np.array([0.1, -0.2])).actuator - observed.actuator
     assert moved == pytest.approx(np.broadcast_to([0.1, -0.2, 0.0], moved.shape), abs=1e-12)
-    seen = closed.record(SINGLE)
-    moved = one.read(seen, np.array([0.1])).actuator - seen.actuator
+    observed = closed.record(SINGLE)
+    moved = one.read(observed, np.array([0.1])).actuator - observed.actuator
     assert moved == pytest.approx(np.broadcast_to([0.1, 0.0], moved.shape), abs=1e-12)
 
 
@@ -375,7 +375,7 @@ def test_payload_by_the_rigid_body_equations():
     yaw = inertia * dr + moment * (dv + u * r)
     # the module's inertia is smooth where there is no load: 7e-5 of moment²/load
     assert np.stack((surge, sway, yaw), -1) == pytest.approx(force, abs=1e-3)
-    assert Payload().shown(np.array([30.0, 24.0]))["position"][0] == pytest.approx(0.8)
+    assert Payload().displayed(np.array([30.0, 24.0]))["position"][0] == pytest.approx(0.8)
 
 
 def forces(label: str, numbers, state, actuator, wind, without=()) -> np.ndarray:
@@ -408,8 +408,10 @@ def test_wind_force_scales_each_force_of_the_wind():
 def test_a_model_without_wind_is_given_that_of_such_a_ship(base):
     """Ones make of it the model with the estimated wind force; each number is an axis' own."""
     ship, main, _ = mmg.geometry_of(TWIN)
-    usual = mmg.estimated(ship, main)
-    lacking = {n: float(v) for n, v in zip(usual.names, usual.values, strict=True) if "wind." in n}
+    nominal = mmg.estimated(ship, main)
+    lacking = {
+        n: float(v) for n, v in zip(nominal.names, nominal.values, strict=True) if "wind." in n
+    }
     assert len(lacking) == 10
     cause = WindForce().on(replace(setting(), lacking=lacking))
     calm, values = extended([], without=("wind",), base=base)
@@ -420,7 +422,7 @@ def test_a_model_without_wind_is_given_that_of_such_a_ship(base):
     plain = acceleration(calm, values, [], *args)
     assert acceleration(windless, values, np.zeros(3), *args) == pytest.approx(plain, abs=1e-15)
     whole, _ = extended([])
-    felt = acceleration(whole, usual.values, [], *args)
+    felt = acceleration(whole, nominal.values, [], *args)
     still, known = extended([], without=("wind",))
     felt = felt - acceleration(still, known, [], *args)
     found = acceleration(windless, values, np.ones(3), *args) - plain
@@ -437,7 +439,7 @@ def test_wind_in_a_model_without_it_is_no_coefficient_that_a_fit_takes_in():
     assert WindForce().on(setting()) == WindForce()
     for label in ("wind_direction_offset", "wind_speed_scale", "clock_offset:wind"):
         assert BY[label].missing(lacking) == "the model feels no wind"
-    shown = WindForce().on(lacking).shown(np.array([0.9, 1.1, -0.2]))
+    shown = WindForce().on(lacking).displayed(np.array([0.9, 1.1, -0.2]))
     assert [v for v, _ in shown.values()] == pytest.approx([0.9, 1.1, -0.2])
 
 
@@ -576,13 +578,13 @@ def test_told_holds_its_value_and_ninety_percent(cause):
     cause = cause.on(setting())
     numbers = sized(cause)
     spread = 0.1 * cause.sizes(setting())
-    told = cause.told(numbers, np.diag(spread**2))
-    for one in told.values():
+    reported = cause.estimates(numbers, np.diag(spread**2))
+    for one in reported.values():
         assert one.low <= one.value <= one.high
         assert one.high > one.low
-    assert cause.sentence(told).endswith(".")
+    assert cause.sentence(reported).endswith(".")
     if cause.count == 1 and cause.label not in ("shallow_water",):
-        (one,) = told.values()
+        (one,) = reported.values()
         unit = DEGREE if one.unit.startswith("deg") else 1.0
         # 1.645 σ on either side; 4000 draws know it to 5 %
         assert (one.high - one.low) * unit == pytest.approx(2.0 * 1.645 * spread[0], rel=0.06)
@@ -592,7 +594,9 @@ def test_an_interval_knows_of_how_many_voyages_its_width_is():
     """Student's t: 2.015 standard deviations with 5 degrees of freedom, 2.920 with 2."""
     cause = BY["heading_offset"]
     for freedom, wide in ((5.0, 2.015), (2.0, 2.920)):
-        (one,) = cause.told(np.array([0.05]), np.array([[1e-4]]), freedom, draws=100_000).values()
+        (one,) = cause.estimates(
+            np.array([0.05]), np.array([[1e-4]]), freedom, draws=100_000
+        ).values()
         half = 0.5 * (one.high - one.low) * DEGREE / 0.01
         assert half == pytest.approx(wide, rel=0.03)
         assert one.low < one.value < one.high
@@ -602,27 +606,29 @@ def test_a_direction_near_north_has_a_short_interval():
     """359 deg and 1 deg are two degrees apart: 0.01 m/s across 0.3 m/s is 1.9 deg."""
     cause = Current()
     for east in (-0.001, 0.001):
-        told = cause.told(np.array([0.3, east]), np.diag([1e-4, 1e-4]))["direction"]
-        assert told.low <= told.value <= told.high
-        assert told.high - told.low == pytest.approx(2 * 1.645 * math.degrees(0.01 / 0.3), rel=0.06)
-    assert cause.shown(np.array([0.0, 0.2]))["direction"][0] == pytest.approx(90.0)
-    assert cause.shown(np.array([0.0, 0.2]))["speed"][0] == pytest.approx(0.2)
+        reported = cause.estimates(np.array([0.3, east]), np.diag([1e-4, 1e-4]))["direction"]
+        assert reported.low <= reported.value <= reported.high
+        assert reported.high - reported.low == pytest.approx(
+            2 * 1.645 * math.degrees(0.01 / 0.3), rel=0.06
+        )
+    assert cause.displayed(np.array([0.0, 0.2]))["direction"][0] == pytest.approx(90.0)
+    assert cause.displayed(np.array([0.0, 0.2]))["speed"][0] == pytest.approx(0.2)
     assert "towards 180 deg" in cause.sentence(
-        cause.told(np.array([-0.2, 0.0]), np.diag([1e-6, 1e-6]))
+        cause.estimates(np.array([-0.2, 0.0]), np.diag([1e-6, 1e-6]))
     )
 
 
 def test_words_speak_degrees_and_factors():
-    assert BY["heading_offset"].shown(np.array([0.1]))["angle"] == (
+    assert BY["heading_offset"].displayed(np.array([0.1]))["angle"] == (
         pytest.approx(math.degrees(0.1)), "deg",
     )  # fmt: skip
-    assert BY["yaw_rate_bias"].shown(np.array([0.01]))["value"] == (
+    assert BY["yaw_rate_bias"].displayed(np.array([0.01]))["value"] == (
         pytest.approx(math.degrees(0.01)), "deg/s",
     )  # fmt: skip
     for label in ("yaw_rate_scale", "wind_speed_scale"):
-        assert BY[label].shown(np.array([0.07]))["value"][0] == pytest.approx(1.07)
+        assert BY[label].displayed(np.array([0.07]))["value"][0] == pytest.approx(1.07)
     for label in ("fouling", "thrust_loss", "cross_flow_drag", "rudder_force"):
-        assert BY[label].shown(np.array([-0.2]))["factor"][0] == pytest.approx(0.8)
+        assert BY[label].displayed(np.array([-0.2]))["factor"][0] == pytest.approx(0.8)
 
 
 @pytest.mark.parametrize(
@@ -643,7 +649,7 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
     rng = np.random.default_rng(0)
     read = Record(
         profile=FERRY, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
-        share=np.zeros(rows), starts=np.arange(rows) == 0, seen=np.ones(rows, bool),
+        share=np.zeros(rows), starts=np.arange(rows) == 0, measured=np.ones(rows, bool),
         state=np.zeros((rows, 6)), actuator=rng.standard_normal((rows, units)).cumsum(0),
         wind=np.zeros((rows, 2)),
     )  # fmt: skip
@@ -663,8 +669,8 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
     port = [FERRY.actuators[i].position_m[1] < 0.0 for i in turned]
     assert (acting[aslant] - read.actuator)[0, turned] == pytest.approx(np.where(port, 0.2, -0.1))
     for cause, p in numbers.items():
-        said = cause.sentence(cause.told(np.array(p), 1e-6 * np.eye(cause.count)))
-        assert said.startswith("The azimuths ")
+        output = cause.sentence(cause.estimates(np.array(p), 1e-6 * np.eye(cause.count)))
+        assert output.startswith("The azimuths ")
 
 
 # --- which cannot be tested -----------------------------------------------------------------------
@@ -681,12 +687,12 @@ MISSING = {
 def test_what_a_ferry_cannot_be_asked(cause):
     """No rudder, no wind sensor, no gyro, no chart: those causes say why; the others are tested.
     What turns its thrusters may be late or misaligned as a rudder may."""
-    said = cause.missing(setting(FERRY))
+    output = cause.missing(setting(FERRY))
     if cause.label not in MISSING:
-        assert said is None
+        assert output is None
     else:
-        assert said is not None and MISSING[cause.label] in said
-    assert cause.missing(setting(SINGLE if "over ground" in (said or "") else TWIN)) is None
+        assert output is not None and MISSING[cause.label] in output
+    assert cause.missing(setting(SINGLE if "over ground" in (output or "") else TWIN)) is None
 
 
 def test_a_ship_without_screw_has_no_thrust_to_lose():
@@ -726,7 +732,7 @@ def reading(profile: Profile) -> Record:
     rows = 100
     return Record(
         profile=profile, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
-        share=np.zeros(rows), starts=np.arange(rows) == 0, seen=np.ones(rows, bool),
+        share=np.zeros(rows), starts=np.arange(rows) == 0, measured=np.ones(rows, bool),
         state=rng.standard_normal((rows, 6)).cumsum(0),
         actuator=rng.standard_normal((rows, len(profile.actuators))).cumsum(0),
         wind=rng.standard_normal((rows, 2)),
@@ -896,14 +902,14 @@ def test_thrust_that_drifts_drifts_on_thrusters_too():
 
 def test_a_lost_units_words_name_it():
     one = replace(BY["thrust_loss"], actuator="bow_1")
-    told = one.told(np.array([-0.25]), np.diag([1e-6]))
+    reported = one.estimates(np.array([-0.25]), np.diag([1e-6]))
     assert (one.name, one.label) == ("thrust_loss", "thrust_loss:bow_1")
-    assert one.sentence(told) == "The thrust of bow_1 is 0.75 times the model's."
-    assert set(told) == {"factor"}
-    assert one.beside("thrust_loss:bow_2") and one.beside("fouling")
-    assert not one.beside("thrust_loss") and not one.beside("thrust_loss:bow_1")
-    assert not BY["thrust_loss"].beside("thrust_loss:bow_1")
-    assert BY["thrust_loss"].beside("thrust_drift")
+    assert one.sentence(reported) == "The thrust of bow_1 is 0.75 times the model's."
+    assert set(reported) == {"factor"}
+    assert one.compatible("thrust_loss:bow_2") and one.compatible("fouling")
+    assert not one.compatible("thrust_loss") and not one.compatible("thrust_loss:bow_1")
+    assert not BY["thrust_loss"].compatible("thrust_loss:bow_1")
+    assert BY["thrust_loss"].compatible("thrust_drift")
 
 
 def test_a_ship_that_stays_has_no_map_of_the_bottom():
@@ -927,11 +933,11 @@ def test_two_of_three_clocks_say_it_all():
     by = {cause.label: cause for cause in CATALOGUE}
     both = by["clock_offset:gnss"]
     for channel in ("position", "velocity"):
-        assert not both.beside(f"clock_offset:{channel}")
-        assert not by[f"clock_offset:{channel}"].beside(both.label)
-    assert by["clock_offset:position"].beside("clock_offset:velocity")
-    assert by["clock_offset:wind"].beside(both.label)
-    assert both.beside("current") and not both.beside(both.label)
+        assert not both.compatible(f"clock_offset:{channel}")
+        assert not by[f"clock_offset:{channel}"].compatible(both.label)
+    assert by["clock_offset:position"].compatible("clock_offset:velocity")
+    assert by["clock_offset:wind"].compatible(both.label)
+    assert both.compatible("current") and not both.compatible(both.label)
 
 
 # --- realistic sizes ------------------------------------------------------------------------------

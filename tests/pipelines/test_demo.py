@@ -33,10 +33,10 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     monkeypatch.setattr(demo, "RECIPE", Fast(iterations=4, warm_epochs=2))
     logs = few_logs(tmp_path / "logs")
     first = demo.run_demo(tmp_path / "demo", logs)
-    said = str(RrdReader(str(first.recording)).store().summary())
+    output = str(RrdReader(str(first.recording)).store().summary())
     for word in ("/track/voyage_6/measured", "/track/voyage_6/simulated", "/hist/wind/training",
                  "/error/voyage_6", "/state/voyage_6/surge/measured", "/report"):  # fmt: skip
-        assert word in said, word
+        assert word in output, word
     names = {e.name: e.findings for e in Store(tmp_path / "demo" / "store").entries()}
     assert sorted(names) == ["season2_1", *VOYAGES]
     # What its README says is wrong with voyage_4: two spikes, and no GNSS for three seconds,
@@ -52,8 +52,8 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
         (tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors").stat().st_mtime_ns
     )
     # a diagnosis is made again, for a minute, and what it says is tested elsewhere
-    said = SimpleNamespace(sentence="as before", as_json=dict)
-    monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=said))
+    output = SimpleNamespace(sentence="as before", as_json=dict)
+    monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=output))
     again = demo.run_demo(tmp_path / "demo", logs)
     assert again.content["runs"] == first.content["runs"]
     path = tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors"

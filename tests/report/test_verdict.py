@@ -10,8 +10,8 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         "sentence": "The rudders lag.", "indistinguishable_from": ["rudder_delay"],
         "probability": 0.9,
     }  # fmt: skip
-    said = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
-    assert said == (
+    output = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
+    assert output == (
         "No part of the error on 18 held-out windows is surely explained: it is 2.0% more (5.0% "
         "more to 1.0% less). The rudders lag; or it is rudder_delay: these data cannot tell."
     )
@@ -21,8 +21,8 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         "20% of the error on 18 held-out windows is explained (10% to 30%). The rudders lag."
     )
     for probability, begins in ((0.53, "Likely, and not surely (53%): "), (0.4, "Perhaps, and ")):
-        said = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
-        assert f"(10% to 30%). {begins}" in said and said.endswith("The rudders lag.")
+        output = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
+        assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
 def test_the_largest_part_that_is_not_explained_is_in_the_sentence():

@@ -207,8 +207,8 @@ def test_a_model_that_knows_its_doubt_is_drawn_with_its_band(compared, tmp_path)
     assert turn[7].to_list() == pytest.approx([4.0, 8.0])  # deg/s
     north = column(rrd, "/state/harbour/x0/band/mmg", "Scalars:scalars")["Scalars:scalars"]
     assert north[0].to_list() == pytest.approx([-3.0, 3.0])
-    said = column(rrd, "/state/harbour/surge/band/mmg", "SeriesLines:names")
-    assert said["SeriesLines:names"][0].to_list() == ["90 % band"] * 2
+    output = column(rrd, "/state/harbour/surge/band/mmg", "SeriesLines:names")
+    assert output["SeriesLines:names"][0].to_list() == ["90 % band"] * 2
     text = paths(rrd)
     assert "/state/harbour/surge/seeds/mmg" not in text
     for without in (
@@ -296,14 +296,14 @@ def test_each_part_is_a_line_with_its_force(pushing, tmp_path):
 
 
 def test_forces_stand_on_a_tab_of_their_own(pushing):
-    shown = views(recording.layout(display.drawn(pushing)))
-    plots = [view for view in shown if view["origin"].startswith("/force/")]
+    displayed = views(recording.layout(display.drawn(pushing)))
+    plots = [view for view in displayed if view["origin"].startswith("/force/")]
     assert [view["name"] for view in plots] == [
         "surge force [N], positive ahead", "sway force [N], positive to starboard",
         "yaw moment [N m], positive bow to starboard",
     ]  # fmt: skip
     assert {view["in"][1:] for view in plots} == {("Forces, mmg", "open sea")}
-    tabs = list(dict.fromkeys(view["in"][1] for view in shown if len(view["in"]) > 1))
+    tabs = list(dict.fromkeys(view["in"][1] for view in displayed if len(view["in"]) > 1))
     assert tabs == ["harbour", "open sea", "Forces, mmg", "Histograms"]
     legends = [view["view"].properties["PlotLegend"].visible for view in plots]
     assert [legend.as_arrow_array().to_pylist() for legend in legends] == [[True], [False], [False]]
@@ -437,8 +437,8 @@ def test_gaps_and_a_voyage_no_model_saw_are_drawn_as_they_are(compared, tmp_path
     holes = compared.measured.filter(~pl.col("time").is_between(50, 80)).with_columns(
         surge=pl.when(pl.col("time") == 10).then(None).otherwise(pl.col("surge"))
     )
-    seen = compared.simulated.filter(pl.col("voyage") == "harbour")
-    partly = replace(compared, measured=holes, simulated=seen)
+    observed = compared.simulated.filter(pl.col("voyage") == "harbour")
+    partly = replace(compared, measured=holes, simulated=observed)
     viewer.save(partly, tmp_path / "partly.rrd")
     surge = scalars(tmp_path / "partly.rrd", "/state/harbour/surge/measured")
     assert len(surge) == SECONDS - 31 + 1 and np.isnan(surge).sum() == 2
@@ -470,9 +470,9 @@ def test_without_a_display_the_viewer_says_what_to_do(saved, monkeypatch):
     monkeypatch.setattr(native.sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(ShiplogError, match="No display") as said:
+    with pytest.raises(ShiplogError, match="No display") as output:
         viewer.open_viewer(saved)
-    assert "--save" in said.value.hint and "--web" in said.value.hint
+    assert "--save" in output.value.hint and "--web" in output.value.hint
 
 
 def test_a_recording_that_is_not_there_is_named(tmp_path):

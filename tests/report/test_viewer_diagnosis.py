@@ -216,5 +216,5 @@ def test_a_rollout_that_ran_away_does_not_flatten_the_errors(exhibit):
 
 
 def test_the_report_is_written_in_letters_that_rerun_has(saved):
-    (said,) = column(saved, "/report", "TextDocument:text").explode()
-    assert said == "# Diagnosis\n\n    R'V of 0.1 m/s\n"
+    (output,) = column(saved, "/report", "TextDocument:text").explode()
+    assert output == "# Diagnosis\n\n    R'V of 0.1 m/s\n"

@@ -45,9 +45,9 @@ def test_nothing_gained_is_not_real():
     found = gain(even(10, 10), even(8, 12), ["a", "b"])
     assert found.reduction == pytest.approx(0.0)
     assert not found.real
-    told = found.as_json()
-    assert told["low"] <= told["reduction"] <= told["high"]
-    assert told["held_out_windows"] == 2
+    estimated = found.as_json()
+    assert estimated["low"] <= estimated["reduction"] <= estimated["high"]
+    assert estimated["held_out_windows"] == 2
 
 
 def test_parts_add_up_to_the_evaluation_function():

@@ -220,13 +220,13 @@ def table(data: WindowSeries) -> pl.DataFrame:
 
 def test_it_sees_what_coverage_measures(hybrid, ship, data):
     """The same columns in the same order, standardised alike, the same limit of distance."""
-    seen = coverage.of(table(data), ship.actuator_names, has_wind=True)
+    observed = coverage.of(table(data), ship.actuator_names, has_wind=True)
     net = hybrid.residual
-    assert seen.names == ("surge", "sway", "yaw_rate", "azimuth", "thruster",
+    assert observed.names == ("surge", "sway", "yaw_rate", "azimuth", "thruster",
                           "wind_ahead", "wind_starboard")  # fmt: skip
-    assert net.mean == pytest.approx(seen.mean) and net.std == pytest.approx(seen.std)
-    assert np.asarray(hybrid.features(*flat(data))) == pytest.approx(seen.tree.data, abs=1e-9)
-    assert net.limit == pytest.approx(seen.limit)
+    assert net.mean == pytest.approx(observed.mean) and net.std == pytest.approx(observed.std)
+    assert np.asarray(hybrid.features(*flat(data))) == pytest.approx(observed.tree.data, abs=1e-9)
+    assert net.limit == pytest.approx(observed.limit)
 
 
 def test_without_wind_it_has_five_inputs(ship, data):
@@ -391,8 +391,10 @@ def test_what_it_learned_is_that_force(taught, pulled):
 def test_less_strength_says_less(taught, physics, known, pulled):
     _, done = trained(physics, known, pulled, 1e-6)
     model, strong = taught
-    said = [np.abs(np.asarray(model.added(d.values, *flat(pulled)))).max() for d in (done, strong)]
-    assert said[0] < 0.05 * said[1]
+    printed = [
+        np.abs(np.asarray(model.added(d.values, *flat(pulled)))).max() for d in (done, strong)
+    ]
+    assert printed[0] < 0.05 * printed[1]
     assert done.loss[1] > strong.loss[1]
 
 

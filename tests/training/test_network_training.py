@@ -53,9 +53,9 @@ def test_the_history_is_smoothed_and_the_best_weights_are_those_of_the_smallest_
     assert epochs == tuple(range(41))
     assert validation[0] == pytest.approx(by_autograd(model, held).item())
     average = validation[0]
-    for value, shown in zip(validation[1:], smoothed[1:], strict=True):
+    for value, displayed in zip(validation[1:], smoothed[1:], strict=True):
         average = 0.1 * value + 0.9 * average
-        assert shown == pytest.approx(average)
+        assert displayed == pytest.approx(average)
     again = network_gradient.loss_only(progress.best_weights, batches[1], model.scaling, SHAPE)
     assert again == pytest.approx(min(validation)) == pytest.approx(progress.best)
 

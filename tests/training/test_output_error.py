@@ -201,8 +201,8 @@ def test_the_strongest_trades_are_named_and_the_rest_counted():
     assert len(notes(made, names, np.ones(5))) == 6
     shared[0] = shared[:, 0] = 0.85 * error * 0.1
     shared[0, 0] = 0.01
-    said = notes(made, names, np.ones(5))
-    assert len(said) == 7 and said[-1] == "4 more pairs correlate above 0.75."
+    output = notes(made, names, np.ones(5))
+    assert len(output) == 7 and output[-1] == "4 more pairs correlate above 0.75."
 
 
 def test_bounds_are_respected_and_said(exact):
@@ -230,8 +230,8 @@ def test_only_what_is_free_moves(exact):
     assert not some.covariance[[0, 2]].any() and not some.covariance[:, [0, 2]].any()
     assert some.covariance[1, 1] > 0.0
     assert some.loss[1] < some.loss[0]
-    said = notes(some, Boat.names, WIDE, (START - 1e-9, START + 1.0))
-    assert not any("drag" in s or "silent" in s for s in said)  # held is neither silent nor stuck
+    output = notes(some, Boat.names, WIDE, (START - 1e-9, START + 1.0))
+    assert not any("drag" in s or "silent" in s for s in output)  # held is neither silent nor stuck
     right = identify(Boat(), np.array([0.05, 0.3, 0.7]), WIDE, exact, free=free)
     assert right.values[1] == pytest.approx(TRUE[1], rel=1e-4)
 
@@ -359,8 +359,10 @@ def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
     assert noise == pytest.approx(30.0 * rest / (3.0 * 39.0))  # three channels, 39 s
     expected = weight * s**2 * gram / noise
     bread = expected + 1.0 / factor**2
-    told = expected / bread  # of one number: how much the data determine it
-    scatter = (weight * weight * (s * pull / noise) ** 2 + told * expected) / (weight + told)
+    estimated = expected / bread  # of one number: how much the data determine it
+    scatter = (weight * weight * (s * pull / noise) ** 2 + estimated * expected) / (
+        weight + estimated
+    )
     meat = weight * scatter + 1.0 / factor**4  # n/(n - 1), its divisor held at 1
     assert done.covariance[0, 0] == pytest.approx(s**2 * meat / bread**2, rel=1e-9)
 
@@ -423,15 +425,15 @@ def test_each_of_two_voyages_is_rolled_out_with_what_the_other_said():
     data = plain._replace(
         measured=np.where(is_a[:, None, None], a.measured, b.measured), weight=np.full(COUNT, 2.0)
     )
-    seen = []
+    observed = []
 
     def fit(part: WindowSeries) -> Simulator:
-        seen.append(part.weight)
+        observed.append(part.weight)
         done = identify(Boat(), START, WIDE, part)
         return Simulator(Boat(), done.values, np.diag([1e-4, 0.0, 0.0]))
 
     done = cross_validate(fit, data, groups)
-    assert sorted(w.tolist() for w in seen) == [[0.0, 2.0] * 4, [2.0, 0.0] * 4]
+    assert sorted(w.tolist() for w in observed) == [[0.0, 2.0] * 4, [2.0, 0.0] * 4]
     crossed = np.where(
         is_a[:, None, None],
         sensitivities.rollout(Boat(), second, data),

@@ -126,8 +126,8 @@ def test_stamps_that_jitter_are_no_gaps(voyage, sigma):
 @pytest.mark.parametrize("lost", [[1000], [1000, 1004, 1300], [3, 2997]])
 def test_a_lost_message_is_a_gap_whatever_the_jitter(voyage, sigma, lost):
     parts = jittered(sigma)
-    told = kept(parts, "/velocity", ~np.isin(np.arange(len(parts["/velocity"].time)), lost))
-    gaps = [f for f in voyage(told).report.findings if f.kind == "gap"]
+    estimated = kept(parts, "/velocity", ~np.isin(np.arange(len(parts["/velocity"].time)), lost))
+    gaps = [f for f in voyage(estimated).report.findings if f.kind == "gap"]
     assert {f.channel for f in gaps} == {"velocity"}
     assert [f.start_s for f in gaps] == pytest.approx([0.1 * i for i in lost], abs=0.25)
 
@@ -318,11 +318,11 @@ def test_a_stamp_that_cannot_belong_is_left_out_and_said(voyage, topic, rows, by
     for name in ("x0", "surge", "heading", "rudder"):
         off = (both[name] - both[f"{name}_clean"]).drop_nulls()
         assert float(off.abs().max()) < 1e-9
-    said = [f for f in done.report.findings if f.kind == "jump"]
-    assert {f.channel for f in said} == {topic}
+    output = [f for f in done.report.findings if f.kind == "jump"]
+    assert {f.channel for f in output} == {topic}
     count = 200 if isinstance(rows, slice) else np.size(rows)
-    assert said[0].sentence.startswith(f"{count} of ")
-    assert said[0].value == pytest.approx(abs(by) * 1e-9, abs=60.0)
+    assert output[0].sentence.startswith(f"{count} of ")
+    assert output[0].value == pytest.approx(abs(by) * 1e-9, abs=60.0)
 
 
 def test_a_sensor_that_fell_out_for_long_and_came_back_for_a_moment_is_data(voyage):

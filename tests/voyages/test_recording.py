@@ -59,7 +59,7 @@ def test_a_gap_shorter_than_two_seconds_is_bridged_and_unseen(mark):
     found = read(table(100, x0=hole, quality=faulty(100, (40, 59), mark=mark)))
     assert len(found) == 100
     assert found.starts.tolist() == [True] + [False] * 99
-    assert np.flatnonzero(~found.seen).tolist() == list(range(40, 59))
+    assert np.flatnonzero(~found.measured).tolist() == list(range(40, 59))
     assert found.state[:, 0] == pytest.approx(0.1 * np.arange(100), abs=1e-9)
     assert found.seconds == pytest.approx(8.1)
 
@@ -70,7 +70,7 @@ def test_a_gap_of_two_seconds_starts_a_stretch():
         assert len(found) == (100 if kept else 100 - rows)
         assert found.starts.sum() == (1 if kept else 2)
     assert np.flatnonzero(found.starts).tolist() == [0, 40]
-    assert found.seen.all()
+    assert found.measured.all()
     assert found.time[[39, 40]] == pytest.approx([3.9, 6.1])
     assert (found.firsts[[0, 39, 40, 78]] == [0, 0, 40, 40]).all()
     assert (found.lasts[[0, 39, 40, 78]] == [39, 39, 78, 78]).all()
@@ -80,21 +80,21 @@ def test_gaps_at_the_ends_are_left_away():
     found = read(table(100, quality=faulty(100, (0, 5), (95, 100))))
     assert len(found) == 90
     assert found.time[0] == pytest.approx(0.5)
-    assert found.seen.all()
+    assert found.measured.all()
 
 
 def test_a_value_that_is_missing_is_a_gap():
     hole = 0.1 * np.arange(100)
     hole[50] = np.nan
     found = read(table(100, y0=hole))
-    assert np.flatnonzero(~found.seen).tolist() == [50]
+    assert np.flatnonzero(~found.measured).tolist() == [50]
     assert found.state[50, 2] == pytest.approx(5.0)
 
 
 def test_a_jump_starts_a_stretch_and_is_seen():
     found = read(table(100, quality=faulty(100, (30, 31), mark=Quality.JUMP)))
     assert np.flatnonzero(found.starts).tolist() == [0, 30]
-    assert found.seen.all()
+    assert found.measured.all()
 
 
 def test_headings_run_on_and_gaps_are_bridged_the_short_way():
@@ -117,8 +117,10 @@ def test_wind_comes_as_components():
 
 def test_true_wind_turns_with_the_ship():
     """What closed form says of a turning ship in a steady wind."""
-    seen = closed.record(PROFILE)
-    assert seen.true_wind == pytest.approx(np.tile(closed.TRUE_WIND, (len(seen), 1)), abs=1e-12)
+    observed = closed.record(PROFILE)
+    assert observed.true_wind == pytest.approx(
+        np.tile(closed.TRUE_WIND, (len(observed), 1)), abs=1e-12
+    )
 
 
 # --- campaigns ------------------------------------------------------------------------------------
@@ -188,38 +190,38 @@ def test_a_smoothed_ramp_stays_and_a_wave_is_less_by_its_mean():
 @pytest.mark.parametrize("profile", (PROFILE, BODY), ids=("over ground", "body axes"))
 def test_sights_are_reduced_as_ingest_does(profile):
     """`reduced` undoes `sighted`, and both are the formulas of `midship`."""
-    seen = closed.record(profile)
-    sight = seen.sighted
-    again = seen.measured_as(sight)
-    assert again.state == pytest.approx(seen.state, abs=1e-12)
+    observed = closed.record(profile)
+    sight = observed.sighted
+    again = observed.measured_as(sight)
+    assert again.state == pytest.approx(observed.state, abs=1e-12)
     arm = profile.sensors.position.lever_arm_m
-    at = frames.position_at_midship(sight.position, seen.state[:, 4], arm)
-    assert at == pytest.approx(seen.state[:, [0, 2]], abs=1e-12)
+    at = frames.position_at_midship(sight.position, observed.state[:, 4], arm)
+    assert at == pytest.approx(observed.state[:, [0, 2]], abs=1e-12)
     velocity = sight.velocity
     if profile is PROFILE:
-        velocity = frames.to_body(velocity, seen.state[:, 4])
+        velocity = frames.to_body(velocity, observed.state[:, 4])
     going = frames.velocity_at_midship(
-        velocity, seen.state[:, 5], profile.sensors.velocity.lever_arm_m
+        velocity, observed.state[:, 5], profile.sensors.velocity.lever_arm_m
     )
-    assert going == pytest.approx(seen.state[:, [1, 3]], abs=1e-12)
+    assert going == pytest.approx(observed.state[:, [1, 3]], abs=1e-12)
 
 
 def test_an_antenna_that_is_sighted_moves_as_its_velocity_says():
     """Over ground, the sighted velocity is the derivative of the sighted position."""
-    seen = closed.record(PROFILE)
-    sight = seen.sighted
+    observed = closed.record(PROFILE)
+    sight = observed.sighted
     moved = (sight.position[2:] - sight.position[:-2]) / 0.2
     assert moved == pytest.approx(sight.velocity[1:-1], abs=2e-5)  # h²/6 of the third derivative
-    still = replace(seen, state=seen.state * [1, 1, 1, 1, 1, 0]).sighted
+    still = replace(observed, state=observed.state * [1, 1, 1, 1, 1, 0]).sighted
     assert np.abs(moved - still.velocity[1:-1]).max() > 0.01  # the swing of the arm counts
 
 
 def test_an_antenna_elsewhere_takes_its_velocity_along():
-    seen = closed.record(PROFILE)
-    sight = seen.sighted
-    found = seen.measured_as(sight, (0.4, -0.1))
-    c, s, r = np.cos(seen.state[:, 4]), np.sin(seen.state[:, 4]), seen.state[:, 5]
-    back = found.state - seen.state
+    observed = closed.record(PROFILE)
+    sight = observed.sighted
+    found = observed.measured_as(sight, (0.4, -0.1))
+    c, s, r = np.cos(observed.state[:, 4]), np.sin(observed.state[:, 4]), observed.state[:, 5]
+    back = found.state - observed.state
     assert back[:, 0] == pytest.approx(-(0.4 * c + 0.1 * s), abs=1e-12)
     assert back[:, 2] == pytest.approx(-(0.4 * s - 0.1 * c), abs=1e-12)
     assert back[:, 1] == pytest.approx(-0.1 * r, abs=1e-12)

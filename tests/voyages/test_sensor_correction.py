@@ -153,12 +153,12 @@ def test_ingest_corrects_on_demand_says_so_and_takes_it_back(log, tmp_path):
         (voyage,) = json.loads(answer.read_text())["voyages"]
         facts = json.loads((folder / "voyage=trip" / "voyage.json").read_text())
         (table,) = (t.collect() for t in Store(folder).tables(["trip"]))
-        said = {(f["kind"], f["channel"]): f for f in voyage["findings"] if f["low"] is not None}
-        return said, facts, table
+        output = {(f["kind"], f["channel"]): f for f in voyage["findings"] if f["low"] is not None}
+        return output, facts, table
 
-    said, facts, table = taken()
+    output, facts, table = taken()
     assert facts["corrected"] == []
-    assert not any("Corrected" in f["sentence"] for f in said.values())
+    assert not any("Corrected" in f["sentence"] for f in output.values())
 
     said_then, facts_then, table_then = taken("--correct")
     assert facts_then["fingerprint"] != facts["fingerprint"]
@@ -172,7 +172,7 @@ def test_ingest_corrects_on_demand_says_so_and_takes_it_back(log, tmp_path):
     assert {key for key, f in said_then.items() if f["sentence"].endswith(" Corrected.")} == set(
         done
     )
-    assert set(said_then) == set(said) == {*done, ("clock_offset", "velocity")}
+    assert set(said_then) == set(output) == {*done, ("clock_offset", "velocity")}
     assert table_then["time"].equals(table["time"])
     assert left(table_then, VECTWIN) == {("clock_offset", "velocity")}
 

@@ -52,7 +52,7 @@ def numbers(cause: Cause, told: Mapping[str, float], setting: Setting) -> np.nda
     size = cause.sizes(setting)
 
     def off(x: np.ndarray) -> np.ndarray:
-        shown = cause.shown(x * size)
+        shown = cause.displayed(x * size)
         away = []
         for name, (value, unit) in shown.items():
             if name not in told:

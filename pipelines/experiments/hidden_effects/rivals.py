@@ -106,7 +106,7 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Ranked:
     before = segments.cut(usual, segments.begins(usual))
     rest = beyond(model, theta, before.y, of_bins(before.driven, before.y.shape[1]))
     sd = np.sqrt((rest[_used(before)] ** 2).mean(0))
-    cut, moved, shown = measurement_correction.read(model, ref.setting, trial.record, trial.rows)
+    cut, moved, observed = measurement_correction.read(model, ref.setting, trial.record, trial.rows)
     bins = cut.y.shape[1]
     y, driven, moved = cut.y, of_bins(cut.driven, bins), of_bins(moved, bins)
     used = _used(cut)
@@ -118,7 +118,9 @@ def regression(trial: Trial, fitted: np.ndarray, usual: Record) -> Ranked:
         for i in columns.of[cause.label]:
             q, step = i - columns.base, float(measurement_correction.READ_STEP * columns.unit[i])
             low, high = (
-                beyond(model, _with(theta, i, d), y + d * shown[..., q], driven + d * moved[..., q])
+                beyond(
+                    model, _with(theta, i, d), y + d * observed[..., q], driven + d * moved[..., q]
+                )
                 for d in (-step, step)
             )
             own.append((low - high)[used] / (2.0 * step))  # what is left falls as it explains

@@ -45,7 +45,7 @@ WHOLE = "nothing"  # the decision as it is
 
 def _no_placebo(stack: ExitStack) -> None:
     stack.enter_context(patch.object(placebo, "placebos", lambda campaign: {}))
-    stack.enter_context(patch.object(Hypotheses, "usual_push", None))
+    stack.enter_context(patch.object(Hypotheses, "nominal_side_force", None))
 
 
 def _no_form_error(stack: ExitStack) -> None:

@@ -5,7 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from shiplog.models.causes.base import Cause, Parameter, Setting, Shown, constants_of, si
+from shiplog.models.causes.base import (
+    Cause,
+    Parameter,
+    ParameterEstimate,
+    Setting,
+    constants_of,
+    si,
+)
 from shiplog.models.causes.environment import Bank, Current, ShallowWater, WindForce
 from shiplog.models.causes.sensors import (
     AntennaOffset,
@@ -71,8 +78,8 @@ __all__ = [
     "CATALOGUE",
     "Cause",
     "Parameter",
+    "ParameterEstimate",
     "Setting",
-    "Shown",
     "constants_of",
     "si",
     "testable",

@@ -104,7 +104,7 @@ NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
 
 
 @dataclass(frozen=True)
-class Shown:
+class ParameterEstimate:
     """One of the contract's parameters, from fitted numbers."""
 
     value: float
@@ -151,7 +151,7 @@ class Cause:
         return False
 
     @property
-    def usual(self) -> bool:
+    def nominal(self) -> bool:
         """Whether its nominal value may differ from zero: false where it is an alias of
         coefficients or of another cause."""
         return not self.absorbed
@@ -169,7 +169,7 @@ class Cause:
         """The cause as this ship has it, once for each unit of which it is tested on its own."""
         return (self.on(setting),)
 
-    def beside(self, label: str) -> bool:
+    def compatible(self, label: str) -> bool:
         """Whether it may be in one hypothesis with this cause."""
         return label != self.label
 
@@ -213,13 +213,13 @@ class Cause:
 
     # --- words ---
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         """The contract's parameters and units, of numbers [..., count]."""
         return {q.name: (p[..., i] / si(q.unit), q.unit) for i, q in enumerate(self.parameters)}
 
-    def told(
+    def estimates(
         self, p: np.ndarray, covariance: np.ndarray, freedom: float = math.inf, draws: int = 4000
-    ) -> dict[str, Shown]:
+    ) -> dict[str, ParameterEstimate]:
         """The contract's parameters with 90 % intervals.
 
         freedom   degrees of it with which the covariance's size is known: Student's t
@@ -229,21 +229,21 @@ class Cause:
         drawn = rng.standard_normal((draws, len(p))) @ root.T
         if math.isfinite(freedom):
             drawn *= np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
-        many = self.shown(p + drawn)
+        many = self.displayed(p + drawn)
         found = {}
-        for name, (value, unit) in self.shown(np.asarray(p, dtype=float)).items():
+        for name, (value, unit) in self.displayed(np.asarray(p, dtype=float)).items():
             spread = many[name][0] - value
             if unit == "deg":
                 spread = (spread + 180.0) % 360.0 - 180.0
             low, high = np.quantile(spread, (0.05, 0.95))
             middle = float(value)
-            found[name] = Shown(
+            found[name] = ParameterEstimate(
                 middle, middle + min(float(low), 0.0), middle + max(float(high), 0.0), unit
             )
         return found
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        numbers = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in shown.items())
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        numbers = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in estimates.items())
         return f"{self.story} {numbers}."
 
     def practical(self, p: np.ndarray, setting: Setting) -> bool:

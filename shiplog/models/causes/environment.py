@@ -10,7 +10,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog.models.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,14 @@ class Current(Cause):
     def water(self, p: Any) -> tuple[Any, Any]:
         return p[0], p[1]
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         towards = np.degrees(np.arctan2(p[..., 1], p[..., 0])) % 360.0
         return {"speed": (np.hypot(p[..., 0], p[..., 1]), "m/s"), "direction": (towards, "deg")}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         return (
-            f"A steady current of {shown['speed'].value:.3g} m/s towards "
-            f"{shown['direction'].value % 360.0:.0f} deg."
+            f"A steady current of {estimates['speed'].value:.3g} m/s towards "
+            f"{estimates['direction'].value % 360.0:.0f} deg."
         )
 
 
@@ -100,12 +100,12 @@ class WindForce(Cause):
         factor = {axis: already + p[i] for i, axis in enumerate("xyn")}
         return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         already = 0.0 if self.lacking else 1.0
         return {q.name: (already + p[..., i], "1") for i, q in enumerate(self.parameters)}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        x, y, n = (shown[q.name].value for q in self.parameters)
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        x, y, n = (estimates[q.name].value for q in self.parameters)
         whose = "of a ship of this kind; the model has none" if self.lacking else "in the model"
         return (
             f"The wind force is {x:.2f} times that {whose} ahead, {y:.2f} times athwart, and its "
@@ -156,13 +156,13 @@ class ShallowWater(Cause):
         }  # fmt: skip
         return c | {k: c[k] * (1.0 + share * depth) for k, share in grow.items()}
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"strength": (p.max(-1), "1")}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         return (
             "Shallow water: at the shallowest place, cross-flow drag is "
-            f"{1.0 + 1.2 * shown['strength'].value:.2f} times that of deep water."
+            f"{1.0 + 1.2 * estimates['strength'].value:.2f} times that of deep water."
         )
 
     def practical(self, p: np.ndarray, setting: Setting) -> bool:
@@ -221,8 +221,9 @@ class Bank(Cause):
         turn = -0.25 * length * pull * starboard * lead
         return jnp.stack(((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1)
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        strength = estimates["strength"].value
         return (
-            f"The bank attracts the ship with {shown['strength'].value:.2f} times the suction of "
-            "the reference formula."
+            f"The bank attracts the ship with {strength:.2f} times the suction of the reference "
+            "formula."
         )

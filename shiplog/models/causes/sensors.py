@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.models.causes.base import Cause, Parameter, Shown
+from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate
 from shiplog.voyages import instrument_faults as faults
 from shiplog.voyages.recording import Record
 
@@ -37,7 +37,7 @@ class HeadingOffset(Cause):
     def label(self) -> str:
         return f"{self.name}:gnss" if self.turned else self.name
 
-    def beside(self, label: str) -> bool:
+    def compatible(self, label: str) -> bool:
         return label.partition(":")[0] != self.name
 
     @property
@@ -47,8 +47,8 @@ class HeadingOffset(Cause):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_heading_offset(record, float(p[0]), self.turned)
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The compass is misaligned by {shown['angle'].value:+.2f} deg."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The compass is misaligned by {estimates['angle'].value:+.2f} deg."
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class YawRateBias(Cause):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_yaw_rate_bias(record, float(p[0]))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The measured yaw rate has a bias of {shown['value'].value:+.3f} deg/s."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The measured yaw rate has a bias of {estimates['value'].value:+.3f} deg/s."
 
 
 @dataclass(frozen=True)
@@ -89,11 +89,11 @@ class YawRateScale(Cause):
     def inverse(self, p: np.ndarray) -> np.ndarray:
         return -p / (1.0 + p)
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"value": (1.0 + p[..., 0], "1")}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The measured yaw rate is {shown['value'].value:.3f} times the true one."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The measured yaw rate is {estimates['value'].value:.3f} times the true one."
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,10 @@ class ClockOffset(Cause):
         return f"{self.name}:{self.channel}"
 
     @property
-    def usual(self) -> bool:
+    def nominal(self) -> bool:
         return self.channel != "gnss"  # that is position and velocity together
 
-    def beside(self, label: str) -> bool:
+    def compatible(self, label: str) -> bool:
         """`gnss` is position and velocity together: two of the three determine the third."""
         both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
         if self.channel == "gnss":
@@ -138,8 +138,8 @@ class ClockOffset(Cause):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_clock_offset(record, self.channel, float(p[0]))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        late = shown["time"].value
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        late = estimates["time"].value
         what = {"gnss": "position and velocity", "yaw_rate": "the yaw rate"}.get(
             self.channel, f"the {self.channel}"
         )
@@ -172,8 +172,8 @@ class AntennaOffset(Cause):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_antenna_offset(record, float(p[0]), float(p[1]))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        x, y = shown["x"].value, shown["y"].value
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        x, y = estimates["x"].value, estimates["y"].value
         return (
             f"The antenna is {abs(x):.2f} m {'ahead' if x >= 0 else 'astern'} and {abs(y):.2f} m "
             f"to {'starboard' if y >= 0 else 'port'} of its position in the profile."
@@ -200,8 +200,8 @@ class WindDirectionOffset(Cause):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return faults.without_wind_direction_offset(record, float(p[0]))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The anemometer is misaligned by {shown['angle'].value:+.1f} deg."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The anemometer is misaligned by {estimates['angle'].value:+.1f} deg."
 
 
 @dataclass(frozen=True)
@@ -228,8 +228,8 @@ class WindSpeedScale(Cause):
     def inverse(self, p: np.ndarray) -> np.ndarray:
         return -p / (1.0 + p)
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"value": (1.0 + p[..., 0], "1")}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The measured wind speed is {shown['value'].value:.2f} times the true one."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The measured wind speed is {estimates['value'].value:.2f} times the true one."

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numba
 import numpy as np
 
-from shiplog.models.causes.base import Cause, Parameter, Setting, Shown
+from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
 from shiplog.profile import Profile
 from shiplog.voyages.recording import Record
 
@@ -56,7 +56,7 @@ class _Factor(Cause):
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return _times(c, self.scaled, 1.0 + p[0])
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"factor": (1.0 + p[..., 0], "1")}
 
 
@@ -74,8 +74,8 @@ class Fouling(_Factor):
         "thrust_loss": "bollard pull (high revolutions at rest) against coasting (screw stopped)"
     }
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The hull resistance is {shown['factor'].value:.2f} times the model's."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The hull resistance is {estimates['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,12 @@ class CrossFlowDrag(_Factor):
         "payload": "step of the screw from rest (inertia) against a pure decay of sway",
     }
 
-    def beside(self, label: str) -> bool:
+    def compatible(self, label: str) -> bool:
         """Not with shallow water, which raises it in places by a coarse map."""
-        return super().beside(label) and label != "shallow_water"
+        return super().compatible(label) and label != "shallow_water"
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"Cross-flow drag is {shown['factor'].value:.2f} times the model's."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"Cross-flow drag is {estimates['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ class RudderForce(_Factor):
     parameters = (Parameter("factor", "1", 0.25, 0.02, low=-1.0),)
     separated_by = {"thrust_loss": "steady speed on a straight course, rudders amidships"}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The rudders' force is {shown['factor'].value:.2f} times the model's."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The rudders' force is {estimates['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class ThrustLoss(Cause):
         names = [setting.profile.actuators[i].name for i in units] if len(units) > 1 else []
         return (replace(self, actuator=""), *(replace(self, actuator=name) for name in names))
 
-    def beside(self, label: str) -> bool:
+    def compatible(self, label: str) -> bool:
         """The loss of all units is not tested together with that of one."""
         same = label.partition(":")[0] == self.name
         return not same or (bool(self.actuator) and ":" in label and label != self.label)
@@ -166,12 +166,12 @@ class ThrustLoss(Cause):
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return _thrust(c, 1.0 + p[0], self.actuator)
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {"factor": (1.0 + p[..., 0], "1")}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         whose = f"thrust of {self.actuator}" if self.actuator else "thrust"
-        return f"The {whose} is {shown['factor'].value:.2f} times the model's."
+        return f"The {whose} is {estimates['factor'].value:.2f} times the model's."
 
 
 @dataclass(frozen=True)
@@ -189,10 +189,10 @@ class ThrustDrift(Cause):
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return _thrust(c, 1.0 + p[0] * share)
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        slope = 100.0 * estimates["slope"].value
         return (
-            f"The thrust changes by {100.0 * shown['slope'].value:+.0f} % from the beginning of "
-            "the campaign to its end."
+            f"The thrust changes by {slope:+.0f} % from the beginning of the campaign to its end."
         )
 
 
@@ -224,17 +224,17 @@ class Payload(Cause):
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return c | {"load.mass": p[0], "load.moment": p[1]}
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         mass = p[..., 0]
         return {
             "mass": (mass, "kg"),
             "position": (p[..., 1] / np.where(np.abs(mass) > 1e-9, mass, 1.0), "m"),
         }
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        at = shown["position"].value
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        at = estimates["position"].value
         return (
-            f"A load of {shown['mass'].value:.3g} kg, {abs(at):.2f} m "
+            f"A load of {estimates['mass'].value:.3g} kg, {abs(at):.2f} m "
             f"{'ahead of' if at >= 0 else 'abaft'} midship."
         )
 
@@ -313,13 +313,13 @@ class RudderOffset(_OnRudders):
             each = np.array([p[0] if y < 0.0 else p[1] for y in aside])
         return self._with(record, self._recorded(record) + each)
 
-    def shown(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         return {name: (np.degrees(p[..., i]), "deg") for i, name in enumerate(self.groups)}
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         angles = " and ".join(
             f"{v.value:+.1f} deg" + (f" ({name})" if self.count > 1 else "")
-            for name, v in shown.items()
+            for name, v in estimates.items()
         )
         return f"The {self.what} have an offset of {angles} from the recorded angle."
 
@@ -341,10 +341,9 @@ class RudderLag(_OnRudders):
     def read(self, record: Record, p: np.ndarray) -> Record:
         return self._with(record, _lagged(record, self._recorded(record), float(p[0])))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return (
-            f"The {self.what} follow the recorded angle with a lag of {shown['time'].value:.2f} s."
-        )
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        lag = estimates["time"].value
+        return f"The {self.what} follow the recorded angle with a lag of {lag:.2f} s."
 
 
 def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
@@ -388,11 +387,11 @@ class RudderDelay(_OnRudders):
     separated_by = {"rudder_lag": "rudder doublets of 2 to 4 s at constant revolutions"}
 
     @property
-    def usual(self) -> bool:
+    def nominal(self) -> bool:
         return False  # a small one is a small lag
 
     def read(self, record: Record, p: np.ndarray) -> Record:
         return self._with(record, record.later(self._recorded(record), -float(p[0])))
 
-    def sentence(self, shown: Mapping[str, Shown]) -> str:
-        return f"The {self.what} act {shown['time'].value:.2f} s later than recorded."
+    def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
+        return f"The {self.what} act {estimates['time'].value:.2f} s later than recorded."

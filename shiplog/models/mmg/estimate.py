@@ -53,45 +53,45 @@ def particulars(profile: Profile) -> tuple[Particulars, tuple[str, ...]]:
     A known mass floats the ship: with no draught given, the block coefficient (0.7 where it too
     is missing) sets it. Areas above water have the proportions of the Esso Osaka's.
     """
-    ship, said = profile.ship, []
+    ship, notes = profile.ship, []
     length, breadth, outline = ship.length_m, ship.breadth_m, ship.outline
     long, wide = np.ptp(np.array(outline), axis=0).tolist() if outline else (0.0, 0.0)
     if breadth is None and wide:
         breadth = wide
-        said.append(f"breadth {breadth:.3g} m taken from the outline")
+        notes.append(f"breadth {breadth:.3g} m taken from the outline")
     elif breadth is None:
         breadth = ship.breadth
-        said.append(f"breadth {breadth:.3g} m estimated as a sixth of the length")
+        notes.append(f"breadth {breadth:.3g} m estimated as a sixth of the length")
 
     density = profile.site.density
     if density is None:
         density, water = (SALT, "salt") if length > 20.0 else (FRESH, "fresh")
-        said.append(f"water density {density:.0f} kg/m³ taken as {water}, by the ship's length")
+        notes.append(f"water density {density:.0f} kg/m³ taken as {water}, by the ship's length")
 
     draught, block, mass, floating = _afloat(ship, density, length, breadth)
-    said += floating
+    notes += floating
     x_g = ship.x_g_m
     if x_g is None:
         x_g = 0.0
-        said.append("centre of gravity assumed amidships")
+        notes.append("centre of gravity assumed amidships")
 
     frontal, lateral = ship.frontal_area_m2, ship.lateral_area_m2
     beam = wide or breadth
     if frontal is None:
         frontal = 0.57 * beam**2
-        said.append(f"frontal area {frontal:.3g} m² estimated as 0.57 of the breadth squared")
+        notes.append(f"frontal area {frontal:.3g} m² estimated as 0.57 of the breadth squared")
     if lateral is None:
         lateral = 0.355 * (long or length) * beam
-        said.append(f"lateral area {lateral:.3g} m² estimated as 0.355 of length by breadth")
+        notes.append(f"lateral area {lateral:.3g} m² estimated as 0.355 of length by breadth")
     main = Particulars(length, breadth, draught, mass, block, x_g, density, frontal, lateral)
-    return main, tuple(said)
+    return main, tuple(notes)
 
 
 def _afloat(
     ship: Ship, density: float, length: float, breadth: float
 ) -> tuple[float, float, float, list[str]]:
     """Draught [m], block coefficient and mass [kg] that go together, and what was estimated."""
-    said: list[str] = []
+    notes: list[str] = []
     draught, block, mass = ship.draught_m, ship.block_coefficient, ship.mass_kg
     if draught is None and mass is not None:
         floating = mass / (density * length * breadth * (block or 0.7))
@@ -100,23 +100,23 @@ def _afloat(
             how = f"from the mass afloat at a block coefficient of {block or 0.7:.2g}"
         else:
             how = f"as a twentieth of the breadth: the mass alone would give {floating:.3g} m"
-        said.append(f"draught {draught:.3g} m estimated {how}")
+        notes.append(f"draught {draught:.3g} m estimated {how}")
     elif draught is None:
         draught = 0.4 * breadth
-        said.append(f"draught {draught:.3g} m estimated as 0.4 of the breadth")
+        notes.append(f"draught {draught:.3g} m estimated as 0.4 of the breadth")
     box = density * length * breadth * draught
     if block is None and mass is not None:
         found = mass / box
         block = _within(found, *BLOCK_COEFFICIENTS)
         limited = "" if block == found else f", limited from {found:.2g}"
-        said.append(f"block coefficient {block:.2g} estimated from the mass{limited}")
+        notes.append(f"block coefficient {block:.2g} estimated from the mass{limited}")
     elif block is None:
         block = 0.7
-        said.append("block coefficient estimated as 0.7")
+        notes.append("block coefficient estimated as 0.7")
     if mass is None:
         mass = block * box
-        said.append(f"mass {mass:.3g} kg estimated from the block coefficient {block:.2g}")
-    return draught, block, mass, said
+        notes.append(f"mass {mass:.3g} kg estimated from the block coefficient {block:.2g}")
+    return draught, block, mass, notes
 
 
 def rudder_size(rudder: Actuator, count: int, p: Particulars) -> tuple[float, float, str]:
@@ -125,18 +125,18 @@ def rudder_size(rudder: Actuator, count: int, p: Particulars) -> tuple[float, fl
     What DNV asks for at least of all rudders together, A = L d/100 (1 + 25 (B/L)²), shared evenly
     (Det Norske Veritas, Rules for Ships, 2000); a span of 1.5 mean chords.
     """
-    area, span, said = rudder.area_m2, rudder.span_m, []
+    area, span, notes = rudder.area_m2, rudder.span_m, []
     if area is None:
         if span is None:
             whole = p.length * p.draught / 100.0 * (1.0 + 25.0 * (p.breadth / p.length) ** 2)
             area, how = whole / count, "from length, breadth and draught"
         else:
             area, how = span**2 / ASPECT, f"from its span of {span:.3g} m"
-        said.append(f"area {area:.3g} m² {how}")
+        notes.append(f"area {area:.3g} m² {how}")
     if span is None:
         span = sqrt(ASPECT * area)
-        said.append(f"span {span:.3g} m of {ASPECT} mean chords")
-    return area, span, f"{rudder.name}: {' and '.join(said)} estimated" if said else ""
+        notes.append(f"span {span:.3g} m of {ASPECT} mean chords")
+    return area, span, f"{rudder.name}: {' and '.join(notes)} estimated" if notes else ""
 
 
 def inertia(p: Particulars) -> dict[str, float]:

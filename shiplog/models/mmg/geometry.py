@@ -128,7 +128,7 @@ def geometry_of(
                 f"There is no force {name!r} to leave out{nearest(name, PARTS[1:])}.",
                 hint=f"--without can be {listed(PARTS[1:])}.",
             )
-    main, said = particulars(profile)
+    main, notes = particulars(profile)
     propellers, rudders, thrusters, sizes = _units(profile, main, off)
     return (
         Geometry(
@@ -146,7 +146,7 @@ def geometry_of(
             wind=profile.has_wind and "wind" not in off,
         ),
         main,
-        (*said, *sizes),
+        (*notes, *sizes),
     )
 
 
@@ -184,8 +184,8 @@ def _units(
         for a in profile.actuators
         if a.kind == "thruster" and "thruster" not in off
     )
-    said = tuple(sentence for *_, sentence in sizes if sentence)
-    return propellers, rudders, thrusters, said
+    notes = tuple(sentence for *_, sentence in sizes if sentence)
+    return propellers, rudders, thrusters, notes
 
 
 def _needed(actuator: Actuator, key: str, part: str) -> float:
