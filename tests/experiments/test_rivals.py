@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import straight
 from jax.typing import ArrayLike
 
 from pipelines.experiments.hidden_effects import plan, rivals, run, score, score_tables, suites
@@ -206,6 +207,22 @@ def test_noise_and_coefficients_of_the_usual_voyages_are_learnt():
     assert solved == pytest.approx(true[:2], abs=0.05)
     sd = np.sqrt(np.diag(np.linalg.inv(white.information))) * columns.unit[:2]
     assert (sd < 0.02).all()  # 7200 numbers less 900 starts, each as large as its noise
+
+
+def test_a_trial_whose_model_has_a_discrepancy_is_compared_without_it():
+    """Its columns are of no simpler method: what was hidden is found by the ratio all the same."""
+    columns = straight.columns_of(straight.CAUSES)
+    nominal, record = straight.sailed(12), straight.sailed(8, seed=3)
+    passed = straight.passed(nominal, columns, noise=0.3, sensitivity=0.3)
+    campaign = straight.campaign(nominal, passed, columns)
+    assert campaign.reference.columns.misfit > 0
+    hidden = np.zeros(columns.linearised)
+    hidden[columns.of["drag"]] = 1.5
+    given = straight.passed(record, columns, hidden, seed=2, noise=0.3, sensitivity=0.3)
+    trial = straight.trial(campaign, record, given)
+    found = rivals.likelihood_ratio(trial, trial.at({}))
+    assert found.answer == "drag"
+    assert set(found.scores) == {c.label for c in straight.CAUSES}
 
 
 # --- the seal -------------------------------------------------------------------------------------

@@ -201,7 +201,7 @@ def likelihood_ratio(trial: Trial, point: Point) -> Ranked:
     before = learnt(ref.nominal, ref.columns, ref.wide.start, ref.wide.noise)
     tried = {c.label: ref.columns.of[c.label] for c in ref.model.causes}
     tried = {label: at for label, at in tried.items() if label not in trial.fixed}
-    total = white_total(point.linear, before.noise, ref.wide.start, ref.columns.unit)
+    total = white_total(point.linear, before.noise, ref.wide.start, _units(ref.columns))
     found = ratios(total, before.information, before.pull, tried)
     count = int(point.linear.cut.used.sum())
     price = {label: 0.5 * len(at) * math.log(count) for label, at in tried.items()}
@@ -213,7 +213,7 @@ def likelihood_ratio(trial: Trial, point: Point) -> Ranked:
 def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarray) -> White:
     """Noise and coefficients of the nominal voyages together, by turns."""
     alone = _white(linear)
-    base, unit = columns.base, columns.unit
+    base, unit = columns.base, _units(columns)
     numbers = np.zeros(len(unit))
     for _ in range(ROUNDS):
         total = white_total(linear, noise, start, unit)[: base + 1, : base + 1]
@@ -226,6 +226,11 @@ def learnt(linear: Linear, columns: Columns, start: np.ndarray, noise: np.ndarra
         noise = np.sqrt(np.where(used, gap**2 + spread, 0.0).sum((0, 1)) / used.sum((0, 1)))
     total = white_total(linear, noise, start, unit)[: base + 1, : base + 1]
     return White(noise, total[1:, 1:] + np.diag(columns.known[:base]), total[1:, 0])
+
+
+def _units(columns: Columns) -> np.ndarray:
+    """[C] of coefficients and causes: simpler methods know nothing of a discrepancy."""
+    return columns.unit[: columns.linearised]
 
 
 def white_total(
