@@ -22,7 +22,7 @@ from shiplog.diagnosis.campaign_parts import parts_of, picked, products, robust_
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
-from shiplog.diagnosis.linear_segments import Linear
+from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_reference import Converged
 from shiplog.diagnosis.parameter_layout import Columns
@@ -32,6 +32,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
+ROUNDS = 3  # of deviations, noise and paths in turn
 NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
 
 
@@ -46,6 +47,7 @@ class Characteristics:
     share       how much of itself a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
     weight      [S] of each segment
+    path        of each segment, as a trial's segments have theirs: about the discrepancy
     """
 
     process_noise: ProcessNoise
@@ -55,6 +57,7 @@ class Characteristics:
     share: float
     noise: float
     weight: np.ndarray
+    path: Path
 
 
 @dataclass(frozen=True)
@@ -71,15 +74,16 @@ class NominalPass:
 
 def nominal_pass(
     model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
-    numbers: Mapping[str, np.ndarray] | None = None,
+    numbers: Mapping[str, np.ndarray] | None = None, pulled: bool = True,
 ) -> NominalPass:  # fmt: skip
-    """`numbers` of causes that the voyages have; none but on voyages that are not nominal."""
+    """`numbers` of causes that the voyages have; none but on voyages that are not nominal. Whether
+    the path has been `pulled` with them."""
     columns = nominal_reference.columns_of(model, setting, start)
     cut, moved, observed = read(model, setting, record, segments.begins(record), numbers)
     whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
     g, path = segments.grid(record), at.path
     wide = nominal_reference.wide_of(setting)
-    if numbers:
+    if not pulled:
         path = linearisation.pulled(model, whole, cut, g, wide, path)
     linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
     held = nominal_reference.anchored(start, at.theta, columns)
@@ -98,21 +102,29 @@ def characteristics(
     numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Characteristics:  # fmt: skip
     """Estimated from the nominal voyages, linearised at their converged coefficients `at`."""
-    made = nominal_pass(model, setting, start, record, at, numbers)
+    made = nominal_pass(model, setting, start, record, at, numbers, pulled=not numbers)
     columns, held, known = made.columns, made.held, made.columns.known
     process_noise = noise_time(made.linear, made.accelerations, columns, held, at.process_noise)
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
-    for last in (False, False, True):
+    for round_ in range(ROUNDS):
         modes = likelihood.modes(
             likelihood.weighed(made.linear, process_noise), process_noise
         ).joined(made.accelerations)
         each = products(modes, made.rows, columns.unit, weight)
         effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
-        if not last:  # what the parts disagree in is no noise, nor what a few segments are off by
-            weight = _weights(modes, made, effects)
-            process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
+        if round_ == ROUNDS - 1:
+            break
+        # what parts disagree in is no noise, nor what a few segments are off by
+        weight = _weights(modes, made, effects)
+        process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
+        expected = nominal_reference.discrepancy_here(
+            sum(each[1:], each[0]), effects.size**-2.0, columns
+        )
+        path = _path_about(model, record, at, made, expected, process_noise, numbers)
+        at = replace(at, path=path)
+        made = nominal_pass(model, setting, start, record, at, numbers)
     parts = [reduced(one, effects.deviation)[0] for one in each]
     voyages = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
     apart, share = campaign_prior.learn(parts, voyages, effects, held)
@@ -125,6 +137,21 @@ def characteristics(
         share,
         _noise(modes, made.rows, columns, effects, information, pull, weight),
         weight,
+        at.path,
+    )
+
+
+def _path_about(
+    model: Extended, record: Record, at: Converged, made: NominalPass, expected: np.ndarray,
+    process_noise: ProcessNoise, numbers: Mapping[str, np.ndarray] | None,
+) -> Path:  # fmt: skip
+    """The path of each segment about its model with the discrepancy, as firmly held as a trial's:
+    what is not linear must be the same in both."""
+    about = made.accelerations @ expected
+    whole = np.concatenate((at.theta, made.columns.numbers(numbers or {})))
+    hold = nominal_reference.hold(process_noise, process_noise.acceleration)
+    return linearisation.pulled(
+        model, whole, made.linear.cut, segments.grid(record), hold, at.path, about=about
     )
 
 

@@ -161,23 +161,31 @@ def pulled(
     wide: Wide,
     path: Path | None = None,
     rounds: int = 2,
+    about: np.ndarray | None = None,
 ) -> Path:
-    """Each segment's path onto what was measured: Gauss-Newton in start and knots."""
+    """Each segment's path onto what was measured: Gauss-Newton in start and knots.
+
+    about   [S, 3J] acceleration at the knots that is expected of it; none unless given
+    """
     path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
         y, z = simulated(model, theta, segments, path, g)
-        path = _closer(path, segments.y - y, z, segments.used, wide)
+        path = _closer(path, segments.y - y, z, segments.used, wide, about)
     return path
 
 
-def ahead(linear: Linear, d: np.ndarray, wide: Wide) -> Path:
+def ahead(linear: Linear, d: np.ndarray, wide: Wide, about: np.ndarray | None = None) -> Path:
     """Where a linearisation expects a path to be pulled once θ has moved by d [C], by one step of
-    Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there."""
+    Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there.
+    `about` as in `pulled`."""
     gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
-    return _closer(linear.path, gap, linear.z, linear.cut.used, wide)
+    return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)
 
 
-def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide) -> Path:
+def _closer(
+    path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide,
+    about: np.ndarray | None,
+) -> Path:  # fmt: skip
     """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
     that diverged stays where it was."""
     count, _, _, size = z.shape
@@ -188,10 +196,13 @@ def _closer(path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: 
     prior = np.concatenate((wide.start, np.repeat(wide.acceleration, path.acceleration.shape[-1])))
     weight = np.where(used, 1.0 / wide.noise, 0.0)
     scaled = (z * weight[..., None]).reshape(count, -1, size)
-    # the start is free about where it stands, the knots about zero
+    # the start is free about where it stands, the knots about what is expected of them
+    known = path.known
+    if about is not None:
+        known[:, 6:] -= about
     turned = np.swapaxes(scaled, 1, 2)
     normal = turned @ scaled + np.diag(prior**-2.0)
-    pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - path.known * prior**-2.0
+    pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - known * prior**-2.0
     step = np.linalg.solve(normal, pull[..., None])[..., 0]
     step[away] = 0.0
     return Path(

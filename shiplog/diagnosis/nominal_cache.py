@@ -16,7 +16,7 @@ import jax
 import numpy as np
 
 from shiplog import disk_cache, files
-from shiplog.diagnosis import campaign_characteristics, nominal_reference
+from shiplog.diagnosis import campaign_characteristics, discrepancy, nominal_reference
 from shiplog.diagnosis.campaign_characteristics import Characteristics
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Path
@@ -39,9 +39,8 @@ def converged(model: Extended, setting: Setting, start: Start, record: Record) -
     if known is not None:
         return _converged(known)
     log.info("the nominal voyages are fitted once for a model, and kept")
-    found = nominal_reference.converged(model, setting, start, record)
-    path = {"start": found.path.start, "acceleration": found.path.acceleration}
-    _keep(kept, {"theta": found.theta} | path | _process_noise(found.process_noise))
+    found = nominal_reference.converged(model, setting, start, record, seen=discrepancy.SEEN)
+    _keep(kept, {"theta": found.theta} | _of_path(found.path) | _process_noise(found.process_noise))
     return found
 
 
@@ -58,9 +57,10 @@ def characteristics(
         return Characteristics(
             _known_process_noise(known), given["deviation"], given["size"],
             float(known["apart"]), float(known["share"]), float(known["noise"]), known["weight"],
+            _path(known),
         )  # fmt: skip
     found = campaign_characteristics.characteristics(model, setting, start, record, at)
-    arrays = _process_noise(found.process_noise) | {
+    arrays = _of_path(found.path) | _process_noise(found.process_noise) | {
         "apart": found.apart, "share": found.share, "noise": found.noise, "weight": found.weight,
     }  # fmt: skip
     for name in ("deviation", "size"):
@@ -91,9 +91,15 @@ def _known_process_noise(arrays: dict) -> ProcessNoise:
 
 
 def _converged(arrays: dict) -> Converged:
-    return Converged(
-        arrays["theta"], Path(arrays["start"], arrays["acceleration"]), _known_process_noise(arrays)
-    )
+    return Converged(arrays["theta"], _path(arrays), _known_process_noise(arrays))
+
+
+def _of_path(path: Path) -> dict:
+    return {"start": path.start, "acceleration": path.acceleration}
+
+
+def _path(arrays: dict) -> Path:
+    return Path(arrays["start"], arrays["acceleration"])
 
 
 def _keep(kept: File, arrays: dict) -> None:

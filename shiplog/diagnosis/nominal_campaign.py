@@ -100,7 +100,7 @@ def learn(
     found: Characteristics,
 ) -> Campaign:  # fmt: skip
     """The campaign as a trial's causes see it, which depend on where the trial was."""
-    made = nominal_pass(model, setting, start, record, at)
+    made = nominal_pass(model, setting, start, record, replace(at, path=found.path))
     columns, held, families = made.columns, made.held, made.families
     process_noise, known = found.process_noise, made.columns.known
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
@@ -134,6 +134,9 @@ def learn(
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
+    total = np.sum([g[:count, :count] for g in every], axis=0)
+    weights = nominal_reference.discrepancy_here(total, size**-2.0, columns)
+    reference_made = replace(reference_made, expected=weights)
     return Campaign(
         reference_made, effects, families, unseen, tuple(every), voyage, found.apart,
         found.noise,
@@ -180,7 +183,7 @@ def assumed(
         return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
     at = nominal_reference.converged(
-        model, setting, start, record, rounds=0 if given else nominal_reference.ROUNDS
+        model, setting, start, record, 0 if given else nominal_reference.ROUNDS, discrepancy.SEEN
     )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference

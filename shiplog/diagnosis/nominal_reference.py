@@ -8,13 +8,21 @@ is divided by κ (a power prior, Ibrahim & Chen 2000).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from shiplog.diagnosis import input_misfit, likelihood, linearisation, segments
+from shiplog.diagnosis import (
+    discrepancy,
+    input_misfit,
+    likelihood,
+    linearisation,
+    segment_nodes,
+    segments,
+)
 from shiplog.diagnosis.input_misfit import Misfit
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path, Wide
@@ -26,9 +34,10 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-ROUNDS = 6  # of moving the coefficients to where they are linearised
-LONGEST_MOVE = 0.7  # plausible spreads that a coefficient moves in one round
-NEAR = 5.0  # nats, for which they are not moved on
+ROUNDS = 20  # of moving the coefficients to where they are linearised, at most
+LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
+NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
+AT_BOUNDS = 0.05  # plausible spreads: all that can still move has converged
 ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are estimated
 FREE = 2.0  # times the process noise: the allowed acceleration at a path's nodes
 KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
@@ -36,6 +45,9 @@ CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
 VOYAGES = 2.0  # and between voyages, together with the error of a network on all of them
 CAREFUL_KAPPA = 11.0  # of too few voyages
 UNREST_TIME = 4.0  # s, of a three-metre ship
+FIRST_SIZE = 1.0  # of a family's weights, in units of the process noise
+LEAST_SIZE = 0.01  # the same: a model without discrepancy has none of it
+SIZE_STEPS = 3  # of expectation-maximisation, of these sizes, each time
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 
 
@@ -53,6 +65,7 @@ class Reference:
     misfit       what is wrong of such a network's inputs
     counts       for how much of itself a trial counts: what is wrong there each voyage has its own
                  of
+    expected     [W] weights of the discrepancy that a path follows; none where None
     """
 
     model: Extended
@@ -72,6 +85,7 @@ class Reference:
     learned: bool = False
     misfit: Misfit | None = None
     counts: float = 1.0
+    expected: np.ndarray | None = None
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -97,19 +111,32 @@ class Reference:
             default=0.0,
         )
 
+    def about(self, cut: segments.Cut, g: segments.SegmentGrid) -> np.ndarray | None:
+        """Acceleration [S, 3J] that is expected at a path's knots: that of the discrepancy. A path
+        that had to do without would be off by more than the process noise, and what is not linear
+        in that would look like a change."""
+        if self.expected is None or self.misfit is None:
+            return None
+        return self.misfit.accelerations(cut, g) @ self.expected
+
     def held(self, noise_factor: float, intermittent: np.ndarray | None = None) -> Wide:
         """Allowed distance of a path where the process noise has this factor, and with an
         intermittent force."""
         acceleration = noise_factor * self.process_noise.acceleration
         if intermittent is not None:
             acceleration = np.hypot(acceleration, intermittent)
-        return Wide(self.process_noise.noise, self.wide.start, FREE * acceleration)
+        return hold(self.process_noise, acceleration)
 
     @property
     def coefficients(self) -> dict[str, np.ndarray]:
         """Of the ship's MMG, by name: the base's own, or those that stand in for a network's."""
         values = self.theta if self.model.own else np.asarray(self.model.stand_in_values)
         return dict(zip(self.model.stand_in.names, values, strict=True))
+
+
+def hold(process_noise: ProcessNoise, acceleration: np.ndarray) -> Wide:
+    """Allowed distance of a path with an acceleration [3] at its nodes."""
+    return Wide(process_noise.noise, process_noise.start, FREE * acceleration)
 
 
 def wide_of(setting: Setting) -> Wide:
@@ -143,14 +170,18 @@ class Converged:
 
 
 def converged(
-    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS
-) -> Converged:
-    """Coefficients moved to where they are linearised, all causes' numbers together with them;
-    without rounds they stay where they are."""
+    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS,
+    seen: Sequence[str] = (),
+) -> Converged:  # fmt: skip
+    """Coefficients moved to where they are linearised, all causes' numbers together with them, and
+    the discrepancy of the families `seen`; without rounds the coefficients stay where they are.
+
+    Without its discrepancy a model that describes the ship badly would be moved to coefficients,
+    and the noise to sizes, that make up for it."""
     columns = columns_of(model, setting, start)
     wide, g = wide_of(setting), segments.grid(record)
     cut, moved, observed = read(model, setting, record, segments.begins(record))
-    base, unit = columns.base, columns.unit
+    base, linearised = columns.base, columns.linearised
     theta = np.clip(start.values, start.low, start.high)
     of = record.timescale
     process_noise = ProcessNoise(
@@ -161,30 +192,107 @@ def converged(
         bin=of.bin,
         knot=of.knot,
     )
-    path = linear = None
-    whole, hold = np.concatenate((theta, np.zeros(len(unit) - base))), wide
+    families = discrepancy.of(
+        record.profile, process_noise.acceleration, linearised, seen, segment_nodes.at_knots(cut, g)
+    )
+    accelerations = families.accelerations(cut, g)
+    columns = columns.with_misfit(families.count)
+    sizes = {family.name: FIRST_SIZE for family in families.families}
+    path = linear = about = None
+    last = False
+    whole, firm = np.concatenate((theta, np.zeros(linearised - base))), wide
     for round_ in range(rounds + 1):
         if linear is None:
-            path = linearisation.pulled(model, whole, cut, g, hold)
+            path = linearisation.pulled(model, whole, cut, g, firm)
         else:
-            before, whole = whole, np.concatenate((theta, np.zeros(len(unit) - base)))
-            path = linearisation.ahead(linear, whole - before, hold)
+            before, whole = whole, np.concatenate((theta, np.zeros(linearised - base)))
+            path = linearisation.ahead(linear, whole - before, firm, about)
         held = anchored(start, theta, columns)
         linear = linearisation.linear(model, whole, cut, g, path, moved, observed)
-        found, _ = solved(linear, process_noise, columns, held)
-        process_noise = likelihood.learnt(linear, found * unit, process_noise, rounds=ON_THE_WAY)
-        hold = Wide(process_noise.noise, wide.start, FREE * process_noise.acceleration)
-        found, gain = solved(linear, process_noise, columns, held)
+        joint = _Joint(linear, accelerations, columns, held, families.families)
+        found, _ = joint.solved(process_noise, sizes)
+        process_noise = joint.noise(found, process_noise, ON_THE_WAY)
+        firm = hold(process_noise, process_noise.acceleration)
+        found, gain = joint.solved(process_noise, sizes)
+        about = accelerations @ joint.weights(process_noise, sizes)
         far = float(np.abs(found[:base]).max(initial=0.0))
-        if round_ == rounds or (gain < NEAR and far < LONGEST_MOVE):
-            process_noise = likelihood.learnt(linear, found * unit, process_noise, rounds=AT_REST)
+        if last or round_ == rounds or (gain < NEAR and far < CLOSE):
+            process_noise = joint.noise(found, process_noise, AT_REST)
             break
-        moved_to = theta + (found * unit)[:base] * min(1.0, LONGEST_MOVE / far)
+        moved_to = theta + (found * columns.unit)[:base] * min(1.0, LONGEST_MOVE / far)
         edge = 1e-6 * (start.high - start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
-        theta = np.clip(moved_to, start.low + edge, start.high - edge)
+        moved_to = np.clip(moved_to, start.low + edge, start.high - edge)
+        step = np.abs((moved_to - theta) / columns.unit[:base])
+        last, theta = float(step.max(initial=0.0)) < AT_BOUNDS, moved_to
     assert path is not None
     return Converged(theta, path, process_noise)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """Coefficients, causes' numbers and weights of the discrepancy on one linearised campaign.
+
+    accelerations  [S, 3J, W] of each weight; held [C] as `anchored` gives it
+    """
+
+    linear: Linear
+    accelerations: np.ndarray
+    columns: Columns
+    held: np.ndarray
+    families: Sequence[discrepancy.Family]
+
+    def solved(
+        self, process_noise: ProcessNoise, sizes: dict[str, float]
+    ) -> tuple[np.ndarray, float]:
+        """[C] most probable numbers, in units; and the log Bayes factor, in nats, of moving the
+        base's there in the linear model (half a Newton decrement). `sizes`, of each family's
+        weights, are estimated on the way."""
+        base, total = self.columns.base, self._total(process_noise)
+        for step in range(SIZE_STEPS + 1):
+            inverse = np.linalg.inv(total[1:, 1:] + np.diag(self._known(sizes)))
+            found = inverse @ (total[1:, 0] + self.held)
+            if step == SIZE_STEPS or not self.families:
+                break
+            for family in self.families:
+                at = family.columns
+                square = float((found[at] ** 2 + np.diagonal(inverse)[at]).mean())
+                sizes[family.name] = max(math.sqrt(square), LEAST_SIZE)
+        moved = found[:base]
+        return found, 0.5 * float(moved @ np.linalg.solve(inverse[:base, :base], moved))
+
+    def weights(self, process_noise: ProcessNoise, sizes: Mapping[str, float]) -> np.ndarray:
+        """[W] as `discrepancy_here` gives them."""
+        return discrepancy_here(self._total(process_noise), self._known(sizes), self.columns)
+
+    def _total(self, process_noise: ProcessNoise) -> np.ndarray:
+        by = np.concatenate(([1.0], self.columns.unit))
+        modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
+        modes = modes.joined(self.accelerations)
+        return modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
+
+    def _known(self, sizes: Mapping[str, float]) -> np.ndarray:
+        known = self.columns.known.copy()
+        for family in self.families:
+            known[family.columns] = sizes[family.name] ** -2.0
+        return known
+
+    def noise(self, found: np.ndarray, process_noise: ProcessNoise, rounds: int) -> ProcessNoise:
+        """Instrument and process noise of what these numbers [C] leave."""
+        count = self.columns.linearised
+        left = self.linear.less(self.accelerations @ found[count:])
+        numbers = (found * self.columns.unit)[:count]
+        return likelihood.learnt(left, numbers, process_noise, rounds=rounds)
+
+
+def discrepancy_here(total: np.ndarray, known: np.ndarray, columns: Columns) -> np.ndarray:
+    """[W] most probable weights of the discrepancy, all other numbers staying where they are
+    linearised: a path is simulated with those, and follows the discrepancy from there.
+
+    total   products [1 + C, 1 + C] of a campaign; known [C] information on its numbers
+    """
+    at = np.arange(columns.linearised, len(columns.unit))
+    return np.linalg.solve(total[np.ix_(1 + at, 1 + at)] + np.diag(known[at]), total[1 + at, 0])
 
 
 def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
@@ -196,19 +304,6 @@ def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
     pull = np.zeros(len(columns.unit))
     pull[: columns.base] = (start.values - theta) / columns.unit[: columns.base]
     return pull
-
-
-def solved(
-    linear: Linear, process_noise: ProcessNoise, columns: Columns, held: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """[C] most probable numbers of the campaign, in units; and the log Bayes factor, in nats, of
-    moving the base's there in the linear model (half a Newton decrement)."""
-    base, by = columns.base, np.concatenate(([1.0], columns.unit))
-    modes = likelihood.modes(likelihood.weighed(linear, process_noise), process_noise)
-    total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
-    inverse = np.linalg.inv(total[1:, 1:] + np.diag(columns.known))
-    found = inverse @ (total[1:, 0] + held)
-    return found, 0.5 * float(found[:base] @ np.linalg.solve(inverse[:base, :base], found[:base]))
 
 
 def learn(

@@ -153,12 +153,13 @@ class Trial:
             wide = ref.held(noise_factor, None if intermittent is None else np.array(intermittent))
         cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
+        about = ref.about(cut, self.grid)
         if isinstance(near, Point):
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
-            path = linearisation.ahead(near.linear, whole - stood, wide)
+            path = linearisation.ahead(near.linear, whole - stood, wide, about)
         else:
             path = linearisation.pulled(
-                ref.model, whole, cut, self.grid, wide, near, rounds=1 if near else 2
+                ref.model, whole, cut, self.grid, wide, near, 1 if near else 2, about
             )
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
@@ -180,7 +181,9 @@ class Trial:
         numbers = dict(point.numbers)
         cut, moved, observed = read(ref.model, ref.setting, self.record, rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-        path = linearisation.pulled(ref.model, whole, cut, self.grid, ref.wide)
+        path = linearisation.pulled(
+            ref.model, whole, cut, self.grid, ref.wide, about=ref.about(cut, self.grid)
+        )
         between = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )

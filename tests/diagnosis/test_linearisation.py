@@ -302,6 +302,32 @@ def test_a_path_is_pulled_onto_a_known_push():
     assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
 
 
+def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
+    """Held to what is expected, it is the true path at once; held to none, it has no acceleration
+    and is off. The same where a linearisation says where it will be."""
+    t = KNOT * np.arange(GRID.knots)
+    acceleration = np.stack(
+        (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
+    )
+    true = Path(SEEN.state[ROWS], np.tile(acceleration, (4, 1, 1)))
+    cut = simulated(true)
+    about = true.acceleration.reshape(4, -1)
+    firm = replace(WIDE, acceleration=1e-6 * WIDE.acceleration)
+    found = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3, about=about)
+    assert found.acceleration == pytest.approx(true.acceleration, abs=1e-5)
+    assert linearisation.simulated(Toy(), THETA, cut, found, GRID)[0] == pytest.approx(
+        cut.y, abs=1e-3
+    )
+    without = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3)
+    assert without.acceleration == pytest.approx(0.0, abs=1e-5)
+    off = linearisation.simulated(Toy(), THETA, cut, without, GRID)[0] - cut.y
+    assert np.abs(off).max() > 0.02
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    linear = linearisation.linear(Toy(), THETA, cut, GRID, without, *none)
+    ahead = linearisation.ahead(linear, np.zeros(4), firm, about)
+    assert ahead.acceleration == pytest.approx(true.acceleration, abs=1e-5)
+
+
 def test_a_path_is_pulled_on_a_longer_grid_too():
     """Segments of 60 s with knots of 4 s: the same pushes, found through `reading` and all."""
     viewed = replace(SEEN, timescale=Timescale(60.0, 4.0, 4.0))

@@ -15,6 +15,7 @@ from shiplog.diagnosis import (
     likelihood,
     nominal_campaign,
     nominal_reference,
+    segments,
     voyage_effects,
 )
 from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
@@ -116,12 +117,12 @@ def learned(model):
     numbers[columns.of["drag"]] = 0.5
     given = straight.passed(record, columns, numbers, sensitivity=0.3)
     at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
-    patch = pytest.MonkeyPatch()
-    patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
-    patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
-    found = campaign_characteristics.characteristics(model, SETTING, START, record, at)
-    made = nominal_campaign.learn(model, SETTING, START, record, at, found)
-    patch.undo()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
+        patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
+        patch.setattr(campaign_characteristics.linearisation, "pulled", lambda *_, **__: given.path)
+        found = campaign_characteristics.characteristics(model, SETTING, START, record, at)
+        made = nominal_campaign.learn(model, SETTING, START, record, at, found)
     return found, made
 
 
@@ -151,6 +152,26 @@ def test_characteristics_say_every_group_once(learned):
     assert max(found.size.values()) < 0.5
     # parts drawn with one process noise differ by what seven steps of a grid can tell
     assert 0.0 <= found.noise < 0.3
+
+
+def test_a_path_follows_the_discrepancy_with_all_other_numbers_where_they_are(learned):
+    """The weights that fit best while coefficients and causes stay, by ridge regression on rows;
+    a trial's path is expected to follow them."""
+    rng = np.random.default_rng(3)
+    columns = straight.columns_of(CAUSES[:2]).with_misfit(4)
+    count = len(columns.unit)
+    rows = rng.standard_normal((60, 1 + count))
+    known = rng.uniform(0.5, 2.0, count)
+    found = nominal_reference.discrepancy_here(rows.T @ rows, known, columns)
+    e, w = rows[:, 0], rows[:, -4:]
+    padded = np.concatenate((w, np.diag(np.sqrt(known[-4:]))))
+    wanted, *_ = np.linalg.lstsq(padded, np.concatenate((e, np.zeros(4))), rcond=None)
+    assert found == pytest.approx(wanted)
+    _, made = learned
+    ref, cut = made.reference, made.reference.nominal.cut
+    assert ref.expected.shape == (made.discrepancy.count,)
+    g = segments.grid(straight.sailed(24))
+    assert ref.about(cut, g) == pytest.approx(made.discrepancy.accelerations(cut, g) @ ref.expected)
 
 
 def test_columns_follow_one_another(learned):

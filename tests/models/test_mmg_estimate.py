@@ -6,7 +6,7 @@ from math import isfinite
 import pytest
 
 from shiplog import profile_file as profiles
-from shiplog.models.mmg import estimate
+from shiplog.models.mmg import estimate, parameters
 from shiplog.models.mmg.estimate import Particulars
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.profile import Ship, Site
@@ -213,6 +213,34 @@ def test_a_catamarans_draught_has_a_floor():
     found, said = estimate.particulars(named(length_m=1.2, breadth_m=0.93, mass_kg=15.0))
     assert found.draught == pytest.approx(0.0465)
     assert any("twentieth" in sentence for sentence in said)
+
+
+def test_masses_of_a_catamaran_are_within_their_spreads():
+    """The Otter of Fossen 2021: 2 m by 1.08 m, 55 kg on two pontoons of 0.25 m and a block
+    coefficient of 0.4; added sway mass 1.5 m, yaw inertia 2.7 m (0.25 L)²."""
+    draught = 55.0 / 998.0 / (2.0 * 0.4 * 0.25 * 2.0)
+    otter = Particulars(2.0, 1.08, draught, 55.0, 0.35, 0.0, 998.0, 0.3, 0.5)
+    start, spread = estimate.inertia(otter), estimate.inertia_spread(otter)
+    m_y = 1.5 * 55.0 / (0.5 * 998.0 * 2.0**2 * draught)
+    i_j = 2.7 * 55.0 * 0.5**2 / (0.5 * 998.0 * 2.0**4 * draught)
+    for key, known in (("m_y", m_y), ("i_j", i_j)):
+        assert 0.3 * spread[key] < known - start[key] < 2.0 * spread[key]
+    made = parameters.estimated(geometry_of(named(length_m=2.0))[0], otter)
+    at = [made.names.index(f"body.{key}") for key in ("m_y", "i_j")]
+    assert made.spread[at] == pytest.approx([spread["m_y"], spread["i_j"]])
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.2])
+def test_masses_of_a_slender_ship_are_as_the_regressions_say(ratio):
+    found = estimate.inertia_spread(box(3.0, 3.0 * ratio, 0.1, 0.7))
+    assert list(found.values()) == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_spreads_of_the_masses_grow_with_the_breadth():
+    found = [estimate.inertia_spread(box(3.0, 3.0 * ratio, 0.1, 0.7)) for ratio in (0.2, 0.3, 0.4)]
+    for key in ("m_y", "i_j"):
+        narrow, middle, broad = (one[key] for one in found)
+        assert narrow + 1e-4 < middle < broad - 1e-4
 
 
 def test_an_outline_gives_breadth_and_areas():

@@ -20,7 +20,7 @@ SALT, FRESH = 1025.0, 998.0  # kg/m³
 ASPECT = 1.5  # span over mean chord of a ship's rudder
 BLOCK_COEFFICIENTS = (0.35, 1.0)
 FULLEST = 0.2  # C_b B/L; a full tanker's is 0.15, and the regressions are of merchant ships
-BROADEST = 0.2  # B/L of the shape that the wind regression is evaluated for
+BROADEST = 0.2  # B/L of the broadest ships of the regressions
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +155,24 @@ def inertia(p: Particulars) -> dict[str, float]:
     j_z = strip * max(1 / 12 + 0.017 * full - 0.33 * ratio, 0.25 / 12)
     m_x = min(m_x, 0.2 * p.mass_nd)  # a ship's is less; a broad box by the formula has twice this
     return {"m_x": m_x, "m_y": m_y, "i_j": 0.25**2 * p.mass_nd + j_z}
+
+
+def inertia_spread(p: Particulars) -> dict[str, float]:
+    """Plausible spreads of sway mass and yaw inertia for a hull broader than the regressions'.
+
+    From B/L of 0.2, the broadest of their ships, to 0.4 they widen to half the way to a catamaran:
+    two slender hulls, each with its own strip of added mass (Newman 1977), and their masses 0.4 B
+    off the centre line. The Otter has 1.5 of its mass as added sway mass (Fossen 2021), where the
+    regressions' lower limit gives 0.3.
+    """
+    known = inertia(p)
+    strip, ratio = pi * p.draught / p.length, p.breadth / p.length
+    twin = {
+        "m_y": 2.0 * strip,
+        "i_j": (0.25**2 + (0.4 * ratio) ** 2) * p.mass_nd + 2.0 * strip / 12.0,
+    }
+    broad = _within((ratio - BROADEST) / BROADEST, 0.0, 1.0)
+    return {key: 0.5 * broad * max(twin[key] - known[key], 0.0) for key in twin}
 
 
 def hull(p: Particulars) -> dict[str, float]:

@@ -7,6 +7,7 @@ TOML of the same sections and keys, beside the ship's profile: `<profile>.mmg.to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -150,7 +151,13 @@ def estimated(geometry: Geometry, main: Particulars) -> Parameters:
         guess["thruster"] = {
             f"{t.name}_{k}": share for t in geometry.thrusters for k in ("ahead", "astern")
         }
-    return _from(geometry, guess, "empirical formulas from the particulars", widen=2.0)
+    found = _from(geometry, guess, "empirical formulas from the particulars", widen=2.0)
+    least = estimate.inertia_spread(main)
+    spread = found.spread.copy()
+    for key, value in least.items():
+        at = found.names.index(f"body.{key}")
+        spread[at] = max(spread[at], value)
+    return replace(found, spread=spread)
 
 
 def load(path: Path | str, geometry: Geometry, without: Iterable[str] = ()) -> Parameters:
