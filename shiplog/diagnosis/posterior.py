@@ -120,6 +120,14 @@ def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
     return (alone - nothing) / whole if whole > 0.0 else 1.0
 
 
+def share_of_remainder(table: Hypotheses, one: Hypothesis) -> float:
+    """Of what a hypothesis explains beyond nothing, the share that its remainder adds to the causes
+    with nominal process noise; all of it where these were not compared."""
+    whole = one.evidence - table.nothing.evidence
+    plain = table.found.get((one.causes, NOMINAL))
+    return 1.0 if plain is None or whole <= 0.0 else (one.evidence - plain.evidence) / whole
+
+
 def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:
     """The likeliest hypothesis that contains all of these names, each in its likeliest kind; of one
     kind of remainder where that is given."""

@@ -5,7 +5,8 @@ interval of its gain on held-out windows lies below zero. The search then goes o
 probabilities are those of the hypotheses that do not contain it.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
-are then named only if the whole interval is a gain.
+are then named only if the whole interval is a gain. A remainder so slight that it can be an error
+of the causes' own equations puts none in doubt.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
+from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import result as decisions
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.posterior import Posterior
 from shiplog.diagnosis.result import Decision
@@ -31,6 +34,14 @@ class Judge(Protocol):
     def worth(self, rest: Decision, decision: Decision) -> Gain:
         """Of a decision over one with a cause less."""
         ...
+
+
+def _in_doubt(search: Search, found: Posterior, decision: Decision) -> bool:
+    """Whether a remainder is stated that is more than an error of the causes' equations."""
+    if found.remainder is None:
+        return False
+    best = posteriors.best_with(found, [one.cause.name for one in decision.named])
+    return posteriors.share_of_remainder(search.table, best) > thresholds.SLIGHT
 
 
 def judged(
@@ -53,7 +64,7 @@ def judged(
             worths = [held.worth(rest, decision) for rest in rests]
         asked = list(zip(decision.named, worths, strict=True))
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
-        if not worse and found.remainder is not None and not gain.real:
+        if not worse and not gain.real and _in_doubt(search, found, decision):
             why = (
                 "the catalogue does not explain all of the trial, so a cause is named only if it "
                 f"surely reduces the held-out error: here by {gain.low:.1%} to {gain.high:.1%}"

@@ -1,6 +1,6 @@
 """Every number that a verdict depends on: name, unit, reason. No other module decides by a number.
 
-Eight decide between hypotheses. The others say when there is nothing to decide on, and what is
+Nine decide between hypotheses. The others say when there is nothing to decide on, and what is
 listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
 factor.
 """
@@ -31,6 +31,11 @@ FORM_ERROR = 0.02
 # where it explains more than the remainder does, and where the remainder could do no more than this
 # share of what the cause does.
 MOST = 0.5
+
+# Share of what a hypothesis explains. A remainder that adds no more than this is an error of the
+# causes' equations: a seventh of a force, since the evidence goes with the square. It puts no name
+# in doubt.
+SLIGHT = 0.02
 
 # Share of the held-out error. Where a plain regression leaves less than this share of the model's
 # error, the model lacks a force: causes that change forces are not tested.

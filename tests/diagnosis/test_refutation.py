@@ -75,6 +75,18 @@ def test_beside_a_remainder_an_unsure_gain_names_nothing(trial, interval):
     assert f"by {interval[0]:.1%} to {interval[1]:.1%}" in decision.rejected["drag"]
 
 
+@pytest.mark.parametrize(("adds", "verdict"), [(1.9, "named"), (2.5, "unknown")])
+def test_a_remainder_that_adds_little_is_an_error_of_the_equations(trial, adds, verdict):
+    """The cause explains 100 nats; a remainder of 2 % is a seventh of its force."""
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.01, (DRAG, RAISED): 0.99},
+        evidence={(DRAG, NOMINAL): 100.0, (DRAG, RAISED): 100.0 + adds},
+    )  # fmt: skip
+    decision, found, _, _ = judged(made, HeldOut({DRAG: UNSURE}))
+    assert found.remainder == RAISED
+    assert decision.verdict == verdict
+
+
 def test_beside_a_remainder_a_sure_gain_names_the_cause(trial):
     held = HeldOut({DRAG: BETTER})
     decision, _, gained, _ = judged(weighed.search(trial, {(DRAG, RAISED): 1.0}), held)
