@@ -1,7 +1,8 @@
 """Progress on stderr with the time left, in a terminal only.
 
-`Bars` shows a queue of trainings, `tracked` a list of files, and `staged` the stages of a function.
-In a file, a queue leaves a line now and then; the other two leave nothing.
+`Bars` shows a queue of trainings, `tracked` a list of files, `staged` the stages of a function, and
+`loading` that libraries are being loaded. In a file, a queue leaves a line now and then; the others
+leave nothing.
 """
 
 from __future__ import annotations
@@ -179,6 +180,20 @@ _CURRENT: ContextVar[_StageBar | None] = ContextVar("bar", default=None)
 def drawable() -> bool:
     """Whether a bar can be drawn: stderr is a terminal."""
     return sys.stderr.isatty()
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Say, in a terminal, that libraries are being loaded: torch and JAX take seconds."""
+    if not drawable() or _CURRENT.get() is not None:
+        yield
+        return
+    sys.stderr.write("loading")
+    sys.stderr.flush()
+    try:
+        yield
+    finally:
+        sys.stderr.write("\r\x1b[K")  # over it, to the end of the line
 
 
 @contextmanager
