@@ -23,6 +23,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
+LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
 BYTES_PER_S = 1.5e6  # of a log, ingested or checked; a first guess that the finished logs correct
 
 
@@ -65,7 +66,7 @@ class Bars:
 
     def _line(self, done: float) -> None:
         now = time.monotonic()
-        if now - self._latest < LINE_S or done <= 0.0:
+        if now - self._latest < LINE_S or done < LEAST_DONE:
             return
         self._latest = now
         left = (now - self._began) * (1.0 - done) / done

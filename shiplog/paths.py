@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from shiplog.exceptions import RunError, ShiplogError
+from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
 
 
 def sample_logs(given: Path | None = None) -> Path:
@@ -31,6 +31,12 @@ def refuse_taken(path: Path, option: str = "--out") -> None:
     """Raises RunError where something is there already."""
     if path.exists():
         raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
+
+
+def check_there(path: Path, what: str) -> None:
+    """Raises LogUnreadable where there is no such path. `what`: what may be given instead."""
+    if not path.exists():
+        raise LogUnreadable(f"{path} does not exist.", hint=f"give the path of {what}.")
 
 
 def check_writable(path: Path, option: str) -> None:
