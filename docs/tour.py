@@ -2,8 +2,7 @@
 # # From logs to a verdict, in Python
 #
 # Run this from a clone of shiplog, as a script or cell by cell. The ship of `sample_logs` is
-# simulated, and its key is in `sample_logs/README.md`. What you see of your own ship is what its
-# logs hold.
+# simulated; what is hidden in its logs stands in `sample_logs/answers`.
 
 # %%
 import shiplog

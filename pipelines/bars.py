@@ -1,7 +1,8 @@
 """Progress on stderr with the time left, in a terminal only.
 
-`Bars` shows a queue of trainings, `tracked` a list of files, and `staged` the stages of a function.
-In a file, a queue leaves a line now and then; the other two leave nothing.
+`Bars` shows a queue of trainings, `tracked` a list of files, `staged` the stages of a function, and
+`loading` that libraries are being loaded. In a file, a queue leaves a line now and then; the others
+leave nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
+LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
 BYTES_PER_S = 1.5e6  # of a log, ingested or checked; a first guess that the finished logs correct
 
 
@@ -64,7 +66,7 @@ class Bars:
 
     def _line(self, done: float) -> None:
         now = time.monotonic()
-        if now - self._latest < LINE_S or done <= 0.0:
+        if now - self._latest < LINE_S or done < LEAST_DONE:
             return
         self._latest = now
         left = (now - self._began) * (1.0 - done) / done
@@ -179,6 +181,20 @@ _CURRENT: ContextVar[_StageBar | None] = ContextVar("bar", default=None)
 def drawable() -> bool:
     """Whether a bar can be drawn: stderr is a terminal."""
     return sys.stderr.isatty()
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Say, in a terminal, that libraries are being loaded: torch and JAX take seconds."""
+    if not drawable() or _CURRENT.get() is not None:
+        yield
+        return
+    sys.stderr.write("loading")
+    sys.stderr.flush()
+    try:
+        yield
+    finally:
+        sys.stderr.write("\r\x1b[K")  # over it, to the end of the line
 
 
 @contextmanager

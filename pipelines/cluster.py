@@ -10,7 +10,7 @@ from pathlib import Path
 import polars as pl
 
 from pipelines.bars import Bars
-from pipelines.train import training_of
+from pipelines.train_networks import training_of
 from shiplog.training import cluster, load_model, run_folder, seed_files
 from shiplog.training.network_training import share_done
 from shiplog.training.queue import Task

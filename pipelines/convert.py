@@ -18,6 +18,7 @@ from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.logs.write import Series, write_log
+from shiplog.paths import check_there
 from shiplog.profile import Profile
 from shiplog.unexpected import unexpected
 from shiplog.voyages.draft_profile import draft as draft_log
@@ -78,6 +79,7 @@ def _free(target: Path) -> Path:
 
 
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
+    check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table a topic")
     ship = profile.ship.name if profile else path.stem
     target = out / f"{path.stem if path.is_file() else path.name}.mcap"
     if is_bag(path):

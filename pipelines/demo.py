@@ -11,9 +11,9 @@ from pipelines.diagnose import diagnose_run
 from pipelines.evaluate import compare_runs
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
-from pipelines.train import train_run
-from shiplog.cli.arguments import sample_logs
+from pipelines.train_networks import train_run
 from shiplog.exceptions import ShiplogError, listed
+from shiplog.paths import sample_logs
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.store import Store

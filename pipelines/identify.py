@@ -30,7 +30,8 @@ from shiplog.training.provenance import Answer, provenance
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
 from shiplog.training.setup import Prepared, prepare
-from shiplog.voyages.split import choose_physical_split, plan, refuse_shared_rows, say
+from shiplog.voyages.split import plan, refuse_shared_rows
+from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
@@ -277,22 +278,17 @@ def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
     )
 
 
-def identify_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
+def identify_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
     """`shiplog train` of a physical model."""
     if not MODELS[options.model].residual and options.seeds > 1:
         log.info("an identification draws nothing: one seed stands for all")
         options = replace(options, seeds=1)
-    store = Store(store_path)
-    split = choose_physical_split(
-        store, options.voyages, options.validation, options.data, options.window
-    )
-    say(split)
     run, notes = identify_run(options.config(split), store, out, options.parameters)
     identified = run.identified()
     lines = [f"{run.label} in {run.path}.", *notes, ""]
     if options.fit:
         lines += [tables.parameters_table(identified), ""]
-    lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
+    lines.append(f"Next: shiplog evaluate {run.path} --store {store.path}")
     content = {
         "contract": CONTRACT,
         "run": str(run.path),

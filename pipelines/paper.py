@@ -9,7 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
-from pipelines import train
+from pipelines import train_networks
 from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from shiplog import files
 from shiplog.channels import VELOCITY
@@ -172,7 +172,7 @@ def train_sets(
 ) -> tuple[dict[str, RunFolder], dict[str, str]]:
     """Every training of every set in one queue. Finished sets, and trainings that failed."""
     finished: dict[str, RunFolder] = {}
-    begun: dict[str, train.Begun] = {}
+    begun: dict[str, train_networks.Begun] = {}
     failures: dict[str, str] = {}
     tasks: list[Task] = []
     for name, config in configs.items():
@@ -181,20 +181,20 @@ def train_sets(
             if path.is_dir():
                 finished[name] = _same(run_folder.open_finished(path), config)
                 continue
-            begun[name] = train.begin(config, store, path)
+            begun[name] = train_networks.begin(config, store, path)
         except ShiplogError as error:  # such as a folder that is of other settings
             failures[name] = str(error)
             continue
-        tasks += train.tasks_of(begun[name].run)
+        tasks += train_networks.tasks_of(begun[name].run)
     if tasks and ray is not None:
         from pipelines import cluster
 
         failures |= cluster.do(tasks, ray)
     elif tasks:
-        failures |= train.do(tasks, jobs)
+        failures |= train_networks.do(tasks, jobs)
     for name, one in begun.items():
         if all(one.run.finished(seed) for seed in one.run.config.seeds):
-            finished[name] = train.finish(one)
+            finished[name] = train_networks.finish(one)
     return {name: finished[name] for name in configs if name in finished}, failures
 
 

@@ -6,13 +6,37 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from shiplog.exceptions import RunError, ShiplogError
+from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
+
+
+def sample_logs(given: Path | None = None) -> Path:
+    """The folder of logs for the demo: the one given, or that of the checkout this runs from.
+    Raises ShiplogError."""
+    if given is not None:
+        if not any(given.glob("*.mcap")):
+            raise ShiplogError(f"No log in {given}.", hint="give --logs a folder of MCAP logs.")
+        return given
+    here = (Path.cwd(), Path(__file__).resolve().parents[1])
+    for folder in here:
+        if any((folder / "sample_logs").glob("*.mcap")):
+            return folder / "sample_logs"
+    raise ShiplogError(
+        f"There is no folder sample_logs in {here[0]}.",
+        hint="run the demo from a clone of shiplog, or make the logs again with "
+        "`python -m pipelines.experiments.simulated_ship sample_logs` and give them with --logs.",
+    )
 
 
 def refuse_taken(path: Path, option: str = "--out") -> None:
     """Raises RunError where something is there already."""
     if path.exists():
         raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
+
+
+def check_there(path: Path, what: str) -> None:
+    """Raises LogUnreadable where there is no such path. `what`: what may be given instead."""
+    if not path.exists():
+        raise LogUnreadable(f"{path} does not exist.", hint=f"give the path of {what}.")
 
 
 def check_writable(path: Path, option: str) -> None:

@@ -16,7 +16,7 @@ import polars as pl
 from pipelines.convert import convert
 from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from pipelines.prepare import expand, ingest_logs
-from pipelines.train import train_run
+from pipelines.train_networks import train_run
 from shiplog import profile_file as profiles
 from shiplog.training.run_config import Config
 from shiplog.voyages.split_settings import Split

@@ -26,7 +26,7 @@ from pipelines.evaluate import comparison, evaluate_runs
 from pipelines.experiments.esso_osaka import TWIN, published_split, trials_store
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
-from pipelines.train import train_run
+from pipelines.train_networks import train_run
 from shiplog.report import tables, viewer
 from shiplog.training.run_config import Config
 from shiplog.voyages.split import choose_split

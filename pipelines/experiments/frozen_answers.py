@@ -96,7 +96,7 @@ def compare(before: Path, after: Path) -> str:
         if not other.exists():
             rows.append((path.stem, "-", "-", "-", "not there"))
             continue
-        old, new = dict(_leaves(_read(path))), dict(_leaves(_read(other)))
+        old, new = dict(_leaves(_read(path, before))), dict(_leaves(_read(other, after)))
         off = {at: _difference(old.get(at), new.get(at)) for at in old.keys() | new.keys()}
         differ = {at for at, by in off.items() if by > EQUAL}
         sentences = {at for at in differ if _is_sentence(old.get(at)) and _is_sentence(new.get(at))}
@@ -113,8 +113,9 @@ def _is_sentence(value: object) -> bool:
     return isinstance(value, str) and " " in value
 
 
-def _read(path: Path) -> object:
-    return json.loads(path.read_text(encoding="utf-8"))
+def _read(path: Path, folder: Path) -> object:
+    """An answer; paths in it as seen from the folder of all answers."""
+    return json.loads(path.read_text(encoding="utf-8").replace(str(folder.resolve()), ""))
 
 
 def _leaves(value: object, at: str = "") -> Iterator[tuple[str, object]]:

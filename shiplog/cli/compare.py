@@ -33,7 +33,10 @@ def compare(
     check_runs(runs, store, voyages, cause)
     if save is not None:
         check_file(save, "--save")
-    from pipelines.evaluate import compare_runs
+    from pipelines.bars import loading
+
+    with loading():
+        from pipelines.evaluate import compare_runs
     from shiplog.voyages.store import Store
 
     result = compare_runs(runs, Store(store), voyages or [], save, cause or [])

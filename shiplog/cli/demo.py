@@ -20,16 +20,18 @@ def demo(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """The main job on sample_logs: ingest, train, evaluate, compare.
+    """The main job on sample_logs: ingest, train, evaluate, compare, diagnose.
 
     Example: shiplog demo --out demo --no-view
     """
-    from shiplog.cli.arguments import sample_logs
-    from shiplog.paths import check_writable
+    from shiplog.paths import check_writable, sample_logs
 
     check_writable(out, "--out")
     folder = sample_logs(logs)
-    from pipelines.demo import run_demo
+    from pipelines.bars import loading
+
+    with loading():
+        from pipelines.demo import run_demo
 
     result = run_demo(out, folder)
     answer(result.text, result.content, json_to)

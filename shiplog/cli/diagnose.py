@@ -36,7 +36,10 @@ def diagnose(
     if extend is not None:
         refuse_taken(extend, "--extend")
         check_writable(extend, "--extend")
-    from pipelines.diagnose import diagnose_command
+    from pipelines.bars import loading
+
+    with loading():
+        from pipelines.diagnose import diagnose_command
 
     found = diagnose_command(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []

@@ -24,7 +24,10 @@ def evaluate(
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """
     check_runs([run], store, voyages, cause)
-    from pipelines.evaluate import evaluate_runs, save
+    from pipelines.bars import loading
+
+    with loading():
+        from pipelines.evaluate import evaluate_runs, save
     from shiplog.voyages.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])

@@ -56,7 +56,10 @@ def paper(
         TrainOptions(data=name, recipe=recipe).check()
     check_writable(out, "--out")
     check_voyages(store, voyages, validation)
-    from pipelines.paper import paper_command
+    from pipelines.bars import loading
+
+    with loading():
+        from pipelines.paper import paper_command
 
     found = paper_command(
         store,

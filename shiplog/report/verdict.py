@@ -230,49 +230,59 @@ def sentence(
     wrong   share of the error in each channel, before any cause is included
     """
     if verdict == "named":
-        text = " ".join(_likely(cause) for cause in causes)
-        if gain is None:
-            return text
-        if gain.real:
-            share = (
-                f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
-                f"explained ({gain.low:.0%} to {gain.high:.0%})."
-            )
-        else:
-            share = (
-                f"No part of the error on {gain.windows} held-out windows is surely explained: it "
-                f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
-            )
-        text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
-        if alone is None:
-            return text
-        return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
+        return _named(causes, gain, alone, wrong)
     if verdict == "undecided":
         text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in ranking[:3]]
         sure = f"{thresholds.STATED:.0%}"
         return f"Undecided: {' or '.join(text)}. No answer has a probability of {sure}."
     if verdict == "unknown":
         assert structure is not None
-        if structure["family"] == "intermittent":
-            return (
-                "Outside the catalogue: an intermittent side force acts on the ship, and no device "
-                "of known place and pattern explains it."
-            )
-        if structure["family"] == "stochastic":
-            return (
-                f"Outside the catalogue: process noise is {noise_factor:.1f} times its nominal "
-                "standard deviation, and no cause explains that."
-            )
-        return (
-            f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
-            f"{listed(structure['depends_on'])}."
-        )
+        return _unknown(structure, noise_factor)
     if verdict == "coverage":
         return "Not trained in these conditions: record data there first, then diagnose again."
     if verdict == "external":
         return "The ship was pushed, held or towed: no force of its own explains these intervals."
     return (
         "No change found: the errors are those that the model already has on its nominal voyages."
+    )
+
+
+def _named(
+    causes: Sequence[dict], gain: Gain | None, alone: float | None, wrong: Sequence[dict]
+) -> str:
+    text = " ".join(_likely(cause) for cause in causes)
+    if gain is None:
+        return text
+    if gain.real:
+        share = (
+            f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
+            f"explained ({gain.low:.0%} to {gain.high:.0%})."
+        )
+    else:
+        share = (
+            f"No part of the error on {gain.windows} held-out windows is surely explained: it "
+            f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
+        )
+    text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
+    if alone is None:
+        return text
+    return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
+
+
+def _unknown(structure: dict, noise_factor: float) -> str:
+    if structure["family"] == "intermittent":
+        return (
+            "Outside the catalogue: an intermittent side force acts on the ship, and no device "
+            "of known place and pattern explains it."
+        )
+    if structure["family"] == "stochastic":
+        return (
+            f"Outside the catalogue: process noise is {noise_factor:.1f} times its nominal "
+            "standard deviation, and no cause explains that."
+        )
+    return (
+        f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
+        f"{listed(structure['depends_on'])}."
     )
 
 

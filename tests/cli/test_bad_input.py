@@ -191,7 +191,7 @@ PROFILES = {
 }  # fmt: skip
 
 TABLES = {
-    "no such table": (1, ["is no table"], lambda d: d.convert("nowhere.csv")),
+    "no such table": (1, ["does not exist"], lambda d: d.convert("nowhere.csv")),
     "no table": (1, ["is no table"], lambda d: d.convert(d.file("t.xlsx", b"PK"))),
     "rubbish Parquet": (1, ["cannot be read"], lambda d: d.convert(d.file("t.parquet", b"PAR1x"))),
     "empty CSV": (1, ["is no table"], lambda d: d.convert(d.file("t.csv"))),

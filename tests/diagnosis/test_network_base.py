@@ -10,7 +10,7 @@ from safetensors.numpy import load_file, save_file
 from pipelines.diagnose import diagnose_run
 from pipelines.experiments.simulated_ship import cases, sensors
 from pipelines.prepare import ingest_logs
-from pipelines.train import train_run
+from pipelines.train_networks import train_run
 from shiplog.diagnosis import evidence, fits, network_base, setup
 from shiplog.diagnosis import trial_voyages as trials
 from shiplog.diagnosis.fitted import Fit

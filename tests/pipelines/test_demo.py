@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from rerun.chunk import RrdReader
 
 from pipelines import demo
-from shiplog.cli.arguments import sample_logs
+from shiplog.paths import sample_logs
 from shiplog.training.run_config import Fast
 from shiplog.voyages.store import Store
 

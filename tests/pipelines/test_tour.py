@@ -1,5 +1,6 @@
 """The notebook of the documentation, executed as a user does, on fewer and shorter logs."""
 
+import ast
 import runpy
 from pathlib import Path
 
@@ -39,6 +40,32 @@ def test_its_results_are_frames_and_files(tour):
     assert found.ranking["probability"].sum() <= 1.0 + len(found.causes)
     assert found.verdict.sentence in str(found) and str(found) == found._repr_markdown_()
     assert (folder / found.report).read_text(encoding="utf-8").startswith("# Diagnosis")
+
+
+def test_the_ten_lines_of_the_readme_are_calls_of_the_notebook():
+    """With the same arguments; the notebook may give further ones."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = calls(readme.split("```python\n")[1].split("```")[0])
+    notebook = calls((ROOT / "docs" / "tour.py").read_text(encoding="utf-8"))
+    assert list(lines) == ["ingest", "train", "evaluate", "compare", "diagnose"]
+    for name, arguments in lines.items():
+        assert arguments <= notebook[name], name
+
+
+def calls(code: str) -> dict[str, set[str]]:
+    """Function of shiplog → its arguments, of every call in the order of the lines."""
+    found = [
+        node
+        for node in ast.walk(ast.parse(code))
+        if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("shiplog.")
+    ]
+    return {
+        ast.unparse(node.func).removeprefix("shiplog."): {
+            *(ast.unparse(one) for one in node.args),
+            *(f"{one.arg}={ast.unparse(one.value)}" for one in node.keywords),
+        }
+        for node in sorted(found, key=lambda node: node.lineno)
+    }
 
 
 def test_what_was_made_opens_again(tour):

@@ -3,7 +3,7 @@
 import pytest
 import sailing
 
-from pipelines.train import train_run
+from pipelines.train_networks import train_run
 from shiplog.exceptions import StoreError
 from shiplog.training.run_config import Config
 from shiplog.voyages.parts import overlap, parse

@@ -18,8 +18,10 @@ from shiplog.models.mmg.geometry import Geometry
 from shiplog.simulation.sensitivities import WindowSeries
 
 cs: Any = casadi  # SWIG's generated stubs do not know SX's operators
+Named = dict[str, Any]  # a part's coefficients, by what follows the dot in their names
+Force = tuple[Any, Any, Any]  # X, Y, N at midship
 
-PITCH_RATIO, AIR_DENSITY = 0.7151, 1.225
+PITCH_RATIO, AIR_DENSITY, GRAVITY = 0.7151, 1.225, 9.80665
 STILL = 1e-12  # m²/s²
 COMPILED = {
     "jit": True,
@@ -53,107 +55,123 @@ def _crossflow(v: Any, a: Any) -> tuple[Any, Any]:
     return cs.if_else(one_sided, same, both), cs.if_else(one_sided, cs.fabs(v) * a / 6.0, moment)
 
 
-def acceleration(
-    g: Geometry, names: Sequence[str], theta: Any, x: Any, actuator: Any, wind: Any
-) -> Any:
-    """u̇, v̇, ṙ of x = (x₀, u, y₀, v, ψ, r) and the true wind (from, along x₀ and y₀)."""
-    p = {name: theta[i] for i, name in enumerate(names)}
-    (screw,), (blade,) = g.propellers, g.rudders
-    size, d, rho = g.length, screw.diameter, g.density
-    q = 0.5 * rho * size * g.draught
-    u, v, psi, r = x[1], x[3], x[4], x[5]
-    delta, n = actuator[blade.column], actuator[screw.column]
-    still = u * u + v * v < STILL
-    total = _root(u * u + v * v)
+def _hull(p: Named, g: Geometry, u: Any, v: Any, r: Any) -> Force:
+    """Resistance over the drift angle, damping, cross-flow drag, and what needs no headway."""
+    size, q = g.length, 0.5 * g.density * g.length * g.draught
+    beta = cs.fabs(cs.atan2(v, cs.if_else(u * u + v * v < STILL, 1.0, u)))
+    straight = p["x_0f"] + (p["x_0a"] - p["x_0f"]) * beta / math.pi
+    force, _ = _crossflow(v, p["c_ry"] * size * r)
+    _, moment = _crossflow(v, p["c_rn"] * size * r)
+    x = q * (straight * u * _root(u * u + v * v) + p["x_vr"] * size * v * r)
+    y = q * (p["y_v"] * v * cs.fabs(u) + p["y_r"] * size * r * u - p["c_d"] * force)
+    n = p["n_v"] * v * u + p["n_r"] * size * r * cs.fabs(u) - p["c_d"] * moment
+    bis = math.sqrt(GRAVITY * size)  # m/s
+    x += q * bis * p["x_u"] * u
+    y += q * bis * (p["y_vl"] * v + p["y_rl"] * size * r)
+    n += bis * (p["n_vl"] * v + p["n_rl"] * size * r)
+    return x, y, q * size * n
 
-    def hull(key: str) -> Any:
-        return p[f"hull.{key}"]
 
-    beta = cs.fabs(cs.atan2(v, cs.if_else(still, 1.0, u)))
-    straight = hull("x_0f") + (hull("x_0a") - hull("x_0f")) * beta / math.pi
-    force, _ = _crossflow(v, hull("c_ry") * size * r)
-    _, moment = _crossflow(v, hull("c_rn") * size * r)
-    x_h = q * (straight * u * total + hull("x_vr") * size * v * r)
-    y_h = q * (hull("y_v") * v * cs.fabs(u) + hull("y_r") * size * r * u - hull("c_d") * force)
-    n_h = hull("n_v") * v * u + hull("n_r") * size * r * cs.fabs(u) - hull("c_d") * moment
-    n_h *= q * size
-
-    def prop(key: str) -> Any:
-        return p[f"propeller.{key}"]
-
+def _propeller(p: Named, g: Geometry, n: Any, u: Any, v: Any, r: Any) -> tuple[Force, Any, Any]:
+    """Forces; the share of u that arrives at the screw; K_T."""
+    (screw,) = g.propellers
+    d, q = screw.diameter, 0.5 * g.density * g.length * g.draught
     stopped = n == 0.0
     j_s = u / (cs.if_else(stopped, 1.0, n) * d)
-    aside = (v + screw.ahead * r) / total
-    wake = prop("w_p0") - prop("tau") * cs.fabs(aside) - prop("c_p") * aside**2
+    aside = (v + screw.ahead * r) / _root(u * u + v * v)
+    wake = p["w_p0"] - p["tau"] * cs.fabs(aside) - p["c_p"] * aside**2
     arriving = cs.if_else(u > 0.0, cs.fmin(cs.fmax(1.0 - wake, 1e-9), 1.0), 1.0)
     j = j_s * arriving  # astern nothing is lost: 1
-    k_ahead = prop("k0") + prop("k1") * j + prop("k2") * j**2
-    k_astern = cs.if_else(j_s >= prop("c10"), prop("c6") + prop("c7") * j_s, prop("c3"))
+    k_ahead = p["k0"] + p["k1"] * j + p["k2"] * j**2
+    k_astern = cs.if_else(j_s >= p["c10"], p["c6"] + p["c7"] * j_s, p["c3"])
     k_t = _choose(stopped, 0.0, n > 0.0, k_ahead, k_astern)
-    thrust = rho * d**4 * n**2
-    x_p = thrust * cs.if_else(n > 0.0, (1.0 - prop("t")) * k_ahead, k_astern)
+    thrust = g.density * d**4 * n**2
+    x = thrust * cs.if_else(n > 0.0, (1.0 - p["t"]) * k_ahead, k_astern)
 
     def side(letter: str) -> Any:
-        c = [prop(f"{letter}{i}") for i in range(1, 9)]
+        c = [p[f"{letter}{i}"] for i in range(1, 9)]
         middle = cs.if_else(j_s <= -0.06, c[0] + c[1] * j_s, c[4])
         reversing = cs.if_else(j_s < -0.35, c[2] + c[3] * j_s, middle)
         braking = PITCH_RATIO**2 * (c[5] * j_s**2 + c[6] * j_s + c[7])
         return _choose(n < 0.0, reversing, cs.logic_and(n > 0.0, u < 0.0), braking, 0.0)
 
-    y_p = q * (n * d) ** 2 * side("a")
-    n_p = q * size * (n * d) ** 2 * side("b")
+    force = x, q * (n * d) ** 2 * side("a"), q * g.length * (n * d) ** 2 * side("b")
+    return force, arriving, k_t
 
-    def rud(key: str) -> Any:
-        return p[f"rudder.{key}"]
 
+def _rudder(
+    p: Named, g: Geometry, delta: Any, n: Any, u: Any, v: Any, r: Any, arriving: Any, k_t: Any
+) -> Force:
+    """One rudder in the slipstream of the screw that turns n times a second."""
+    (screw,), (blade,) = g.propellers, g.rudders
+    d, size = screw.diameter, g.length
     eta = d / blade.span
-    eps, u_p = rud("eps"), u * arriving
+    eps, u_p = p["eps"], u * arriving
     jet = 8.0 * n**2 * d**2 / math.pi
     far = _root(u_p**2 + jet * cs.fmax(k_t, 0.0))
-    inside = u_p + rud("k_x") / eps * (far - u_p)
+    inside = u_p + p["k_x"] / eps * (far - u_p)
     driven = eps * _root(eta * inside**2 + (1.0 - eta) * u_p**2)
     u_b = eps * u_p
-    u_a = u_b + n * d * rud("k_xr") * _root(8.0 / math.pi * cs.fabs(k_t))
-    signed = eta * cs.sign(u_a) * u_a**2 + (1.0 - eta) * u_b**2 + rud("c_pr") * u**2
+    u_a = u_b + n * d * p["k_xr"] * _root(8.0 / math.pi * cs.fabs(k_t))
+    signed = eta * cs.sign(u_a) * u_a**2 + (1.0 - eta) * u_b**2 + p["c_pr"] * u**2
     coasting = cs.sign(signed) * _root(cs.fabs(signed))
     pushing = cs.logic_and(n > 0.0, k_t > 0.0)
     u_r = _choose(pushing, driven, u >= 0.0, coasting, u)
-    gamma = cs.if_else(v + blade.ahead * r >= 0.0, rud("gamma_p"), rud("gamma_n"))
-    v_r = -gamma * (v + rud("l_r") * size * r)
+    gamma = cs.if_else(v + blade.ahead * r >= 0.0, p["gamma_p"], p["gamma_n"])
+    v_r = -gamma * (v + p["l_r"] * size * r)
     square = u_r**2 + v_r**2
     alpha = delta - cs.atan2(v_r, cs.if_else(square == 0.0, 1.0, u_r))
     sine, cosine = cs.sin(alpha), cs.cos(alpha)
-    pressure = 0.5 * rho * blade.area * square
-    across = pressure * rud("f_alpha") * sine * (1.0 + rud("f_3") * sine**2)
-    chord = pressure * rud("f_t") * (1.0 - cosine)
+    pressure = 0.5 * g.density * blade.area * square
+    across = pressure * p["f_alpha"] * sine * (1.0 + p["f_3"] * sine**2)
+    chord = pressure * p["f_t"] * (1.0 - cosine)
     f_x = chord * cs.cos(delta) - across * cs.sin(delta)
     f_y = -across * cs.cos(delta) - chord * cs.sin(delta)
-    x_r, y_r = (1.0 - rud("t_r")) * f_x, (1.0 + rud("a_h")) * f_y
-    n_r = (blade.ahead + rud("a_h") * rud("x_h") * size) * f_y
+    moment = (blade.ahead + p["a_h"] * p["x_h"] * size) * f_y
+    return (1.0 - p["t_r"]) * f_x, (1.0 + p["a_h"]) * f_y, moment
 
-    def air(key: str) -> Any:
-        return p[f"wind.{key}"]
 
-    c, s = cs.cos(psi), cs.sin(psi)
-    from_ahead = c * wind[0] + s * wind[1] + u
-    from_starboard = -s * wind[0] + c * wind[1] + v
+def _air(p: Named, g: Geometry, from_ahead: Any, from_starboard: Any) -> Force:
+    """Harmonics of the apparent wind's angle; where the wind comes from, in body axes [m/s]."""
     u_a2 = from_ahead**2 + from_starboard**2
     c1, s1 = from_ahead / _root(u_a2), -from_starboard / _root(u_a2)
     cos, sin = [1.0, c1], [0.0, s1]
     for _ in range(4):  # cos (k+1)g = 2 cos g cos kg - cos (k-1)g, and so for sin
         cos.append(2.0 * c1 * cos[-1] - cos[-2])
         sin.append(2.0 * c1 * sin[-1] - sin[-2])
-    q_a = 0.5 * AIR_DENSITY * u_a2
-    x_a = air("x0") + sum(air(f"x{k}") * cos[k] for k in (1, 3, 5))
-    x_a *= q_a * g.frontal_area
-    y_a = q_a * g.lateral_area * sum(air(f"y{k}") * sin[k] for k in (1, 3, 5))
-    n_a = q_a * g.lateral_area * size * sum(air(f"n{k}") * sin[k] for k in (1, 2, 3))
+    q = 0.5 * AIR_DENSITY * u_a2
+    x = p["x0"] + sum(p[f"x{k}"] * cos[k] for k in (1, 3, 5))
+    x *= q * g.frontal_area
+    y = q * g.lateral_area * sum(p[f"y{k}"] * sin[k] for k in (1, 3, 5))
+    n = q * g.lateral_area * g.length * sum(p[f"n{k}"] * sin[k] for k in (1, 2, 3))
+    return x, y, n
 
-    unit = 0.5 * rho * size**2 * g.draught
+
+def acceleration(
+    g: Geometry, names: Sequence[str], theta: Any, x: Any, actuator: Any, wind: Any
+) -> Any:
+    """u̇, v̇, ṙ of x = (x₀, u, y₀, v, ψ, r) and the true wind (from, along x₀ and y₀)."""
+    p: dict[str, Named] = {}
+    for i, name in enumerate(names):
+        part, _, key = name.partition(".")
+        p.setdefault(part, {})[key] = theta[i]
+    (screw,), (blade,) = g.propellers, g.rudders
+    u, v, psi, r = x[1], x[3], x[4], x[5]
+    delta, n = actuator[blade.column], actuator[screw.column]
+    c, s = cs.cos(psi), cs.sin(psi)
+    pushed, arriving, k_t = _propeller(p["propeller"], g, n, u, v, r)
+    parts = (
+        _hull(p["hull"], g, u, v, r),
+        pushed,
+        _rudder(p["rudder"], g, delta, n, u, v, r, arriving, k_t),
+        _air(p["wind"], g, c * wind[0] + s * wind[1] + u, -s * wind[0] + c * wind[1] + v),
+    )
+    all_x, all_y, all_n = (sum(part[i] for part in parts) for i in range(3))
+
+    unit = 0.5 * g.density * g.length**2 * g.draught
     m, x_g = g.mass, g.x_g
-    m_x, m_y = p["body.m_x"] * unit, p["body.m_y"] * unit
-    i_z = p["body.i_j"] * unit * size**2 + x_g**2 * m
-    all_x, all_y, all_n = x_h + x_p + x_r + x_a, y_h + y_p + y_r + y_a, n_h + n_p + n_r + n_a
+    m_x, m_y = p["body"]["m_x"] * unit, p["body"]["m_y"] * unit
+    i_z = p["body"]["i_j"] * unit * g.length**2 + x_g**2 * m
     right_y = all_y - (m + m_x) * u * r
     right_n = all_n - x_g * m * u * r
     det = (m + m_y) * i_z - (x_g * m) ** 2

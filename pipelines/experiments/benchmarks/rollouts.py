@@ -168,6 +168,30 @@ def refit(
     return time.perf_counter() - began, found
 
 
+def refits(
+    model: MMG, known: Parameters, data: WindowSeries, rounds: int, rng: np.random.Generator
+) -> None:
+    """Identification of all parameters and of a few, from noisy data of another ship; printed."""
+    truth, noisy = measurements(model, known, data, rng)
+    every, few = np.ones(len(known.values), bool), np.isin(model.names, FEW)
+    print(f"\n{'refit':<18} {'s':>6} {'least':>6} {'most':>6}  evaluations  loss")
+    took: dict[str, list[float]] = {"all": [], "few": []}
+    found: dict[str, Identified] = {}
+    for _ in range(rounds):
+        for name, free in (("all", every), ("few", few)):
+            seconds, found[name] = refit(model, known, noisy, free)
+            took[name].append(seconds)
+    for name, each in took.items():
+        fit = found[name]
+        print(
+            f"  {f'{int(fit.free.sum())} parameters':<16} {statistics.median(each):>6.2f} "
+            f"{min(each):>6.2f} {max(each):>6.2f}  {fit.evaluations:>11}  "
+            f"{fit.loss[0]:.4g} to {fit.loss[1]:.4g}, {fit.message}"
+        )
+    away = np.abs(found["all"].values - truth) / np.maximum(found["all"].standard_error, 1e-300)
+    print(f"  of all, {np.mean(away < 2.0):.0%} end within two standard errors of the truth")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -213,25 +237,7 @@ def main() -> None:
         "loss, gradient, JᵀJ [ms]",
         interleaved({"shiplog normal": ours["shiplog normal"][1]}, options.rounds),
     )
-
-    truth, noisy = measurements(model, known, data, rng)
-    every, few = np.ones(len(theta), bool), np.isin(model.names, FEW)
-    print(f"\n{'refit':<18} {'s':>6} {'least':>6} {'most':>6}  evaluations  loss")
-    took: dict[str, list[float]] = {"all": [], "few": []}
-    found: dict[str, Identified] = {}
-    for _ in range(options.refits):
-        for name, free in (("all", every), ("few", few)):
-            seconds, found[name] = refit(model, known, noisy, free)
-            took[name].append(seconds)
-    for name, each in took.items():
-        fit = found[name]
-        print(
-            f"  {f'{int(fit.free.sum())} parameters':<16} {statistics.median(each):>6.2f} "
-            f"{min(each):>6.2f} {max(each):>6.2f}  {fit.evaluations:>11}  "
-            f"{fit.loss[0]:.4g} to {fit.loss[1]:.4g}, {fit.message}"
-        )
-    away = np.abs(found["all"].values - truth) / np.maximum(found["all"].standard_error, 1e-300)
-    print(f"  of all, {np.mean(away < 2.0):.0%} end within two standard errors of the truth")
+    refits(model, known, data, options.refits, rng)
 
 
 if __name__ == "__main__":

@@ -220,6 +220,21 @@ def wind_force(c, h, ahead, starboard):
 
 
 @njit
+def masses(c, h, shallow):
+    """Mass with added mass, in surge and in sway; m x_G; moment of inertia with what is added."""
+    mass = c.mass + h.payload
+    moment = c.mass * c.gravity_ahead + h.payload * h.payload_ahead
+    inertia = c.inertia + h.payload * h.payload_ahead**2
+    crest = h.shallow_water
+    more_x = c.shallow_added_surge * grown(crest, shallow, c.shallow_added_surge_power)
+    more_y = c.shallow_added_sway * grown(crest, shallow, c.shallow_added_sway_power)
+    more_j = grown(crest, shallow, c.shallow_added_inertia_power)
+    mx, my = mass + c.added_surge * (1.0 + more_x), mass + c.added_sway * (1.0 + more_y)
+    inertia += c.shallow_added_inertia * c.inertia * more_j  # J_zz is some 0.4 of it
+    return mx, my, moment, inertia
+
+
+@njit
 def rates(c, h, state, port, starboard, order, wind, push, time, out):
     """dx/dt [11] of `state` [11] into `out`; port and starboard are the rudder angles that act.
 
@@ -259,15 +274,7 @@ def rates(c, h, state, port, starboard, order, wind, push, time, out):
     y += push[0]
     n += push[0] * THRUSTER
 
-    mass = c.mass + h.payload
-    moment = c.mass * c.gravity_ahead + h.payload * h.payload_ahead  # m x_G
-    inertia = c.inertia + h.payload * h.payload_ahead**2
-    crest = h.shallow_water
-    more_x = c.shallow_added_surge * grown(crest, shallow, c.shallow_added_surge_power)
-    more_y = c.shallow_added_sway * grown(crest, shallow, c.shallow_added_sway_power)
-    more_j = grown(crest, shallow, c.shallow_added_inertia_power)
-    mx, my = mass + c.added_surge * (1.0 + more_x), mass + c.added_sway * (1.0 + more_y)
-    inertia += c.shallow_added_inertia * c.inertia * more_j  # J_zz is some 0.4 of it
+    mx, my, moment, inertia = masses(c, h, shallow)
     udot = (x + my * vw * r + moment * r * r) / mx
     ya = y - mx * uw * r
     na = n - moment * uw * r

@@ -85,13 +85,8 @@ def sail(
     track[0, :6] = start
     halves = 0.5 * step * np.arange(2 * rows + 1)
     air = blow(wind, duration_s, halves, weather_rng)
-    push = np.zeros((2 * rows + 1, 4))
     pulses = draw_pulses(effects.side_thrust, duration_s, pulse_rng)
-    for begin, length, force in pulses:
-        push[(halves >= begin) & (halves < begin + length), 0] = force
-    if effects.turbulence > 0.0:
-        pushed = process_noise(laws.noise, duration_s, halves, noise_rng)
-        push[:, 1:] = effects.turbulence * pushed
+    push = unexplained(pulses, effects.turbulence, laws, duration_s, halves, noise_rng)
     numbers = physics.coefficients(ship, laws)
     hidden = physics.hidden(effects, campaign, duration_s)
     watch = round(WATCH / step)
@@ -100,14 +95,34 @@ def sail(
         steps = min(watch, rows - first)
         physics.advance(numbers, hidden, track, first, steps, step, order, air, push)
 
-    seen = track[::kept]
-    from_north, from_east = air[:: 2 * kept].T
-    x0, surge, y0, sway, heading, yaw_rate, port, starboard, speed = seen[:, :9].T.copy()
+    seen, (from_north, from_east) = track[::kept], air[:: 2 * kept].T
+    return _observed(ship, effects, duration_s, seen, from_north, from_east, pulses)
+
+
+def unexplained(
+    pulses: tuple[Pulse, ...], turbulence: float, laws: Laws, duration: float, at: np.ndarray,
+    rng: np.random.Generator,
+) -> np.ndarray:  # fmt: skip
+    """Side thrust [N] and random accelerations [m/s², m/s², rad/s²] at the times `at`: [len, 4]."""
+    push = np.zeros((len(at), 4))
+    for begin, length, force in pulses:
+        push[(at >= begin) & (at < begin + length), 0] = force
+    if turbulence > 0.0:
+        push[:, 1:] = turbulence * process_noise(laws.noise, duration, at, rng)
+    return push
+
+
+def _observed(
+    ship: Ship, effects: Effects, duration: float, track: np.ndarray, from_north: np.ndarray,
+    from_east: np.ndarray, pulses: tuple[Pulse, ...],
+) -> Voyage:  # fmt: skip
+    """The columns of a voyage: its states at 10 Hz, and the wind that the moving ship feels."""
+    x0, surge, y0, sway, heading, yaw_rate, port, starboard, speed = track[:, :9].T.copy()
     cos, sin = np.cos(heading), np.sin(heading)
     ahead = from_north * cos + from_east * sin + surge
     aside = -from_north * sin + from_east * cos + sway
     return Voyage(
-        ship=ship, effects=effects, duration=duration_s, time=PERIOD * np.arange(len(seen)),
+        ship=ship, effects=effects, duration=duration, time=PERIOD * np.arange(len(track)),
         x0=x0, surge=surge, y0=y0, sway=sway, heading=heading, yaw_rate=yaw_rate,
         rudder_port=port, rudder_starboard=starboard, propeller=speed,
         true_wind_speed=np.hypot(from_north, from_east),

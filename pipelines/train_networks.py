@@ -1,0 +1,189 @@
+"""Voyages to a trained network: windows, then a training for each seed."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import torch
+
+from pipelines.bars import Bars
+from shiplog.exceptions import RunError, listed
+from shiplog.logs.health_report import CONTRACT
+from shiplog.models.feedforward import scaling
+from shiplog.simulation import prediction_interval
+from shiplog.simulation.rollout import simulate
+from shiplog.training import load_model, network_gradient, random_streams, run_folder, seed_files
+from shiplog.training.jittering import jittered
+from shiplog.training.job import Training
+from shiplog.training.load_model import NetworkRun, Run
+from shiplog.training.network_training import Progress
+from shiplog.training.options import TrainOptions
+from shiplog.training.provenance import Answer, provenance
+from shiplog.training.queue import Report, Task, work
+from shiplog.training.run_config import Config
+from shiplog.training.run_folder import RunFolder
+from shiplog.voyages import windows
+from shiplog.voyages.split import plan, refuse_shared_rows
+from shiplog.voyages.split_settings import Split
+from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
+
+log = logging.getLogger(__name__)
+
+
+def train_run(config: Config, store: Store, out: Path) -> Run:
+    """Train every seed of a run; goes on where an interrupted one stopped. Raises ShiplogError."""
+    begun = begin(config, store, out)
+    tasks = tasks_of(begun.run)
+    failures = do(tasks)
+    if failures:
+        line = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        raise RunError(
+            f"{len(failures)} of {len(tasks)} trainings did not end: {line}.",
+            hint="give the same command again: finished seeds and checkpoints are kept.",
+        )
+    return finish(begun)
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A run that is being trained: its partial folder, and what finishing it needs."""
+
+    run: RunFolder
+    held: pl.DataFrame
+    store: Store
+    began: float
+
+
+def begin(config: Config, store: Store, out: Path) -> Begun:
+    """The partial folder of a run, with all that its seeds need. Raises ShiplogError."""
+    split = config.split
+    profile = store.profile([*split.training, *split.validation])
+    profile.require_actuators()
+    rows = store.seconds([*split.training, *split.validation], profile)
+    learnt = rows.filter(pl.col("voyage").is_in(split.training))
+    held = rows.filter(pl.col("voyage").is_in(split.validation))
+    refuse_shared_rows(rows, split)
+
+    names = (profile.actuator_names, profile.wind_names)
+    size = config.window
+    # it may be a part of a training voyage, which stands there under another name
+    standard = store.seconds(config.standard, profile) if config.standard else learnt
+    reference = windows.cut(standard, plan(standard, "ref", size), size, *names)
+    chosen = plan(learnt, config.data, size)
+    windows.cut(held, plan(held, "ref", size), size, *names)  # or say so before training
+    run = run_folder.create(
+        out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
+    )
+    log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
+    return Begun(run, held, store, time.time())
+
+
+def finish(begun: Begun) -> Run:
+    """The run with its name, all seeds being trained."""
+    run = load_model.network(begun.run)
+    run.save_band(_band(run, begun.held))
+    done = run.finish(provenance(begun.store, run.config.split, begun.began))
+    return load_model.of_folder(done)
+
+
+def tasks_of(run: RunFolder) -> list[Task]:
+    """The trainings of a run that are not finished; windows of an epoch are what they cost."""
+    cost = float(run.windows().height)
+    if run.config.recipe == "fast":
+        cost = min(cost, run.config.fast.most_windows)
+    return [
+        Task(f"{run.name}, seed {seed}", train_seed, (run.path, seed), cost)
+        for seed in run.config.seeds
+        if not run.finished(seed)
+    ]
+
+
+def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
+    """Do all trainings, with progress on stderr. Returns those that failed, and why."""
+    failures: dict[str, str] = {}
+    costs = {task.name: task.cost for task in tasks}
+    with Bars(costs) as bars, closing(work(tasks, workers)) as events:
+        for event in events:
+            bars.show(event.task.name, event.share, event.ended)
+            if not event.ended:
+                continue
+            if event.failure:
+                failures[event.task.name] = event.failure
+                log.warning("%s: %s", event.task.name, event.failure)
+            else:
+                best, epochs, took = event.result
+                line = (event.task.name, best, epochs, took)
+                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *line)
+    return failures
+
+
+def _band(run: NetworkRun, held: pl.DataFrame) -> prediction_interval.Band:
+    """How far off its seeds were on the validation voyages, which they did not learn from."""
+    unseen = _cut(run, held, plan(held, "ref", run.config.window))
+    simulated = [simulate(model, unseen) for model in run.models().values()]
+    error = np.concatenate([states - unseen.state for states in simulated])
+    spread = np.concatenate([prediction_interval.seeds_spread(simulated)] * len(simulated))
+    return prediction_interval.calibrate(error, spread, len(run.config.split.validation))
+
+
+def training_of(run: NetworkRun, seed: int) -> Training:
+    """One seed of a begun run, with its windows."""
+    config = run.config
+    scale, shape = run.scaling(), run.shape
+    learnt = _cut(run, run.training(), run.windows())
+    learnt = jittered(learnt, random_streams.generator(seed, "jitter"))
+    held = _cut(run, run.validation(), plan(run.validation(), "ref", config.window))
+    training, validation = (
+        network_gradient.batch(w, scale, shape, torch.float32) for w in (learnt, held)
+    )
+    model = run.empty_model().initialise(random_streams.generator(seed, "weights"))
+    return Training(config, seed, model, training, validation)
+
+
+def train_seed(path: Path, seed: int, report: Report | None = None) -> tuple[float, int, float]:
+    """One seed of a begun run, in a process of its own. Returns best loss, epochs and seconds."""
+    torch.set_num_threads(1)
+    began = time.time()
+    run = load_model.network(run_folder.open_folder(path))
+    folder = run.seed(seed)
+
+    def keep(progress: Progress) -> None:
+        seed_files.save_checkpoint(folder, progress)
+
+    progress = training_of(run, seed).run(seed_files.load_checkpoint(folder), keep, report=report)
+    seed_files.save_network(folder, progress)
+    return progress.best, progress.epoch, time.time() - began
+
+
+def _cut(run: RunFolder, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
+    names = (run.profile.actuator_names, run.profile.wind_names)
+    return windows.cut(rows, planned, run.config.window, *names)
+
+
+def network_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
+    """`shiplog train` of a network: every seed trained."""
+    config = options.config(split)
+    run = train_run(config, store, out)
+    best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
+    line = ", ".join(f"{loss:.0f}" for loss in best.values())
+    text = (
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {options.seeds - 1}).\n"
+        f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store.path}"
+    )
+    content = {
+        "contract": CONTRACT,
+        "run": str(run.path),
+        "label": run.label,
+        "windows": run.windows().height,
+        "validation_loss": list(best.values()),
+        "split": split.model_dump(mode="json"),
+    }
+    return Answer(text, content)
