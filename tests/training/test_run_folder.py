@@ -6,7 +6,6 @@ import sailing
 import torch
 from small_networks import network, windows
 
-from shiplog import files
 from shiplog.exceptions import RunError
 from shiplog.models.feedforward import Shape
 from shiplog.training import load_model, network_gradient, run_folder, seed_files
@@ -98,8 +97,3 @@ def test_a_torn_weight_file_is_named(begun):
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
         load_model.network(run).simulator(0)
-
-
-def test_json_has_no_infinity(tmp_path):
-    files.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
-    assert (tmp_path / "a.json").read_text().count("null") == 2
