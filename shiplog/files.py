@@ -46,8 +46,33 @@ def whole(path: Path) -> Iterator[Path]:
             raise
         raise refusal from error
     finally:  # an interrupt, too, leaves nothing
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
+        remove(partial)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """An empty folder to write into, which becomes `path` where the block ends well. Else nothing
+    stays. `path` may be there only if it is empty.
+
+    Raises OSError as `whole` does.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    sweep(path.parent, path.name)
+    partial = path.with_name(f".{path.name}.{MACHINE}-{os.getpid()}.partial")
+    try:
+        partial.mkdir()
+        yield partial
+        for file in partial.rglob("*"):
+            if file.is_file():
+                flush(file)
+        partial.rename(path)
+    except Exception as error:
+        refusal = refused(error, path, partial)
+        if refusal is error:
+            raise
+        raise refusal from error
+    finally:
+        remove(partial)
 
 
 def flush(path: Path) -> None:
@@ -59,24 +84,32 @@ def flush(path: Path) -> None:
 def refused(error: Exception, path: Path, *also: Path) -> Exception:
     """What the system says of `path`, as an OSError with its name, where a library reports it in
     words of its own or under another name (`also`). Any other exception comes back as it is."""
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and error.errno:
         number = error.errno
         if error.filename is not None and Path(os.fsdecode(error.filename)) not in also:
             return error
-    else:  # as Rust has it: polars, safetensors
-        found = re.search(r"\(os error (\d+)\)", str(error))
-        number = int(found[1]) if found else None
+    else:  # as Rust has it (polars, safetensors), or shutil
+        found = re.search(r"\(os error (\d+)\)|\[Errno (\d+)\]", str(error))
+        number = int(found[1] or found[2]) if found else None
     return OSError(number, os.strerror(number), str(path)) if number else error
 
 
 def sweep(folder: Path, name: str | None = None) -> None:
-    """Remove the files that killed processes left half-written in a folder; only those that were
-    to become `name` if one is given."""
+    """Remove what killed processes left half-written in a folder; only what was to become `name`
+    if one is given."""
     pattern = f".{glob.escape(name)}.*.partial" if name else ".*.partial"
     for leaving in folder.glob(pattern):
         if _left(leaving):
-            with suppress(OSError):
-                leaving.unlink()
+            remove(leaving)
+
+
+def remove(path: Path) -> None:
+    """A file, or a folder with all that is in it, as far as the system allows."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+        return
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -84,7 +117,7 @@ def temporary_folder() -> Iterator[Path]:
     """A folder for the time of a block. Those of killed processes are removed first."""
     for leaving in Path(tempfile.gettempdir()).glob(f"shiplog-{MACHINE}-*"):
         if _left(leaving):
-            shutil.rmtree(leaving, ignore_errors=True)
+            remove(leaving)
     prefix = f"shiplog-{MACHINE}-{os.getpid()}-"
     with tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True) as folder:
         yield Path(folder)
