@@ -56,6 +56,11 @@ def entries(store: Path) -> list[CatalogueEntry]:
     return sorted(found, key=lambda entry: entry.name)
 
 
+def unfinished(store: Path) -> bool:
+    """Whether a process writes a voyage, or was killed at it."""
+    return any(store.glob(".voyage=*"))
+
+
 def _places(store: Path) -> set[Path]:
     """Where the folders of voyages are, or will be again."""
     places = set(store.glob("voyage=*"))

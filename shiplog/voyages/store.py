@@ -7,8 +7,8 @@
 
 A voyage is written under a hidden name and renamed when complete: wherever a process is killed, a
 voyage is there as it was, or as it was to become. What is listed are the folders themselves, so
-that no list can be out of date. Readers take no lock: while a voyage is replaced they find the one
-that was there before. What a killed process left is removed by the next one that writes.
+that no list can be out of date. Readers wait for nobody: while a voyage is replaced they find the
+one that was there before. What a killed process left is put in order by the next one.
 
 The same log through the same profile is recognised by its content and left alone; another log
 under a taken name is refused. What was put right is part of that: the same log ingested without is
@@ -58,6 +58,7 @@ class Store:
 
     def entries(self) -> list[CatalogueEntry]:
         """All voyages, by name."""
+        self.mend(wait=False)
         return catalogue.entries(self.path)
 
     def select(self, patterns: Sequence[str] | None = None) -> list[str]:
@@ -149,14 +150,20 @@ class Store:
         fingerprint = fingerprint_of(sha256, profile, correct)
         return bool(facts) and facts["fingerprint"] == fingerprint and _whole(folder, facts)
 
-    def mend(self) -> None:
+    def mend(self, wait: bool = True) -> None:
         """Remove what an interrupted ingest left, and put back the voyage that it was replacing.
-        A store that cannot be written is left as it is: readers know how to read it."""
-        if not any(self.path.glob(".voyage=*")):
+
+        wait   for a process that writes at this moment; else what lies there is that process's
+
+        A store that cannot be written is left as it is: readers know how to read it.
+        """
+        if not catalogue.unfinished(self.path):
             return
         try:
-            with self._writing():
+            with self._writing(wait):
                 pass
+        except Timeout:
+            pass
         except OSError as error:
             log.debug("%s stays as it is: %s", self.path, error)
 
@@ -237,15 +244,18 @@ class Store:
         return catalogue.whole(catalogue.place(self.path, name))
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
+    def _writing(self, wait: bool = True) -> Iterator[None]:
         """Alone: another process waits here. What an interrupted one left is put in order first.
 
-        Raises OSError where the store cannot be written.
+        Raises OSError where the store cannot be written; Timeout where another process writes and
+        this one does not wait.
         """
         lock = FileLock(self.path / ".lock")
         try:
-            lock.acquire(timeout=SILENT_S)
+            lock.acquire(timeout=SILENT_S if wait else 0.0)
         except Timeout:
+            if not wait:
+                raise
             log.info("waiting for another process that writes into the store %s", self.path)
             lock.acquire()
         try:

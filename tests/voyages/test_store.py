@@ -228,7 +228,8 @@ def test_readers_do_not_wait_for_a_replacement(tmp_path, voyage):
         assert store.report("a b") == taken.report
         assert store.profile(["a b"]).ship == taken.profile.ship
         assert store.tables(["a b"])[0].collect().height == entry.rows
-    store.mend()
+        assert not place.exists()
+    assert store.entries() == [entry]  # nobody writes now: the next call puts it in order
     assert [p.name for p in store.path.glob("*voyage=*")] == [place.name]
 
 
