@@ -30,6 +30,7 @@ from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, DiagnosedTrial
+from shiplog.report.text_table import inert
 from shiplog.training import extension_file, load_model
 from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
@@ -198,7 +199,7 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
 
 def _write(done: DiagnosedTrial) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
-    files.write_text(done.folder / "report.md", page.markdown(done.verdict))
+    files.write_text(done.folder / "report.md", inert(page.markdown(done.verdict)))
     files.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote, unquote
@@ -13,6 +14,7 @@ from shiplog.logs.health_report import VoyageReport
 
 FACTS = ("sha256", "fingerprint", "source", "start", "profile", "report")  # every voyage.json
 NEW, OLD = ".new", ".old"  # of a voyage's folder, hidden: while it is written, or replaced
+UNSHOWN = ("Cc", "Zl", "Zp")  # Unicode's categories of control characters and line ends
 LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
 
 log = logging.getLogger(__name__)
@@ -69,7 +71,13 @@ def _places(store: Path) -> set[Path]:
 
 
 def place(store: Path, name: str) -> Path:
-    """Where a voyage's folder is. Raises StoreError for a name that no folder can have."""
+    """Where a voyage's folder is. Raises StoreError for a name that no folder can have, or that
+    would break a line of a report."""
+    if unshown(name):
+        raise StoreError(
+            f"The name {name!r} of the log holds a line end or a control character.",
+            hint="rename the log file.",
+        )
     try:
         folder = f"voyage={quote(name, safe=' ()+,')}"
     except UnicodeEncodeError as error:
@@ -83,6 +91,11 @@ def place(store: Path, name: str) -> Path:
             hint="rename the log file.",
         )
     return store / folder
+
+
+def unshown(name: str) -> bool:
+    """Whether a name holds what no line of text can show."""
+    return any(unicodedata.category(letter) in UNSHOWN for letter in name)
 
 
 def hidden(place: Path, end: str) -> Path:
@@ -125,12 +138,14 @@ def facts(folder: Path) -> dict:
 
 
 def known(folder: Path) -> dict | None:
-    """The same; None where it cannot be read, or where it names another voyage than the folder."""
+    """The same; None where it cannot be read, or names another voyage than the folder, or one that
+    no ingest would have named so."""
     try:
         found = facts(folder)
     except StoreError:
         return None
-    return found if found["report"]["name"] == name_of(folder) else None
+    name = found["report"]["name"]
+    return found if name == name_of(folder) and not unshown(name) else None
 
 
 def _entry(folder: Path) -> CatalogueEntry | None:
