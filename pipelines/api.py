@@ -19,6 +19,7 @@ from pipelines import prepare
 from shiplog.exceptions import ShiplogError
 from shiplog.logs.health_report import VoyageReport
 from shiplog.report import page, tables
+from shiplog.report.text_table import inert
 from shiplog.report.verdict import Verdict
 from shiplog.training import load_model
 from shiplog.training.load_model import Run
@@ -33,7 +34,7 @@ class _Printed:
     """Prints as the command's text; a notebook shows it as Markdown."""
 
     def _repr_markdown_(self) -> str:
-        return str(self)
+        return inert(str(self))
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from pipelines.bars import drawable, tracked
+from shiplog import files
 from shiplog.exceptions import ProfileError, ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.conversion import columns
@@ -63,8 +63,8 @@ def draft(path: Path, vessel: str | None = None) -> str:
             return draft_table(path, vessel)
         if not (is_bag(path) or is_nmea(path) or path.is_dir()):
             return draft_log(path, vessel)
-        with TemporaryDirectory() as folder:
-            (target,) = _each(path, None, Path(folder), Converted())
+        with files.temporary_folder() as folder:
+            (target,) = _each(path, None, folder, Converted())
             return draft_log(target, vessel)
 
 

@@ -30,6 +30,7 @@ from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, DiagnosedTrial
+from shiplog.report.text_table import inert
 from shiplog.training import extension_file, load_model
 from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
@@ -91,7 +92,7 @@ def diagnose_run(
         detailed = log.isEnabledFor(logging.DEBUG)
         log.info("no path of the model can be computed: %s", error, exc_info=detailed)
         done = DiagnosedTrial(answer.runs_away(run, before_effect), out)
-    _save(done, run, store, names, began)
+    _save(done, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
     return done
@@ -198,14 +199,13 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
 
 def _write(done: DiagnosedTrial) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
-    (done.folder / "report.md").write_text(page.markdown(done.verdict), encoding="utf-8")
+    files.write_text(done.folder / "report.md", inert(page.markdown(done.verdict)))
     files.write_json(done.folder / "verdict.json", done.verdict.as_json())
 
 
-def _save(done: DiagnosedTrial, run: Run, store: Store, names: Sequence[str], began: float) -> None:
+def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
     _write(done)
-    split = run.config.split.model_copy(update={"training": tuple(names), "validation": ()})
-    files.write_json(done.folder / "provenance.json", provenance(store, split, began))
+    files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
     if done.recording is not None:
         diagnosis_pictures.save(done, done.recording)
 

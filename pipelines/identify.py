@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -51,14 +51,35 @@ def identify_run(
     Raises ShiplogError.
     """
     began = time.time()
-    run, ready = _begin(config, store, out, parameters)
+    hashes = store.hashes([*config.split.training, *config.split.validation])
+    return _finish(*_begin(config, store, out, parameters), hashes, began)
+
+
+@staged("identifying", STAGES)
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def identify_again(old: RunFolder, out: Path) -> tuple[Run, list[str]]:
+    """A run once more, from its folder alone: settings, rows, windows and starting values.
+
+    Raises ShiplogError.
+    """
+    began, rows = time.time(), (old.training(), old.validation())
+    known = old.identified(old.config.seeds[0])
+    ready = prepare(old.config, old.profile, *rows, old.windows(), None, known)
+    run = run_folder.create(out, old.config, old.profile, None, old.windows(), *rows)
+    return _finish(run, ready, old.logs_sha256(), began)
+
+
+def _finish(
+    run: RunFolder, ready: Prepared, hashes: Mapping[str, str | None], began: float
+) -> tuple[Run, list[str]]:
+    """The run identified, if that is asked of it, and under its name."""
     chosen: dict = {}
-    if not config.physics.fit:
+    if not run.config.physics.fit:
         notes = _keep(run, ready)
     else:
         notes, choices = _identify(run, ready)
         chosen = {"chosen": choices}
-    done = run.finish(provenance(store, config.split, began) | chosen)
+    done = run.finish(provenance(hashes, began) | chosen)
     return load_model.of_folder(done), notes
 
 
@@ -284,18 +305,23 @@ def identify_command(store: Store, out: Path, options: TrainOptions, split: Spli
         log.info("an identification draws nothing: one seed stands for all")
         options = replace(options, seeds=1)
     run, notes = identify_run(options.config(split), store, out, options.parameters)
+    return answer(run, notes, store.path)
+
+
+def answer(run: Run, notes: Sequence[str], store_path: Path) -> Answer:
+    """What there is to say of an identified run."""
     identified = run.identified()
     lines = [f"{run.label} in {run.path}.", *notes, ""]
-    if options.fit:
+    if run.config.physics.fit:
         lines += [tables.parameters_table(identified), ""]
-    lines.append(f"Next: shiplog evaluate {run.path} --store {store.path}")
+    lines.append(f"Next: shiplog evaluate {run.path} --store {store_path}")
     content = {
         "contract": CONTRACT,
         "run": str(run.path),
         "label": run.label,
         "windows": run.windows().height,
-        "notes": notes,
+        "notes": list(notes),
         "parameters": identified.to_dicts(),
-        "split": split.model_dump(mode="json"),
+        "split": run.config.split.model_dump(mode="json"),
     }
     return Answer("\n".join(lines), content)

@@ -19,6 +19,7 @@ from shiplog.profile import Profile
 from shiplog.report import tables, viewer
 from shiplog.report.paper import figures, sets, statements
 from shiplog.report.paper.style import named
+from shiplog.report.text_table import inert
 from shiplog.training import run_folder
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer
@@ -274,7 +275,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
     for name, frame in frames.items():
         files.write_frame(numbers / f"{name}.parquet", frame)
     text = report_of(results, chosen, sizes)
-    files.write_text(out / "report.md", text + "\n")
+    files.write_text(out / "report.md", inert(text) + "\n")
     title = f"{profile.ship.name}: {len(results.runs)} window sets"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
     return text

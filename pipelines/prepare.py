@@ -52,7 +52,7 @@ def ingest_logs(
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
     reported: set[str] = set()
-    store.mend()  # or what a killed ingest left out of the catalogue stayed so, being "unchanged"
+    store.mend()  # else it would wait for the next voyage that is new
     for path in tracked(paths, "ingesting"):
         try:
             found = contents(path)

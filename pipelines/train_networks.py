@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +40,20 @@ log = logging.getLogger(__name__)
 
 def train_run(config: Config, store: Store, out: Path) -> Run:
     """Train every seed of a run; goes on where an interrupted one stopped. Raises ShiplogError."""
-    begun = begin(config, store, out)
+    return _trained(begin(config, store, out))
+
+
+def train_network_again(old: RunFolder, out: Path) -> Run:
+    """A finished run once more, from its folder alone: the same settings, rows and windows.
+
+    Raises ShiplogError.
+    """
+    scale, rows = load_model.network(old).scaling(), (old.training(), old.validation())
+    run = run_folder.create(out, old.config, old.profile, scale, old.windows(), *rows)
+    return _trained(Begun(run, rows[1], old.logs_sha256(), time.time()))
+
+
+def _trained(begun: Begun) -> Run:
     tasks = tasks_of(begun.run)
     failures = do(tasks)
     if failures:
@@ -54,11 +67,15 @@ def train_run(config: Config, store: Store, out: Path) -> Run:
 
 @dataclass(frozen=True)
 class Begun:
-    """A run that is being trained: its partial folder, and what finishing it needs."""
+    """A run that is being trained: its partial folder, and what finishing it needs.
+
+    held          the 1 Hz rows of the validation voyages
+    logs_sha256   voyage → hash of its log
+    """
 
     run: RunFolder
     held: pl.DataFrame
-    store: Store
+    logs_sha256: Mapping[str, str | None]
     began: float
 
 
@@ -83,14 +100,15 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
         out, config, profile, scaling(reference, config.network.wind_input), chosen, learnt, held
     )
     log.info("training %s on %d windows of %s", run.label, chosen.height, listed(split.training))
-    return Begun(run, held, store, time.time())
+    hashes = store.hashes([*split.training, *split.validation])
+    return Begun(run, held, hashes, time.time())
 
 
 def finish(begun: Begun) -> Run:
     """The run with its name, all seeds being trained."""
     run = load_model.network(begun.run)
     run.save_band(_band(run, begun.held))
-    done = run.finish(provenance(begun.store, run.config.split, begun.began))
+    done = run.finish(provenance(begun.logs_sha256, begun.began))
     return load_model.of_folder(done)
 
 
@@ -170,13 +188,17 @@ def _cut(run: RunFolder, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
 
 def network_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
     """`shiplog train` of a network: every seed trained."""
-    config = options.config(split)
-    run = train_run(config, store, out)
+    return answer(train_run(options.config(split), store, out), store.path)
+
+
+def answer(run: Run, store_path: Path) -> Answer:
+    """What there is to say of a trained run."""
+    config = run.config
     best = {seed: float(run.history(seed)["validation"].min()) for seed in config.seeds}  # type: ignore[arg-type]
     line = ", ".join(f"{loss:.0f}" for loss in best.values())
     text = (
-        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {options.seeds - 1}).\n"
-        f"Split by {split.chosen_by}. Next: shiplog evaluate {run.path} --store {store.path}"
+        f"{run.label} in {run.path}: best validation L {line} (seeds 0 to {config.seeds[-1]}).\n"
+        f"Split by {config.split.chosen_by}. Next: shiplog evaluate {run.path} --store {store_path}"
     )
     content = {
         "contract": CONTRACT,
@@ -184,6 +206,6 @@ def network_command(store: Store, out: Path, options: TrainOptions, split: Split
         "label": run.label,
         "windows": run.windows().height,
         "validation_loss": list(best.values()),
-        "split": split.model_dump(mode="json"),
+        "split": config.split.model_dump(mode="json"),
     }
     return Answer(text, content)

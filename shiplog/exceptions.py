@@ -50,6 +50,10 @@ class RunError(ShiplogError):
     """A run folder is missing, unfinished, or belongs to other settings."""
 
 
+class UnreadableError(RunError):
+    """A file of a run folder is not what was written there, or is missing."""
+
+
 class ModelError(ShiplogError):
     """A dynamic model cannot be built, rolled out or identified from what is given."""
 

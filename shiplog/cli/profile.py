@@ -21,6 +21,7 @@ def profile(
 
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
+    from shiplog import files
     from shiplog.paths import check_file, refuse_taken
 
     if out is not None:
@@ -32,5 +33,5 @@ def profile(
     if out is None:
         typer.echo(text)
     else:
-        out.write_text(text, encoding="utf-8")
+        files.write_text(out, text)
         typer.echo(f"draft written to {out}: look over every line that says CHECK")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,7 +19,11 @@ from shiplog.cli.options import (
     Window,
 )
 from shiplog.cli.output import answer
+from shiplog.exceptions import UsageError, listed
 from shiplog.models import MODELS
+
+if TYPE_CHECKING:
+    from shiplog.training.options import TrainOptions
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
@@ -50,6 +54,10 @@ Folds = Annotated[
         "none out, and the gain is not tested.",
     ),
 ]
+Again = Annotated[
+    Path | None,
+    typer.Option(help="Repeat this run from its folder alone; every setting is that run's."),
+]
 
 
 def train(
@@ -69,6 +77,7 @@ def train(
     without: Without = None,
     free: Free = None,
     folds: Folds = None,
+    again: Again = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
@@ -76,8 +85,9 @@ def train(
 
     Example: shiplog train --data ref --seeds 3 --out runs/ref
     Example: shiplog train --model mmg --voyages 'trial_*' --out runs/mmg
+    Example: shiplog train --again runs/mmg --out runs/mmg-2
     """
-    from shiplog.paths import check_writable, refuse_taken
+    from shiplog.paths import check_run, check_writable, refuse_taken
     from shiplog.training.options import TrainOptions
 
     options = TrainOptions(
@@ -89,8 +99,27 @@ def train(
     options.check()
     refuse_taken(out)
     check_writable(out, "--out")
+    if again is not None:
+        _refuse_others(options)
+        check_run(again)
+        from pipelines.train_again import again_command
+
+        found = again_command(store, out, again)
+        answer(found.text, found.content, json_to)
+        return
     check_voyages(store, voyages, validation)
     from pipelines.train import train_command
 
     found = train_command(store, out, options)
     answer(found.text, found.content, json_to)
+
+
+def _refuse_others(options: TrainOptions) -> None:
+    """Raises UsageError where something is asked of a run that is to be repeated as it was."""
+    given = options.given()
+    if given:
+        flags = listed(f"--{name.replace('_', '-')}" for name in given)
+        raise UsageError(
+            f"--again repeats a run as it was, and {flags} would change it.",
+            hint="leave the other options out, or train a run of other settings without --again.",
+        )

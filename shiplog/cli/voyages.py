@@ -41,10 +41,10 @@ def voyages(
             f"There is no store {store}.",
             hint="ingest logs first: shiplog ingest LOG... --store DIR.",
         )
-    if catalogue.interrupted(store):
+    if catalogue.unfinished(store):
         from shiplog.voyages.store import Store  # it loads polars, which takes 0.3 s
 
-        Store(store).mend()
+        Store(store).mend(wait=False)
     entries = catalogue.entries(store)
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
     answer(text_table.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)

@@ -15,13 +15,14 @@ import logging
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import polars as pl
+
+from shiplog import files
 
 from . import container
 from .tables import Tables, Tally
@@ -74,12 +75,12 @@ def read_most(tables: Tables, tally: Tally) -> set[str]:
             topic = tables.found.channels[number].topic
             asked[topic], expected[topic] = leaves, tally.counts[number]
     done: set[str] = set()
-    with tempfile.TemporaryDirectory(prefix="shiplog-", ignore_cleanup_errors=True) as folder:
+    with files.temporary_folder() as folder:
         seconds = PATIENCE + sum(expected.values()) / PACE
-        request = {"log": str(tables.found.path.resolve()), "folder": folder, "topics": asked}
+        request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
         rows = worker().ask(request | {"seconds": seconds}, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):
-            if got == expected[topic] and _take(tables, topic, Path(folder) / f"{number}.arrow"):
+            if got == expected[topic] and _take(tables, topic, folder / f"{number}.arrow"):
                 done.add(topic)
     for topic in asked.keys() - done:
         log.info("%s: %s is left to the slow route", tables.found.path, topic)

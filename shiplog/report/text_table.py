@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Sequence
 
 from shiplog.channels import WINDOW
-from shiplog.voyages.catalogue import CatalogueEntry
+from shiplog.voyages.catalogue import UNSHOWN, CatalogueEntry
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -32,12 +33,26 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 def _cell(value: object) -> str:
     if isinstance(value, bool) or not isinstance(value, float):
-        return str(value)
+        return one_line(str(value)).replace("|", "\\|")
     if not math.isfinite(value):
         return "diverged" if value > 0 else "-"
     if value != 0 and abs(value) < 0.001:
         return f"{value:.1e}"
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def one_line(text: str) -> str:
+    """With line ends and control characters as escapes: a ship's name may be anything."""
+    return "".join(
+        c.encode("unicode_escape").decode() if unicodedata.category(c) in UNSHOWN else c
+        for c in text
+    )
+
+
+def inert(markdown: str) -> str:
+    """The same text, without what a viewer of Markdown would load or run: HTML, pictures and links
+    can only come from the names of voyages, ships and topics, which strangers may have chosen."""
+    return markdown.replace("<", "&lt;").replace("](", "]\\(")
 
 
 def catalogue(entries: Sequence[CatalogueEntry]) -> str:

@@ -20,7 +20,7 @@ from shiplog.training import run_files
 from shiplog.training.run_folder import RunFolder
 
 ANEW = (  # what of a run is not of the run that extends it
-    "errors.parquet", "rollouts.parquet", "*.rrd", "band.safetensors", "extension.*",
+    ".*", "errors.parquet", "rollouts.parquet", "*.rrd", "band.safetensors", "extension.*",
     "extension-*.py",
 )  # fmt: skip
 
@@ -63,14 +63,13 @@ def extend(
     """A new run, `out`: everything of the old one, and the causes; `own_files` define those that
     are not in the catalogue. Raises RunError for a taken name."""
     refuse_taken(out, "--extend")
-    partial = out.with_name(f"{out.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    shutil.copytree(folder.path, partial, ignore=shutil.ignore_patterns(*ANEW))
     content, arrays = Extension.kept(simulator, len(simulator.model.base.names))
     own = any(cause.user for cause in simulator.model.causes)
-    for i, path in enumerate(own_files if own else ()):
-        shutil.copy(path, partial / f"extension-{i}.py")
-    files.write_json(partial / "extension.json", content | {"base": folder.name})
-    run_files.save_arrays(partial / "extension.safetensors", arrays)
-    partial.rename(out)
+    with files.whole_folder(out) as new:
+        anew = shutil.ignore_patterns(*ANEW)
+        shutil.copytree(folder.path, new, ignore=anew, dirs_exist_ok=True)
+        for i, path in enumerate(own_files if own else ()):
+            shutil.copy(path, new / f"extension-{i}.py")
+        files.write_json(new / "extension.json", content | {"base": folder.name})
+        run_files.save_arrays(new / "extension.safetensors", arrays)
     return out

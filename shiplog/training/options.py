@@ -69,7 +69,7 @@ class TrainOptions:
                     hint=f"{option} can be {listed(allowed)}.",
                 )
         kind = MODELS[self.model]
-        for name in self._given():
+        for name in filter(taking, self.given()):
             flag = "--no-fit" if name == "fit" else f"--{name.replace('_', '-')}"
             hint = f"it goes with --model {' or '.join(taking(name))}."
             if name in kind.family.options and not kind.takes(name):
@@ -104,13 +104,9 @@ class TrainOptions:
             "fast": _known(iterations=self.epochs),
         }
 
-    def _given(self) -> list[str]:
-        """Options of one family only that are not as they are left."""
-        return [
-            field.name
-            for field in fields(self)
-            if taking(field.name) and getattr(self, field.name) != field.default
-        ]
+    def given(self) -> list[str]:
+        """Options that are not as they are left."""
+        return [one.name for one in fields(self) if getattr(self, one.name) != one.default]
 
 
 def _known(**values: Any) -> dict[str, Any]:

@@ -7,15 +7,13 @@ import platform
 import subprocess
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import polars as pl
 import torch
-
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
 
 
 @dataclass(frozen=True)
@@ -26,9 +24,11 @@ class Answer:
     content: dict
 
 
-def provenance(store: Store, split: Split, began: float) -> dict:
-    """Versions, commit, log hashes, device and times."""
-    used = [*split.training, *split.validation]
+def provenance(logs_sha256: Mapping[str, str | None], began: float) -> dict:
+    """Versions, commit, log hashes, device and times; no path of this machine.
+
+    logs_sha256   voyage → hash of its log
+    """
     return {
         "shiplog": version("shiplog"),
         "commit": commit_of_source(),
@@ -37,11 +37,21 @@ def provenance(store: Store, split: Split, began: float) -> dict:
         "polars": pl.__version__,
         "machine": platform.machine(),
         "device": "cpu",
-        "logs_sha256": store.hashes(used),
+        "logs_sha256": dict(logs_sha256),
         "began": _utc(began),
         "ended": _utc(time.time()),
-        "command": sys.argv,
+        "command": portable(sys.argv),
     }
+
+
+def portable(arguments: Sequence[str]) -> list[str]:
+    """A command line without its folders on this machine: of absolute paths the last part."""
+    found = []
+    for argument in arguments:
+        option, equals, value = argument.rpartition("=")
+        place = PurePath(value)
+        found.append(f"{option}{equals}{place.name if place.is_absolute() else value}")
+    return found
 
 
 def _utc(stamp: float) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from shiplog.exceptions import RunError, listed
+from shiplog.exceptions import UnreadableError, listed
 from shiplog.models import FAMILIES, MODELS, NETWORK, ModelFamily
 from shiplog.toml_section import Section
 from shiplog.voyages.split_settings import Split
@@ -122,11 +122,11 @@ class Config(Section):
 
 
 def load(path: Path) -> Config:
-    """A config from TOML. Raises RunError naming what is wrong."""
+    """A config from TOML. Raises UnreadableError naming what is wrong."""
     try:
         return Config.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, RecursionError) as error:  # of TOML, UTF-8 and pydantic
         first = str(error).splitlines()[0] if isinstance(error, ValidationError) else error
-        raise RunError(
+        raise UnreadableError(
             f"{path} is no configuration of a run: {first}.", hint="train the run again."
         ) from error

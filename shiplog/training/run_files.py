@@ -16,15 +16,15 @@ from safetensors.numpy import save_file as save_numpy
 from safetensors.torch import load_file, save_file
 
 from shiplog import files
-from shiplog.exceptions import RunError
+from shiplog.exceptions import UnreadableError
 
 
-def unreadable(path: Path, why: object) -> RunError:
-    return RunError(f"{path} cannot be read: {why}.", hint="train the run again.")
+def unreadable(path: Path, why: object) -> UnreadableError:
+    return UnreadableError(f"{path} cannot be read: {why}.", hint="train the run again.")
 
 
 def json_of(path: Path) -> Any:
-    """Raises RunError."""
+    """Raises UnreadableError."""
     try:
         return json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -32,7 +32,7 @@ def json_of(path: Path) -> Any:
 
 
 def table(path: Path) -> pl.DataFrame:
-    """Raises RunError."""
+    """Raises UnreadableError."""
     try:
         return pl.read_parquet(path)
     except (OSError, pl.exceptions.PolarsError) as error:
@@ -40,7 +40,7 @@ def table(path: Path) -> pl.DataFrame:
 
 
 def tensors(path: Path) -> dict[str, torch.Tensor]:
-    """Raises RunError."""
+    """Raises UnreadableError."""
     try:
         return load_file(path)
     except (OSError, SafetensorError) as error:
@@ -48,7 +48,7 @@ def tensors(path: Path) -> dict[str, torch.Tensor]:
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
-    """Raises RunError."""
+    """Raises UnreadableError."""
     try:
         return load_arrays(path)
     except (OSError, SafetensorError) as error:

@@ -15,20 +15,21 @@ them stands in `load_model`.
 
 While it is being trained a run is called <run>.partial; it is renamed when every seed is done.
 Killed, it goes on from the finished seeds and, in the paper's recipe, from the last checkpoint.
+<run>.partial itself appears with all that a training needs, or not at all.
 """
 
 from __future__ import annotations
 
+import logging
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 from pydantic import ValidationError
 
 from shiplog import files
-from shiplog.exceptions import RunError
+from shiplog.exceptions import RunError, UnreadableError
 from shiplog.models import MODELS, Kind
 from shiplog.models.feedforward import Scaling
 from shiplog.paths import check_run, refuse_taken
@@ -38,6 +39,8 @@ from shiplog.simulation.prediction_interval import Band
 from shiplog.training import run_config as configuration
 from shiplog.training import run_files
 from shiplog.training.run_config import Config
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -101,9 +104,15 @@ class RunFolder:
         free."""
         return run_files.table(self.seed(seed) / "identified.parquet")
 
+    def logs_sha256(self) -> dict[str, str | None]:
+        """Voyage → hash of its log, as its provenance has them; none where it has none."""
+        found = run_files.json_of(self.path / "provenance.json")
+        known = found.get("logs_sha256") if isinstance(found, dict) else None
+        return known if isinstance(known, dict) else {}
+
     def save_cross_validation(self, losses: pl.DataFrame) -> None:
         """groups, voyage, window, start (L of the starting values), loss."""
-        losses.write_parquet(self.path / "cross_validation.parquet")
+        files.write_frame(self.path / "cross_validation.parquet", losses)
 
     def save_band(self, band: Band) -> None:
         arrays = {"growth": band.growth, "factor": band.factor}
@@ -142,29 +151,55 @@ def create(
     """
     partial = path.with_name(f"{path.name}.partial")
     refuse_taken(path)
-    if partial.is_dir() and (partial / "config.toml").is_file():
-        begun = configuration.load(partial / "config.toml")
-        same = begun == config and _same_rows(partial, training)
-        if not same:
-            raise RunError(
-                f"{partial} was begun with other settings or data and is not finished.",
-                hint=f"finish it with its own settings, choose another --out, or remove {partial}.",
+    if partial.exists():
+        try:
+            _refuse_other(partial, config, training, validation)
+            for folder in (partial, *partial.glob("seed*")):
+                files.sweep(folder)
+            return RunFolder(partial, config, profile)
+        except UnreadableError as error:
+            _refuse_foreign(partial)
+            log.warning("%s", error.message)
+            log.warning("%s is begun anew.", partial)
+            shutil.rmtree(partial)
+    with files.whole_folder(partial) as new:
+        windows.write_parquet(new / "windows.parquet")
+        training.write_parquet(new / "training.parquet")
+        validation.write_parquet(new / "validation.parquet")
+        files.write_json(new / "profile.json", profile.model_dump(mode="json"))
+        if scaling is not None:
+            run_files.save_tensors(
+                new / "scaling.safetensors",
+                {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
             )
-        return RunFolder(partial, config, profile)
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
-    windows.write_parquet(partial / "windows.parquet")
-    training.write_parquet(partial / "training.parquet")
-    validation.write_parquet(partial / "validation.parquet")
-    files.write_json(partial / "profile.json", profile.model_dump(mode="json"))
-    if scaling is not None:
-        run_files.save_tensors(
-            partial / "scaling.safetensors",
-            {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
-        )
-    # Last, and whole: a folder with a config is one that can be gone on with.
-    files.write_text(partial / "config.toml", config.to_toml())
+        files.write_text(new / "config.toml", config.to_toml())
     return RunFolder(partial, config, profile)
+
+
+def _refuse_other(
+    partial: Path, config: Config, training: pl.DataFrame, validation: pl.DataFrame
+) -> None:
+    """Raises RunError where a begun run has other settings or data; UnreadableError where these
+    cannot be read."""
+    same = configuration.load(partial / "config.toml") == config and all(
+        run_files.table(partial / f"{name}.parquet").equals(rows)
+        for name, rows in (("training", training), ("validation", validation))
+    )
+    if not same:
+        raise RunError(
+            f"{partial} was begun with other settings or data and is not finished.",
+            hint=f"finish it with its own settings, choose another --out, or remove {partial}.",
+        )
+
+
+def _refuse_foreign(partial: Path) -> None:
+    """Raises RunError for a folder that no training began: it is not to be removed."""
+    if (partial.is_dir() and not any(partial.iterdir())) or (partial / "config.toml").is_file():
+        return
+    raise RunError(
+        f"{partial} is there, and is no run that was begun: there is no config.toml in it.",
+        hint=f"choose another --out, or move {partial} away.",
+    )
 
 
 def open_finished(path: Path) -> RunFolder:
@@ -187,17 +222,3 @@ def open_folder(path: Path) -> RunFolder:
     except ValidationError as error:
         raise run_files.unreadable(path / "profile.json", advice(error)) from error
     return RunFolder(path, config, profile)
-
-
-def _same_rows(partial: Path, training: pl.DataFrame) -> bool:
-    """Same seconds and values; to rounding, since a parallel mean may add in another order."""
-    begun = pl.read_parquet(partial / "training.parquet")
-    if begun.columns != training.columns or begun.height != training.height:
-        return False
-    exact = [name for name, dtype in training.schema.items() if not dtype.is_float()]
-    if not begun.select(exact).equals(training.select(exact)):
-        return False
-    values = [name for name in training.columns if name not in exact]
-    return bool(
-        np.allclose(begun.select(values).to_numpy(), training.select(values).to_numpy(), atol=1e-9)
-    )

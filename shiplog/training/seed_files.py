@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,10 +16,13 @@ import polars as pl
 import torch
 
 from shiplog import files
+from shiplog.exceptions import UnreadableError
 from shiplog.models.feedforward import FeedForward
 from shiplog.simulation.sensitivities import Simulator
 from shiplog.training import run_files
 from shiplog.training.network_training import HISTORY, Progress
+
+log = logging.getLogger(__name__)
 
 
 def save_network(folder: Path, progress: Progress) -> None:
@@ -62,11 +66,18 @@ def save_checkpoint(folder: Path, progress: Progress) -> None:
 
 
 def load_checkpoint(folder: Path) -> Progress | None:
-    """Where an unfinished seed stands, or None."""
+    """Where an unfinished seed stands; None where it begins, as with a checkpoint of no use."""
     path = folder / "checkpoint.safetensors"
     if not path.is_file():
         return None
-    tensors = run_files.tensors(path)
+    try:
+        return _progress(run_files.tensors(path))
+    except (UnreadableError, KeyError, IndexError, ValueError) as error:
+        log.warning("%s cannot be read, its training begins anew: %s", path, error)
+        return None
+
+
+def _progress(tensors: Mapping[str, torch.Tensor]) -> Progress:
     rows = [(int(row[0]), *row[1:]) for row in tensors["history"].tolist()]
     best, first, smoothed, steps = tensors["numbers"].tolist()
     order = list(_named([torch.empty(0)] * sum(n.startswith("layer") for n in tensors)))
@@ -107,5 +118,5 @@ def save_physics(
     folder.mkdir(exist_ok=True)
     arrays = {"theta": simulator.theta, "covariance": simulator.covariance, **fixed}
     run_files.save_arrays(folder / "model.safetensors", arrays)
-    (folder / "parameters.toml").write_text(parameters, encoding="utf-8")
-    identified.write_parquet(folder / "identified.parquet")
+    files.write_text(folder / "parameters.toml", parameters)
+    files.write_frame(folder / "identified.parquet", identified)

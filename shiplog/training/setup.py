@@ -51,16 +51,21 @@ def prepare(
     held: pl.DataFrame,
     planned: pl.DataFrame,
     parameters: Path | None,
+    known: pl.DataFrame | None = None,
 ) -> Prepared:
     """Equations, starting values and windows of a run. Raises ProfileError or WindowError.
 
     learnt, held   seconds of the training and of the validation voyages
     planned        the training windows
+    known          starting values of an earlier run: name, start, spread
     """
     equations = MODELS[config.model].equations
     model, start, estimates = equations.begin(profile, config.physics, parameters)
-    for sentence in estimates:
-        log.info(sentence)
+    if known is None:
+        for sentence in estimates:
+            log.info(sentence)
+    else:
+        start = _as_known(start, known, config.physics.parameters)
     names = (profile.actuator_names, profile.wind_names)
     cut = windows.cut(learnt, planned, config.window, *names)
     _refuse_none(planned, config.window, config.split.training)
@@ -82,6 +87,17 @@ def prepare(
         model, start, data, voyages, [first[v] for v in voyages],
         _free(config.physics.free, start.names), unseen,
     )  # fmt: skip
+
+
+def _as_known(start: Parameters, known: pl.DataFrame, source: str) -> Parameters:
+    """Raises RunError where the earlier run has other coefficients."""
+    if tuple(known["name"]) != start.names:
+        raise RunError(
+            "The run has other coefficients than this version of its model.",
+            hint="repeat it with the shiplog that made it; its provenance.json names the version.",
+        )
+    values, spread = (known[column].to_numpy() for column in ("start", "spread"))
+    return replace(start, values=values, spread=spread, source=source)
 
 
 def _refuse_none(planned: pl.DataFrame, size: int, voyages: Sequence[str]) -> None:

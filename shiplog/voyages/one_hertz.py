@@ -30,26 +30,32 @@ def averages(
     columns: Sequence[str],
     circular: Iterable[str],
     least: int = LEAST_SAMPLES,
-) -> pl.LazyFrame:
-    """10 Hz rows to 1 Hz rows (Sec. 4.1 of the paper), unsorted, in flat memory.
+) -> pl.DataFrame:
+    """10 Hz rows of one voyage to 1 Hz rows (Sec. 4.1 of the paper), by time.
 
     table: voyage, time, `columns` (SI), quality. Bins run from half a second before their stamp
-    to half a second after. Truncating streams; `group_by_dynamic` does not stay bounded.
+    to half a second after. The rows of a bin are added in the order of time, whatever the number
+    of threads: `group_by` adds parts in the order in which its threads end, and coefficients
+    fitted to such means differ in the eighth digit.
     """
     circular = set(circular)
     means = [mean_angle(c) if c in circular else pl.col(c).mean() for c in columns]
     good = pl.col("quality") & int(UNUSABLE) == 0
-    second = pl.col("time").dt.offset_by("500ms").dt.truncate("1s")
+    shifted = pl.col("time").dt.offset_by("500ms")
+    rows = table.filter(good).with_columns(time=shifted).collect().rechunk()
+    if not rows["time"].is_sorted():
+        rows = rows.sort("time", maintain_order=True)
     return (
-        table.filter(good)
-        .group_by("voyage", second)
+        rows.set_sorted("time")
+        .group_by_dynamic("time", every="1s")
         .agg(
+            pl.col("voyage").first(),
             *means,
             samples=pl.len(),
             jump=(pl.col("quality") & int(Quality.JUMP) != 0).any(),
         )
         .filter((pl.col("samples") >= least) & ~pl.col("jump"))
-        .drop("jump")
+        .select("voyage", pl.exclude("voyage", "jump"))
     )
 
 
@@ -65,11 +71,7 @@ def resample(
     one, the stamps are exactly 1 s apart.
     """
     circular = frozenset(circular)
-    parts = [
-        averages(part, columns, circular, least).collect(engine="streaming")
-        for table in tables
-        for part in days(table)
-    ]
+    parts = [averages(day, columns, circular, least) for table in tables for day in days(table)]
     return segments(pl.concat(parts))
 
 
@@ -81,14 +83,13 @@ def sink_averages(
     circular = frozenset(circular)
     parts = (part for table in tables for part in days(table))
     for number, part in enumerate(parts):
-        target = folder / f"{number:06d}.parquet"
-        averages(part, columns, circular).sort("time").sink_parquet(target, engine="streaming")
+        averages(part, columns, circular).write_parquet(folder / f"{number:06d}.parquet")
 
 
 def days(table: pl.LazyFrame) -> Iterator[pl.LazyFrame]:
     """One voyage's rows in pieces of at most a day, cut where bins are.
 
-    Grouping keeps every second it has met; a day of them is 100 MB whatever the voyage's length.
+    A day of rows is some 100 MB, whatever the voyage's length.
     """
     first, last = (
         table.select(pl.col("time").min().alias("first"), pl.col("time").max().alias("last"))

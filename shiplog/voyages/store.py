@@ -1,15 +1,18 @@
-"""Ingested voyages on disk: hive Parquet, one folder a voyage, and a small catalogue.
+"""Ingested voyages on disk: hive Parquet, one folder a voyage.
 
-    store/catalogue.parquet               one row a voyage, made again from the folders
     store/voyage=<name>/table.parquet     10 Hz, zstd
     store/voyage=<name>/voyage.json       ship, profile, source hash, report, corrections
+    store/.voyage=<name>.new, .old        while a voyage is written, or replaced
     store/.lock                           held by the one process that writes
 
-A voyage is written under a hidden name and renamed when complete. The folders are the truth: a
-process that is killed between a folder's rename and the catalogue's leaves a catalogue that is out
-of date, which every reader notices. The same log through the same profile is recognised by its
-content and left alone; another log under a taken name is refused. What was put right is part of
-that: the same log ingested without is the table as it was measured.
+A voyage is written under a hidden name and renamed when complete: wherever a process is killed, a
+voyage is there as it was, or as it was to become. What is listed are the folders themselves, so
+that no list can be out of date. Readers wait for nobody: while a voyage is replaced they find the
+one that was there before. What a killed process left is put in order by the next one.
+
+The same log through the same profile is recognised by its content and left alone; another log
+under a taken name is refused. What was put right is part of that: the same log ingested without is
+the table as it was measured.
 """
 
 from __future__ import annotations
@@ -20,14 +23,13 @@ import logging
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
 import polars as pl
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from shiplog import files
@@ -43,7 +45,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
 INGEST_VERSION = 4  # raised when the same log would become another table or report
-LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
+SILENT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)
 
@@ -55,10 +57,9 @@ class Store:
         self.path = Path(path)
 
     def entries(self) -> list[CatalogueEntry]:
-        """All voyages, by name. Reads the catalogue, or the folders where the two differ."""
-        if catalogue.interrupted(self.path):
-            self.mend()
-        return catalogue.entries(self.path, self._catalogue())
+        """All voyages, by name."""
+        self.mend(wait=False)
+        return catalogue.entries(self.path)
 
     def select(self, patterns: Sequence[str] | None = None) -> list[str]:
         """Names that match any of the shell patterns, each name once; all when none is given. A
@@ -95,49 +96,50 @@ class Store:
         Raises StoreError where the name is taken by another log, or the store cannot be written;
         it is then as it was.
         """
-        folder = self._folder(voyage.name)
+        place = catalogue.place(self.path, voyage.name)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             with self._writing():
-                return self._add(voyage, folder)
+                return self._add(voyage, place)
         except (OSError, pl.exceptions.PolarsError) as error:
+            refusal = files.refused(error, place)
+            why = refusal.strerror if isinstance(refusal, OSError) else refusal
             raise StoreError(
-                f"The voyage {voyage.name!r} cannot be written into the store {self.path}: "
-                f"{error}.",
-                hint="give a --store on a disk with room that you may write to.",
+                f"The voyage {voyage.name!r} cannot be written into the store {self.path}: {why}.",
+                hint="give a --store on a disk with room that you may write to; what is in the "
+                "store is as it was.",
             ) from error
 
-    def _add(self, voyage: Voyage, folder: Path) -> str:
+    def _add(self, voyage: Voyage, place: Path) -> str:
         asked = voyage.corrected is not None
         fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked)
         state = "added"
-        if folder.is_dir():
-            facts = catalogue.known(folder)
+        if place.is_dir():
+            facts = catalogue.known(place)
             if facts and facts["sha256"] != voyage.contents.sha256:
                 raise StoreError(
                     f"The store {self.path} already holds another log as the voyage "
                     f"{voyage.name!r} (from {facts['source']}).",
                     hint="rename the log file, or ingest into another --store.",
                 )
-            if facts and facts["fingerprint"] == fingerprint and _whole(folder, facts):
-                self._list()
+            if facts and facts["fingerprint"] == fingerprint and _whole(place, facts):
                 return "unchanged"
             state = "replaced"
-        new, old = (folder.with_name(f".{folder.name}{end}") for end in (NEW, OLD))
+        new = catalogue.hidden(place, NEW)
+        table, facts = new / "table.parquet", new / "voyage.json"
         try:
             new.mkdir()
             voyage.table.select(pl.lit(voyage.name).alias("voyage"), pl.all()).write_parquet(
-                new / "table.parquet", compression="zstd", row_group_size=1_000_000
+                table, compression="zstd", row_group_size=1_000_000
             )
-            (new / "voyage.json").write_text(
-                json.dumps(_describe(voyage, fingerprint), indent=1), encoding="utf-8"
-            )
+            facts.write_text(json.dumps(_describe(voyage, fingerprint), indent=1), encoding="utf-8")
+            for path in (table, facts):
+                files.flush(path)
             if state == "replaced":  # the old table stands until the new one is whole
-                folder.rename(old)
-            new.rename(folder)
+                place.rename(catalogue.hidden(place, OLD))
+            new.rename(place)
         finally:
             self._sweep()
-        self._list()
         return state
 
     def holds(self, name: str, sha256: str, profile: Profile, correct: bool = False) -> bool:
@@ -148,15 +150,20 @@ class Store:
         fingerprint = fingerprint_of(sha256, profile, correct)
         return bool(facts) and facts["fingerprint"] == fingerprint and _whole(folder, facts)
 
-    def mend(self) -> None:
-        """Finish what an interrupted ingest left undone: a voyage that was being replaced goes
-        back to its place, and the catalogue lists every voyage. A store that cannot be written is
-        left as it is."""
-        if not self.path.is_dir():
+    def mend(self, wait: bool = True) -> None:
+        """Remove what an interrupted ingest left, and put back the voyage that it was replacing.
+
+        wait   for a process that writes at this moment; else what lies there is that process's
+
+        A store that cannot be written is left as it is: readers know how to read it.
+        """
+        if not catalogue.unfinished(self.path):
             return
         try:
-            with self._writing():
-                self._list()
+            with self._writing(wait):
+                pass
+        except Timeout:
+            pass
         except OSError as error:
             log.debug("%s stays as it is: %s", self.path, error)
 
@@ -233,57 +240,40 @@ class Store:
         return {name: known.get(part.whole if part else name) for name, part in of.items()}
 
     def _folder(self, name: str) -> Path:
-        """A voyage's folder. Raises StoreError for a name that no folder can have."""
-        try:
-            folder = f"voyage={quote(name, safe=' ()+,')}"
-        except UnicodeEncodeError as error:
-            raise StoreError(
-                f"The name {name!a} of the log is not text.", hint="rename the log file."
-            ) from error
-        if len(folder) > LONGEST:
-            raise StoreError(
-                f"The name {name!r} of the log is too long for a folder.",
-                hint="rename the log file.",
-            )
-        return self.path / folder
+        """The folder to read a voyage from. Raises StoreError for a name that none can have."""
+        return catalogue.whole(catalogue.place(self.path, name))
 
     @contextmanager
-    def _writing(self) -> Iterator[None]:
-        """Alone: two that write at once would each make a catalogue without the other's voyage.
-        What an interrupted process left behind is put in order first."""
-        with FileLock(self.path / ".lock"):
+    def _writing(self, wait: bool = True) -> Iterator[None]:
+        """Alone: another process waits here. What an interrupted one left is put in order first.
+
+        Raises OSError where the store cannot be written; Timeout where another process writes and
+        this one does not wait.
+        """
+        lock = FileLock(self.path / ".lock")
+        try:
+            lock.acquire(timeout=SILENT_S if wait else 0.0)
+        except Timeout:
+            if not wait:
+                raise
+            log.info("waiting for another process that writes into the store %s", self.path)
+            lock.acquire()
+        try:
             self._sweep()
             yield
+        finally:
+            lock.release()
 
     def _sweep(self) -> None:
         """Back in its place what was being replaced; away with what was never whole."""
         for old in self.path.glob(f".voyage=*{OLD}"):
-            place = old.with_name(old.name.removeprefix(".").removesuffix(OLD))
+            place = catalogue.place_of(old)
             if place.is_dir():
                 shutil.rmtree(old, ignore_errors=True)
             else:
                 old.rename(place)
         for new in self.path.glob(f".voyage=*{NEW}"):
             shutil.rmtree(new, ignore_errors=True)
-
-    def _catalogue(self) -> list[CatalogueEntry]:
-        """What catalogue.parquet lists; nothing where it cannot be read."""
-        path = self.path / "catalogue.parquet"
-        try:
-            table = pl.read_parquet(path)
-        except (OSError, pl.exceptions.PolarsError):
-            return []
-        if table.columns != [field.name for field in fields(CatalogueEntry)]:
-            return []
-        return [CatalogueEntry(**row) for row in table.to_dicts()]
-
-    def _list(self) -> None:
-        """Write the catalogue anew, if it does not say what the folders say."""
-        entries = catalogue.entries(self.path, self._catalogue())
-        if entries == self._catalogue():
-            return
-        rows = pl.DataFrame([asdict(entry) for entry in entries])
-        files.write_frame(self.path / "catalogue.parquet", rows)
 
 
 def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:

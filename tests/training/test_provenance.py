@@ -19,3 +19,12 @@ def test_the_commit_is_that_of_the_checkout_the_source_lies_in(monkeypatch):
         assert found == done.stdout.strip()
     monkeypatch.setattr(provenance, "__file__", "/nowhere/at/all/provenance.py")
     assert provenance.commit_of_source() is None
+
+
+def test_a_command_line_is_kept_without_the_folders_of_its_machine():
+    given = ["/opt/venv/bin/shiplog", "train", "--out=/home/someone/runs/a", "--store", "/data/sea",
+             "--voyages", "trial_*", "--out", "../runs/b", "--width", "8"]  # fmt: skip
+    assert provenance.portable(given) == [
+        "shiplog", "train", "--out=a", "--store", "sea", "--voyages", "trial_*", "--out",
+        "../runs/b", "--width", "8",
+    ]  # fmt: skip

@@ -75,9 +75,10 @@ def test_the_same_command_goes_on_and_another_is_refused(begun):
     other = CONFIG.model_copy(update={"window": 50})
     with pytest.raises(RunError, match="other settings"):
         run_folder.create(out, other, PROFILE, model.scaling, ROWS, ROWS, ROWS)
-    moved = ROWS.with_columns(surge=pl.col("surge") + 0.1)
-    with pytest.raises(RunError, match="other settings or data"):
-        run_folder.create(out, CONFIG, PROFILE, model.scaling, ROWS, moved, ROWS)
+    moved = ROWS.with_columns(surge=pl.col("surge") + 1e-15)
+    for rows in ((ROWS, moved, ROWS), (ROWS, ROWS, moved)):
+        with pytest.raises(RunError, match="other settings or data"):
+            run_folder.create(out, CONFIG, PROFILE, model.scaling, *rows)
 
 
 def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path):
@@ -91,6 +92,83 @@ def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path)
         run_folder.create(tmp_path / "run", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
 
 
+@pytest.mark.parametrize("raw", [b"", b"\xff\xfe", b"[[[", None])
+def test_a_begun_run_that_cannot_be_read_is_begun_anew(begun, caplog, raw):
+    """As a power cut or a full disk may leave it."""
+    run, model, batches = begun
+    seed_files.save_network(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
+    file = run.path / ("windows.parquet" if raw is None else "config.toml")
+    spoilt = run.path / ("training.parquet" if raw is None else "config.toml")
+    spoilt.write_bytes(b"x" if raw is None else raw)
+    again = run_folder.create(
+        run.path.with_name("run"), CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS
+    )
+    assert not again.finished(0) and file.is_file()
+    assert run_folder.open_folder(again.path).config == CONFIG
+    assert again.training().equals(ROWS)
+    assert f"{run.path} is begun anew." in caplog.messages
+
+
+def test_a_folder_that_no_training_began_is_not_removed(begun, tmp_path):
+    _run, model, _ = begun
+    (tmp_path / "other.partial").mkdir()
+    diary = tmp_path / "other.partial" / "diary.txt"
+    diary.write_text("at sea")
+    with pytest.raises(RunError) as told:
+        run_folder.create(tmp_path / "other", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    assert str(told.value) == (
+        f"{diary.parent} is there, and is no run that was begun: there is no config.toml in it.\n"
+        f"  choose another --out, or move {diary.parent} away."
+    )
+    assert diary.read_text() == "at sea"
+
+
+def test_nothing_of_a_run_appears_before_all_of_it(begun, tmp_path, monkeypatch):
+    """Whoever is killed, or runs out of disk, while a run is begun leaves no part of it."""
+    _run, model, _ = begun
+    write = pl.DataFrame.write_parquet
+    count = 0
+
+    def fills_up(frame, path, *args, **kwargs):
+        nonlocal count
+        count += 1
+        assert not (tmp_path / "other.partial").exists()
+        if count == 3:
+            raise pl.exceptions.ComputeError(f"No space left on device (os error 28): {path}")
+        return write(frame, path, *args, **kwargs)
+
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", fills_up)
+    with pytest.raises(OSError, match="No space left on device") as told:
+        run_folder.create(tmp_path / "other", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    assert told.value.filename == str(tmp_path / "other.partial")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.partial"]
+
+
+def test_a_resumed_run_holds_no_leavings_of_the_killed_one(begun):
+    run, model, _ = begun
+    run.seed(0).mkdir()
+    of_nobody = f"{files.MACHINE}-{2**22 + 1}.partial"  # more than Linux numbers processes
+    leavings = [run.path / f".provenance.json.{of_nobody}",
+                run.seed(0) / f".checkpoint.safetensors.{of_nobody}"]  # fmt: skip
+    for path in leavings:
+        path.touch()
+    run_folder.create(run.path.with_name("run"), CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    assert not any(path.exists() for path in leavings)
+
+
+def test_a_torn_checkpoint_begins_its_seed_anew(begun, caplog):
+    run, model, batches = begun
+    paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
+          checkpoint=lambda p: seed_files.save_checkpoint(run.seed(0), p))  # fmt: skip
+    path = run.seed(0) / "checkpoint.safetensors"
+    for raw in (b"", path.read_bytes()[:200], path.read_bytes().replace(b"history", b"mystery")):
+        path.write_bytes(raw)
+        caplog.clear()
+        assert seed_files.load_checkpoint(run.seed(0)) is None
+        (message,) = caplog.messages
+        assert message.startswith(f"{path} cannot be read, its training begins anew: ")
+
+
 def test_a_torn_weight_file_is_named(begun):
     run, model, batches = begun
     seed_files.save_network(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
@@ -98,8 +176,3 @@ def test_a_torn_weight_file_is_named(begun):
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
         load_model.network(run).simulator(0)
-
-
-def test_json_has_no_infinity(tmp_path):
-    files.write_json(tmp_path / "a.json", {"loss": float("inf"), "seeds": [1.0, float("nan")]})
-    assert (tmp_path / "a.json").read_text().count("null") == 2

@@ -8,6 +8,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog.report.text_table import inert
 from shiplog.report.viewer.recording import whole
 
 
@@ -23,6 +24,6 @@ def write(title: str, text: str, pictures: Mapping[str, Path], path: Path) -> No
         rrb.BlueprintPanel(state="hidden"),
     )  # fmt: skip
     with whole(title, blueprint, path) as recording:
-        recording.log("text", rr.TextDocument(text, media_type="text/markdown"), static=True)
+        recording.log("text", rr.TextDocument(inert(text), media_type="text/markdown"), static=True)
         for number, picture in enumerate(pictures.values()):
             recording.log(f"figure/{number}", rr.EncodedImage(path=picture), static=True)

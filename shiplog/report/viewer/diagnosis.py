@@ -13,6 +13,7 @@ import rerun.blueprint as rrb
 from shiplog import channels
 from shiplog.report.comparison_data import ComparisonData
 from shiplog.report.diagnosis_data import AFTER, BEFORE, Exhibit
+from shiplog.report.text_table import inert
 from shiplog.report.viewer import display, forces, style, timeline, trajectory
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
@@ -219,7 +220,9 @@ def send(recording: rr.RecordingStream, picture: Pictured) -> None:
         _send_forces(recording, picture, voyage)
         _send_errors(recording, picture, voyage)
     text = picture.exhibit.report.translate(DRAWABLE)
-    recording.log("/report", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    recording.log(
+        "/report", rr.TextDocument(inert(text), media_type=rr.MediaType.MARKDOWN), static=True
+    )
 
 
 def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
+from shiplog.report.text_table import inert
 from shiplog.report.viewer import display, forces
 from shiplog.report.viewer.display import Drawn
 
@@ -41,4 +42,6 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     physical = forces.of_first_model(drawn)["model"].unique().to_list()
     legend = "".join(FORCES.format(model=model) for model in physical)
     text = f"# {drawn.title}\n\n{drawn.summary}\n{LEGEND}{legend}{bold}\n"
-    recording.log("/report", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    recording.log(
+        "/report", rr.TextDocument(inert(text), media_type=rr.MediaType.MARKDOWN), static=True
+    )
