@@ -120,12 +120,14 @@ def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
     return (alone - nothing) / whole if whole > 0.0 else 1.0
 
 
-def share_of_remainder(table: Hypotheses, one: Hypothesis) -> float:
-    """Of what a hypothesis explains beyond nothing, the share that its remainder adds to the causes
-    with nominal process noise; all of it where these were not compared."""
-    whole = one.evidence - table.nothing.evidence
+def slight(table: Hypotheses, one: Hypothesis) -> bool:
+    """Whether the remainder of a hypothesis adds so little to its causes with nominal process noise
+    that it can be an error of their equations."""
     plain = table.found.get((one.causes, NOMINAL))
-    return 1.0 if plain is None or whole <= 0.0 else (one.evidence - plain.evidence) / whole
+    whole = one.evidence - table.nothing.evidence
+    if plain is None or whole <= 0.0:
+        return False
+    return one.evidence - plain.evidence <= thresholds.SLIGHT * whole
 
 
 def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:

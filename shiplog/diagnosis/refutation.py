@@ -16,7 +16,6 @@ from typing import Protocol
 
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import result as decisions
-from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.posterior import Posterior
 from shiplog.diagnosis.result import Decision
@@ -38,10 +37,8 @@ class Judge(Protocol):
 
 def _in_doubt(search: Search, found: Posterior, decision: Decision) -> bool:
     """Whether a remainder is stated that is more than an error of the causes' equations."""
-    if found.remainder is None:
-        return False
     best = posteriors.best_with(found, [one.cause.name for one in decision.named])
-    return posteriors.share_of_remainder(search.table, best) > thresholds.SLIGHT
+    return found.remainder is not None and not posteriors.slight(search.table, best)
 
 
 def judged(

@@ -182,7 +182,16 @@ CAUSES = (
     "clock_offset", "antenna_offset", "wind_direction_offset", "wind_speed_scale", "coverage",
     "external", "unknown",
 )  # fmt: skip
-FAMILIES = ("position", "heading", "time", "motion", "controls", "wind", "stochastic")
+FAMILIES = (
+    "position",
+    "heading",
+    "time",
+    "motion",
+    "controls",
+    "wind",
+    "stochastic",
+    "intermittent",
+)
 
 
 def shaped(v: dict) -> None:
