@@ -120,6 +120,11 @@ def tensor(path, entity, component):
     return np.array(value["buffer"]).reshape(value["shape"])
 
 
+def test_the_line_of_a_bank_says_what_it_is(saved):
+    table = column(saved, "/track/harbour/banks", "LineStrips2D:labels")
+    assert table["LineStrips2D:labels"].to_list() == [["bank"]]
+
+
 def test_everything_compared_is_an_entity(saved):
     text = RrdReader(saved).store().summary()
     for path in (

@@ -269,6 +269,8 @@ def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: 
             entity("track", voyage, "banks"),
             rr.LineStrips2D(
                 [[(y, -x) for x, y in bank] for bank in drawn.banks],
+                labels=["bank"] * len(drawn.banks),
+                show_labels=True,
                 colors=style.BANK,
                 radii=rr.Radius.ui_points(2.0),
                 draw_order=2.0,
