@@ -269,11 +269,21 @@ def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: 
             entity("track", voyage, "banks"),
             rr.LineStrips2D(
                 [[(y, -x) for x, y in bank] for bank in drawn.banks],
-                labels=["bank"] * len(drawn.banks),
-                show_labels=True,
                 colors=style.BANK,
                 radii=rr.Radius.ui_points(2.0),
                 draw_order=2.0,
+            ),
+            static=True,
+        )
+        middles = [np.mean([(y, -x) for x, y in bank], axis=0) for bank in drawn.banks]
+        recording.log(
+            entity("track", voyage, "banks", "labels"),
+            rr.Points2D(
+                middles,
+                labels=["bank"] * len(middles),
+                show_labels=True,
+                colors=style.TICK,
+                radii=rr.Radius.ui_points(0.0),
             ),
             static=True,
         )
