@@ -120,6 +120,12 @@ def tensor(path, entity, component):
     return np.array(value["buffer"]).reshape(value["shape"])
 
 
+def test_the_line_of_a_bank_says_what_it_is(saved):
+    table = column(saved, "/track/harbour/banks/labels", "Points2D:labels")
+    assert table["Points2D:labels"].to_list() == [["bank"]]
+    assert table["Points2D:positions"].to_list() == [[[15.0, 10.0]]]  # its middle, north up
+
+
 def test_everything_compared_is_an_entity(saved):
     text = RrdReader(saved).store().summary()
     for path in (

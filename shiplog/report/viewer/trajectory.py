@@ -275,6 +275,18 @@ def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: 
             ),
             static=True,
         )
+        middles = [np.mean([(y, -x) for x, y in bank], axis=0) for bank in drawn.banks]
+        recording.log(
+            entity("track", voyage, "banks", "labels"),
+            rr.Points2D(
+                middles,
+                labels=["bank"] * len(middles),
+                show_labels=True,
+                colors=style.TICK,
+                radii=rr.Radius.ui_points(0.0),
+            ),
+            static=True,
+        )
 
 
 def extent(
