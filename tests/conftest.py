@@ -23,6 +23,7 @@ LONGEST = (
     "pipelines/test_train_physics.py", "voyages/test_sensor_consistency.py", "cli/test_endings.py",
     "experiments/test_simulated_ship.py", "voyages/test_sensor_correction.py",
     "training/test_hybrid_training.py", "diagnosis/test_residual_acceleration.py",
+    "cli/test_same_numbers.py",
 )  # fmt: skip
 
 

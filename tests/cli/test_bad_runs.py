@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 import sailing
 from own_causes import GOOD
@@ -15,7 +16,7 @@ from safetensors.numpy import load_file, save_file
 from test_bad_input import judge
 
 from pipelines.experiments import simulated_ship
-from shiplog import cli
+from shiplog import cli, files
 
 HULL = ("--model", "mmg", "--no-fit", "--without", "propeller", "--without", "rudder")
 
@@ -65,6 +66,20 @@ class Desk:
     def dir(self, name: str) -> Path:
         self.path(name).mkdir()
         return self.path(name)
+
+    def file_in(self, folder: str, name: str) -> Path:
+        (self.dir(folder) / name).touch()
+        return self.path(folder)
+
+    def train(self) -> list:
+        return ["train", "--store", self.sea / "store", "--voyages", "trip_1", "--voyages",
+                "trip_2", "--window", 20, *HULL, "--out"]  # fmt: skip
+
+    def fewer_coefficients(self) -> Path:
+        copy = self.spoilt("seed0/identified.parquet")[1]
+        known = pl.read_parquet(self.sea / "mmg/seed0/identified.parquet")
+        known[1:].write_parquet(copy / "seed0" / "identified.parquet")
+        return copy
 
     def on(self, command: str, *runs, store: str = "store", voyages: str = "trip_3") -> list:
         return [command, *(r if isinstance(r, Path) else self.sea / r for r in runs),
@@ -135,6 +150,20 @@ CASES = {
         *d.on("diagnose", "mmg"), "--out", d.file("f")]),
     "train: --out is a run": (["exists already"], lambda d: [
         "train", "--store", d.sea / "store", "--out", d.sea / "mmg"]),
+    "train: a folder in the way": (["no run that was begun", "move"], lambda d: [
+        *d.train(), d.file_in("r.partial", "diary.txt").with_name("r")]),
+    "train --again: no run": (["There is no run"], lambda d: [
+        "train", "--again", d.path("none"), "--out", d.path("r")]),
+    "train --again: not finished": (["is not finished"], lambda d: [
+        "train", "--again", d.dir("r.partial").with_name("r"), "--out", d.path("s")]),
+    "train --again: out is there": (["exists already"], lambda d: [
+        "train", "--again", d.sea / "mmg", "--out", d.sea / "short"]),
+    "train --again: an extended run": (["extended by a diagnosis", "diagnose again"], lambda d: [
+        "train", "--again", d.spoilt("extension.json", "{}")[1], "--out", d.path("r")]),
+    "train --again: other coefficients": (["other coefficients"], lambda d: [
+        "train", "--again", d.fewer_coefficients(), "--out", d.path("r")]),
+    "train --again: rows gone": (["training.parquet cannot be read"], lambda d: [
+        "train", "--again", d.spoilt("training.parquet")[1], "--out", d.path("r")]),
     "cause: no file": (["is no Python file"], lambda d: [
         *d.on("diagnose", "mmg"), "--cause", d.path("c.py")]),
     "cause: a folder": (["is no Python file"], lambda d: [
@@ -217,6 +246,40 @@ def test_it_is_one_sentence_and_exit_code_1(desk, capsys, words, arguments):
 
 def test_a_catalogue_of_rubbish_is_made_again(desk, capsys):
     judge(desk.stored("catalogue.parquet", b"x"), 0, ["Per voyage, mmg"], capsys)
+
+
+def test_again_takes_no_other_setting(desk, capsys):
+    for option in (("--window", 30), ("--model", "mmg"), ("--voyages", "trip_1")):
+        judge(["train", "--again", desk.sea / "mmg", "--out", desk.path("r"), *option], 2,
+              ["--again repeats a run as it was", f"{option[0]} would change it",
+               "leave the other options out"], capsys)  # fmt: skip
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe"])
+def test_a_begun_run_with_spoilt_settings_is_begun_anew(desk, capsys, caplog, content):
+    begun = desk.dir("r.partial")
+    (begun / "config.toml").write_bytes(content)
+    judge([*desk.train(), desk.path("r")], 0, ["Mean L"], capsys)
+    assert f"{begun / 'config.toml'} is no configuration of a run" in caplog.text
+    assert f"{begun} is begun anew." in caplog.messages
+    assert desk.path("r").is_dir() and not begun.exists()
+
+
+@pytest.mark.parametrize(("number", "words"), [
+    (30, "Read-only file system"), (28, "No space left on device"), (13, "Permission denied"),
+])  # fmt: skip
+def test_a_run_that_cannot_be_written_stays_as_it_was(desk, capsys, monkeypatch, number, words):
+    """A disk that is full, or a network drive that is read-only now."""
+    copy = desk.spoilt("nothing")[1]
+    before = {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+
+    def refuse(_path):
+        raise OSError(number, words)
+
+    monkeypatch.setattr(files, "flush", refuse)
+    judge(desk.on("evaluate", copy), 1, [f"errors.parquet: {words}", "has room on its disk"],
+          capsys)  # fmt: skip
+    assert {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()} == before
 
 
 def test_a_refused_diagnosis_leaves_nothing(desk, capsys):

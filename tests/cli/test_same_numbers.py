@@ -6,19 +6,16 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 from datetime import UTC, datetime
-from pathlib import Path
 
-import polars as pl
 import pytest
 from commands import call
 
 from pipelines.experiments import simulated_ship
+from pipelines.experiments.same_numbers import content, differing, run_on
 from shiplog.training import run_folder
 
-ROOT = Path(__file__).parents[2]
 SMALL = ("--window", "20", "--store", "store")
 HULL = ("--without", "propeller", "--without", "rudder")  # it compiles quickly
 LEARN = ("--voyages", "trip_1", "--voyages", "trip_2")
@@ -31,44 +28,7 @@ COMMANDS = (
     ("evaluate", "network", "--voyages", "trip_3", "--store", "store"),
     ("diagnose", "mmg", "--voyages", "trip_3", "--store", "store", "--out", "found"),
 )  # fmt: skip
-RUNS = ("network", "mmg", "hybrid")
-TIMES = ("began", "ended", "command")  # the command is this test's own
-# In a process of its own: libraries count the cores when they are loaded.
-SCRIPT = """
-import json, os, sys
-cores, commands = json.loads(sys.argv[1])
-os.sched_setaffinity(0, cores)
-from shiplog import cli
-sys.exit(max(cli.run(command) for command in commands))
-"""
-
-
-def run_on(cores: list[int], threads: int, folder: Path, commands=COMMANDS) -> None:
-    names = ("POLARS_MAX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NPROC")
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, json.dumps([cores, commands])],
-        env={**os.environ, **dict.fromkeys(names, str(threads)), "PYTHONPATH": str(ROOT)},
-        cwd=folder, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-
-
-def content(folder: Path) -> dict[str, bytes | str]:
-    """What every file says; times and pictures, which hold times, are left out."""
-    return {
-        str(path.relative_to(folder)): said(path)
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.suffix not in (".rrd", ".lock")
-    }
-
-
-def said(path: Path) -> bytes | str:
-    if path.suffix == ".parquet":
-        return pl.read_parquet(path, hive_partitioning=False).write_json()
-    if path.name == "provenance.json":
-        known = json.loads(path.read_text(encoding="utf-8"))
-        return json.dumps({k: v for k, v in known.items() if k not in TIMES})
-    return path.read_bytes()
+NOT_REPEATED = ("provenance.json", "errors.parquet", "rollouts.parquet")
 
 
 @pytest.fixture(scope="module")
@@ -89,14 +49,14 @@ def on_one(logs, tmp_path_factory):
     """All commands on one core."""
     folder = tmp_path_factory.mktemp("one")
     shutil.copytree(logs, folder / "logs")
-    run_on([min(os.sched_getaffinity(0))], 1, folder)
+    run_on([min(os.sched_getaffinity(0))], 1, folder, COMMANDS)
     return folder
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a process is kept to one core as Linux does")
 def test_the_number_of_cores_and_threads_changes_no_bit(on_one, logs, tmp_path):
     shutil.copytree(logs, tmp_path / "logs")
-    run_on(sorted(os.sched_getaffinity(0)), 3, tmp_path)
+    run_on(sorted(os.sched_getaffinity(0)), 3, tmp_path, COMMANDS)
     one, many = content(on_one), content(tmp_path)
     assert json.loads((on_one / "found" / "verdict.json").read_text())["ranking"]
     assert {
@@ -106,20 +66,19 @@ def test_the_number_of_cores_and_threads_changes_no_bit(on_one, logs, tmp_path):
         "hybrid/seed0/model.safetensors",
         "store/voyage=trip_3/table.parquet",
     } <= set(one)
-    assert [name for name in one.keys() | many.keys() if one.get(name) != many.get(name)] == []
+    assert differing(one, many) == []
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="it takes the runs of the test above")
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", ["network", "mmg", "hybrid"])
 def test_a_run_repeats_from_its_folder_alone(on_one, tmp_path, monkeypatch, name):
     shutil.copytree(on_one / name, tmp_path / "elsewhere")
     monkeypatch.chdir(tmp_path)
     code, _, error = call("train", "--again", "elsewhere", "--out", name)
     assert code == 0, error
     before, after = content(on_one / name), content(tmp_path / name)
-    kept = {file for file in before if file.split("/")[-1] not in (
-        "provenance.json", "errors.parquet", "rollouts.parquet")}  # fmt: skip
-    assert kept == set(after) - {"provenance.json"}
+    kept = [file for file in before if file not in NOT_REPEATED]
+    assert sorted(after.keys() - {"provenance.json"}) == kept
     assert [file for file in kept if before[file] != after[file]] == []
     old, new = (run_folder.open_folder(p).logs_sha256() for p in (on_one / name, tmp_path / name))
     assert old == new and len(old) == (3 if name == "network" else 2)

@@ -486,6 +486,23 @@ def test_a_recording_that_is_not_there_is_named(tmp_path):
         viewer.serve(tmp_path / "missing.rrd")
 
 
+@pytest.mark.parametrize("how", ["window", "web"])
+def test_every_program_is_told_to_listen_on_this_machine_only(saved, monkeypatch, how):
+    started = []
+
+    class Program:
+        def __init__(self, command, **_settings):
+            started.append(command)
+            raise OSError("not started")
+
+    monkeypatch.setattr(native.subprocess, "Popen", Program)
+    monkeypatch.setenv("DISPLAY", ":0")
+    with pytest.raises(OSError, match="not started"):
+        viewer.open_viewer(saved) if how == "window" else viewer.serve(saved, port=0)
+    ((*_, option, address),) = started
+    assert (option, address) == ("--bind", "127.0.0.1")
+
+
 @pytest.mark.viewer
 def test_the_web_viewer_listens_on_this_machine_only(saved):
     with viewer.serve(saved, port=0) as served:
