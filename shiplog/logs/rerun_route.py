@@ -23,7 +23,8 @@ from typing import Any
 
 import polars as pl
 
-from . import container
+from . import scan
+from .container import Index, Survey
 from .tables import Tables, Tally
 
 log = logging.getLogger(__name__)
@@ -43,14 +44,14 @@ class Mismatch(Exception):
     """Rerun gave another type than the schema states."""
 
 
-def preflight(found: container.Survey) -> Tally | None:
+def preflight(found: Survey) -> Tally | None:
     """Check every chunk of a log and count its messages; None when it is not for Rerun.
 
     The counts are those of the message indexes, and must be those of the statistics.
     """
     tally = Tally()
-    for item in container.walk(found):
-        if isinstance(item, container.Index):
+    for item in scan.walk(found):
+        if isinstance(item, Index):
             tally.note(item.channel, item.times, known=item.channel in found.channels)
     stated = found.statistics and found.statistics.channel_message_counts
     counted = stated and {number: count for number, count in stated.items() if count}

@@ -77,6 +77,7 @@ class Tables:
     def __init__(self, found: Survey, wanted: Mapping[str, Collection[str]] | None) -> None:
         self.found, self.wanted = found, wanted
         self.failed: dict[str, int] = {}  # messages by topic whose payload did not decode
+        self.too_large: dict[str, int] = {}  # messages by topic that were not kept
         self.undecodable: dict[str, str] = {}
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}
