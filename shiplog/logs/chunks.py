@@ -10,14 +10,17 @@ from __future__ import annotations
 import logging
 import struct
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import lz4.frame
 import zstandard
+from mcap.opcode import Opcode
 from mcap.records import Chunk, McapRecord
 
 from . import records
+from .container import Alone
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +29,8 @@ LENGTH = struct.Struct("<Q")  # of the packed records, behind the compression's 
 LEAST = FIXED.size + LENGTH.size
 LONGEST_NAME = 16  # of a compression
 MOST_IN_A_CHUNK = 1 << 30  # bytes; writers make chunks of 1 to 10 MB
-PIECE = 16 << 20  # bytes unpacked at once
+AT_ONCE = 16 << 20  # bytes of a chunk that is unpacked at once
+PIECE = 4 << 20  # bytes of a larger one that are unpacked at a time
 WINDOW = 128 << 20  # bytes that zstd may keep to look back into, its own default
 BATCH = 10_000  # records handed on at once
 
@@ -64,19 +68,14 @@ def opened(packed: Chunk) -> Chunk:
     if size > MOST_IN_A_CHUNK:
         raise ValueError("states a size that cannot be")
     try:
-        if size <= PIECE:
+        if size <= AT_ONCE:
             data = _at_once(packed)
             if len(data) != size:
                 raise ValueError("does not have the size it states")
             if crc and zlib.crc32(data) != crc:
                 raise ValueError("does not match its checksum")
             return replace(packed, compression="", data=data)
-        found = 0
-        for piece in _unpacked(packed):
-            found = zlib.crc32(piece, found) if crc else 0
-        if found != crc:
-            raise ValueError("does not match its checksum")
-        for _ in records.split(_unpacked(packed), size):
+        for _ in records.split(_checked(packed), size):
             pass
         return packed
     except ValueError:
@@ -86,27 +85,39 @@ def opened(packed: Chunk) -> Chunk:
         raise ValueError("cannot be decompressed") from error
 
 
-def contents(sound: Chunk, messages: bool = True) -> Iterator[list[McapRecord]]:
+def contents(sound: Chunk, counts: Counter[int] | None = None) -> Iterator[list[McapRecord]]:
     """Schemas, channels and messages of an opened chunk, in batches; all of them or none.
 
-    messages    whether to hand them on, too
+    counts  messages by channel so far: they are then counted here, and not handed on
     Raises ValueError where the bytes are no records, before any is handed on.
     """
     size = sound.uncompressed_size
-    if size <= PIECE:  # a larger one was checked when it was opened
+    if size <= AT_ONCE:  # a larger one was checked when it was opened
         for _ in records.split(_unpacked(sound), size):
             pass
-    batch: list[McapRecord] = []
-    for opcode, body, whole in records.split(_unpacked(sound), size):
-        if opcode == records.Opcode.MESSAGE and not messages:
+    for data, places in records.split(_unpacked(sound), size):
+        for first in range(0, len(places), BATCH):
+            batch = places[first : first + BATCH]
+            bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in batch)
+            yield list(_made(bodies, counts))
+
+
+def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
+    """The same of a record that stands in no chunk."""
+    return _made([(item.opcode, memoryview(item.body), item.whole)], counts)
+
+
+def _made(
+    bodies: Iterable[tuple[int, memoryview, bool]], counts: Counter[int] | None
+) -> Iterator[McapRecord]:
+    for opcode, body, whole in bodies:
+        if opcode == Opcode.MESSAGE and counts is not None:
+            if len(body) >= records.MESSAGE.size:
+                counts[body[0] + 256 * body[1]] += 1
             continue
         made = records.record(opcode, body, whole) or records.unnamed(opcode, body)
         if made is not None:
-            batch.append(made)
-        if len(batch) >= BATCH:
-            yield batch
-            batch = []
-    yield batch
+            yield made
 
 
 def _at_once(packed: Chunk) -> bytes:
@@ -119,6 +130,16 @@ def _at_once(packed: Chunk) -> bytes:
         if framed not in (0, zstandard.CONTENTSIZE_UNKNOWN):
             raise ValueError("does not have the size it states")
     return b"".join(_unpacked(packed))
+
+
+def _checked(packed: Chunk) -> Iterator[bytes]:
+    """The same; raises ValueError at the end where the CRC is another one."""
+    found = 0
+    for piece in _unpacked(packed):
+        found = zlib.crc32(piece, found)
+        yield piece
+    if packed.uncompressed_crc not in (0, found):
+        raise ValueError("does not match its checksum")
 
 
 def _unpacked(packed: Chunk) -> Iterator[bytes]:

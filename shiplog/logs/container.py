@@ -39,6 +39,7 @@ FOOTER = struct.Struct("<QQI")
 TAIL = HEAD.size + FOOTER.size + len(MAGIC)
 AFTER_CRC = 4 + len(MAGIC)  # the end of a file that the summary's checksum leaves out
 LARGEST_SUMMARY = 256 << 20  # bytes; that of a day in chunks of a second has 10 MB
+FARTHEST = 1 << 48  # bytes: file systems refuse to look beyond what they can hold
 SECTION = 1 << 16  # numbers of channels and of schemas in a log, which are its own
 SUMMARY: dict[int, type] = {
     Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.STATISTICS: Statistics,
@@ -111,6 +112,7 @@ class Survey:
     summed: list[McapRecord] = field(default_factory=list)  # descriptions in a sound summary
     indexed: dict[int, ChunkIndex] = field(default_factory=dict)  # by where the chunk stands
     sections: int = 1  # logs that stand in the file one behind the other
+    counts: dict[int, int] = field(default_factory=dict)  # messages by channel, if not in summary
     chunks: int = 0
     losses: list[Loss] = field(default_factory=list)
     unvouched: bool = False  # some messages stand outside any CRC
@@ -194,15 +196,13 @@ def _tiled(section: bytes) -> list[McapRecord] | None:
     """The records that fill a summary to its last byte; None where they do not."""
     met = []
     try:
-        for opcode, body, _ in records.split([section], len(section)):
-            if opcode in SUMMARY:
-                record = parsed(SUMMARY[opcode], bytes(body))
-                if record is None:
-                    return None
-                met.append(record)
+        for data, places in records.split([section], len(section)):
+            for opcode, begin, stop in places:
+                if opcode in SUMMARY:
+                    met.append(parsed(SUMMARY[opcode], bytes(data[begin:stop])))
     except ValueError:
         return None
-    return met
+    return None if None in met else met
 
 
 def head(stream: IO[bytes], position: int, size: int) -> tuple[int, int, Loss | None]:
@@ -221,8 +221,8 @@ def head(stream: IO[bytes], position: int, size: int) -> tuple[int, int, Loss | 
 
 
 def read_at(stream: IO[bytes], offset: int, length: int) -> bytes:
-    """Bytes of a file, fewer at its end, none beyond what it can have."""
-    if offset >= 1 << 63:
+    """Bytes of a file, fewer at its end; an offset that no file reaches is damage."""
+    if offset > FARTHEST:
         return b""
     stream.seek(offset)
     return stream.read(length)

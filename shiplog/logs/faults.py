@@ -11,7 +11,7 @@ from shiplog.logs.health_report import Finding
 
 from .container import Loss
 from .records import LARGEST_MESSAGE
-from .tables import Order
+from .tables import Order, Tables
 
 SECOND = 1_000_000_000
 NAMED = 5  # topics of a loss; of a large log it may be hundreds
@@ -60,21 +60,20 @@ def appended(sections: int) -> list[Finding]:
     return [Finding("out_of_order", "log", sentence, value=float(sections))]
 
 
-def undecoded(
-    orphans: int, failed: Mapping[str, int], too_large: Mapping[str, int]
-) -> list[Finding]:
+def left_out(orphans: int, tables: Tables) -> list[Finding]:
     """Messages whose bytes arrived whole but that could not be kept."""
     findings = []
     if orphans:
         sentence = f"{orphans} messages belong to channels whose description is lost."
         findings.append(Finding("crc", "log", sentence, value=float(orphans)))
-    for topic, count in failed.items():
-        sentence = f"{count} messages on {topic} do not fit their schema; left out."
-        findings.append(Finding("crc", topic, sentence, value=float(count)))
-    for topic, count in too_large.items():
-        most = LARGEST_MESSAGE >> 20
-        sentence = f"{count} messages on {topic} are larger than {most} MB; left out."
-        findings.append(Finding("crc", topic, sentence, value=float(count)))
+    for counts, what in (
+        (tables.failed, "do not fit their schema"),
+        (tables.too_large, f"are larger than {LARGEST_MESSAGE >> 20} MB"),
+        (tables.too_many, "are more than a log of this size can hold"),
+    ):
+        for topic, count in counts.items():
+            sentence = f"{count} messages on {topic} {what}; left out."
+            findings.append(Finding("crc", topic, sentence, value=float(count)))
     return findings
 
 

@@ -88,7 +88,7 @@ def _float(number: int) -> float:
     try:
         return float(number)
     except OverflowError:  # hundreds of digits: beyond any number, as 1e400 is
-        return math.copysign(math.inf, number)
+        return math.inf if number > 0 else -math.inf
 
 
 def _stated_types(schema: Schema | None) -> dict[str, pl.DataType]:

@@ -72,10 +72,8 @@ class Reading:
 def contents(path: str | Path) -> Contents:
     """Topics, counts and metadata: from the summary alone when there is a sound one."""
     found = scan.survey(Path(path))
-    if found.statistics is not None:
-        return _contents(found, found.statistics.channel_message_counts)
-    tally = salvage.read_all(Tables(found, {}))
-    return _contents(found, tally.counts)
+    stated = found.statistics
+    return _contents(found, stated.channel_message_counts if stated else found.counts)
 
 
 def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) -> Reading:
@@ -88,12 +86,14 @@ def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) 
     tables = Tables(scan.survey(path), wanted)
     done: set[str] = set()
     tally = None
-    if rerun_route.worth_it(tables):
+    quickly = rerun_route.worth_it(tables)
+    if quickly:
         tally = rerun_route.preflight(tables.found)
         if tally is not None:
             done = rerun_route.read_most(tables, tally)
     if tally is None or (left := tables.topics(tally) - done):
-        tables.found = scan.survey(path)
+        if quickly:  # the check has walked through it
+            tables.found = scan.survey(path)
         tally = salvage.read_all(tables, None if tally is None else left)
     frames = tables.finish()
     _refuse_nothing(tables, tally, frames)
@@ -155,7 +155,7 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     topics = {number: channel.topic for number, channel in found.channels.items()}
     findings = faults.losses(found.losses, tally.first, lost, topics)
     findings += faults.appended(found.sections)
-    findings += faults.undecoded(tally.orphans, tables.failed, tables.too_large)
+    findings += faults.left_out(tally.orphans, tables)
     findings += faults.disorder([(found.channels[n].topic, o) for n, o in tally.order.items()])
     suspects = {topic: times for topic, frame in frames.items() if (times := faults.twice(frame))}
     again = salvage.repeated(found.path, suspects) if suspects else {}

@@ -22,6 +22,7 @@ log = logging.getLogger(__name__)
 HEAD = struct.Struct("<BQ")  # opcode and length of every record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 LARGEST_MESSAGE = 32 << 20  # bytes: four times an uncompressed HD image; what is larger is left out
+Place = tuple[int, int, int]  # opcode, where the body begins, and where it ends if it is there
 KINDS: dict[int, type] = {
     Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
 }  # fmt: skip
@@ -78,11 +79,10 @@ def unnamed(opcode: int, body: bytes | memoryview) -> Unnamed | None:
     return Unnamed(number, f"channel {number} (description damaged)", "", {}, 0)
 
 
-def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[int, memoryview, bool]]:
-    """Opcode and body of each record in bytes that come in pieces, `size` of them in all.
+def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[memoryview, list[Place]]]:
+    """The records in bytes that come in pieces, `size` of them in all: piece by piece.
 
-    The third value is False for a body beyond LARGEST_MESSAGE, of which the first piece is handed
-    on. Raises ValueError where the bytes are no records.
+    Raises ValueError where the bytes are no records.
     """
     kept, skip, seen = b"", 0, 0
     for piece in pieces:
@@ -91,20 +91,22 @@ def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[int, memoryview,
             skip -= len(piece)
             continue
         data = memoryview(kept + piece[skip:] if kept or skip else piece)
-        skip, at, end = 0, 0, len(data)
+        skip, at, end, rest = 0, 0, len(data), size - seen
+        places: list[Place] = []
         while at + HEAD.size <= end:
             opcode, length = HEAD.unpack_from(data, at)
             begin, stop = at + HEAD.size, at + HEAD.size + length
-            if opcode == 0 or stop - end > size - seen:
+            if opcode == 0 or stop - end > rest:
                 raise ValueError("does not hold sound records")
             if stop <= end:
-                yield opcode, data[begin:stop], True
+                places.append((opcode, begin, stop))
             elif length > LARGEST_MESSAGE and end - begin >= MESSAGE.size:
-                yield opcode, data[begin:], False
+                places.append((opcode, begin, stop))
                 skip = stop - end
             else:
                 break
             at = stop
         kept = bytes(data[at:]) if at < end else b""
+        yield data, places
     if skip or len(kept) >= HEAD.size:  # fewer bytes than a record has are nothing
         raise ValueError("does not hold sound records")

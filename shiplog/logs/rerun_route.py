@@ -60,10 +60,10 @@ def preflight(found: Survey) -> Tally | None:
 
 
 def worth_it(tables: Tables) -> bool:
-    """Whether a log says that it has enough wanted messages of the right kind."""
+    """Whether a log says that it has enough wanted messages of the right kind, and not too many."""
     counts = tables.found.statistics.channel_message_counts if tables.found.statistics else {}
     least = LEAST_WARM if worker().runs else LEAST_MESSAGES
-    return sum(counts[number] for number in _suitable(tables)) >= least
+    return least <= sum(counts[number] for number in _suitable(tables)) <= tables.room
 
 
 def read_most(tables: Tables, tally: Tally) -> set[str]:

@@ -60,7 +60,12 @@ def _take(
         if channel is None or (topics is not None and channel.topic not in topics):
             continue
         reader = tables.decoder(channel)
-        if reader is not None:
+        if reader is None:
+            continue
+        tables.room -= len(met)
+        if tables.room < 0:
+            tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
+        else:
             _decode(tables, channel, reader, met, logged)
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex, Header, McapRecord, Message, Metadata
@@ -87,47 +88,60 @@ def _first_sound(stream: IO[bytes], found: Survey) -> int | None:
 
 def _describe(found: Survey) -> None:
     """Walk once for the descriptions alone: one may stand behind the messages that need it."""
-    trial = replace(found, losses=[], metadata=dict(found.metadata))
-    for item in walk(trial):
-        if not isinstance(item, Index):
-            for _ in contents_of(trial, item, messages=False):
-                pass
-    found.metadata, found.sections = trial.metadata, trial.sections
+    state = found.path.stat()
+    key = (str(found.path.resolve()), state.st_size, state.st_mtime_ns, state.st_ino)
+    if _last.get("key") != key:
+        trial = replace(found, losses=[], metadata=dict(found.metadata))
+        counts: Counter[int] = Counter()
+        for item in walk(trial):
+            if not isinstance(item, Index):
+                for _ in contents_of(trial, item, counts):
+                    pass
+        trial.counts = {n: count for n, count in counts.items() if n in trial.channels}
+        _last.update(key=key, trial=trial)
+    trial = _last["trial"]
+    for name in ("schemas", "channels", "metadata", "beliefs", "counts"):
+        setattr(found, name, dict(getattr(trial, name)))
+    found.sections = trial.sections
     if found.sections > 1:  # each has its own, and none of them speaks for the file
         found.losses, found.statistics = [], None
 
 
+_last: dict[str, Any] = {}  # the walk of `_describe`: a command opens one log several times
+
+
 def contents_of(
-    found: Survey, item: Sound | Alone, messages: bool = True
+    found: Survey, item: Sound | Alone, counts: Counter[int] | None = None
 ) -> Iterator[list[Message]]:
     """The messages of an item, in batches; its descriptions are noted in `found`.
 
-    messages    whether they are wanted; without them an item is read for its descriptions alone
+    counts  messages by channel so far: they are then counted here, and not handed on
     """
-    if isinstance(item, Alone):
-        if messages or item.opcode != Opcode.MESSAGE:
-            made = records.record(item.opcode, item.body, item.whole)
-            yield _noted(found, [made or records.unnamed(item.opcode, item.body)], LOOSE, item)
-        return
-    belief = VOUCHED if item.chunk.uncompressed_crc else LOOSE
+    here: Counter[int] | None = None if counts is None else Counter()
     try:
-        for batch in chunks.contents(item.chunk, messages):
-            yield _noted(found, batch, belief, item)
+        if isinstance(item, Alone):
+            yield _noted(found, chunks.alone(item, here), LOOSE, item.section)
+        else:
+            belief = VOUCHED if item.chunk.uncompressed_crc else LOOSE
+            for batch in chunks.contents(item.chunk, here):
+                yield _noted(found, batch, belief, item.section)
     except ValueError as error:  # only where nothing had a checksum
-        found.losses.append(lost(item.offset, str(error), item.chunk))
+        if isinstance(item, Sound):
+            found.losses.append(lost(item.offset, str(error), item.chunk))
+    else:
+        if counts is not None and here:
+            counts.update({n + item.section * SECTION: count for n, count in here.items()})
 
 
-def _noted(
-    found: Survey, batch: Iterable[McapRecord | None], belief: int, item: Sound | Alone
-) -> list[Message]:
+def _noted(found: Survey, batch: Iterable[McapRecord], belief: int, section: int) -> list[Message]:
     here = []
     for record in batch:
         if isinstance(record, Message):
-            record.channel_id += item.section * SECTION
+            record.channel_id += section * SECTION
             here.append(record)
-        elif record is not None:
+        else:
             whole = not isinstance(record, records.Unnamed)
-            note(found, record, belief if whole else BROKEN, item.section)
+            note(found, record, belief if whole else BROKEN, section)
     return here
 
 
