@@ -70,6 +70,7 @@ class Sound:
     offset: int
     section: int
     chunk: Chunk
+    end: int  # byte behind its packed records
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +109,7 @@ class Survey:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    metadata_indexed: int = 0  # records that the summary points to
     statistics: Statistics | None = None
     summed: list[McapRecord] = field(default_factory=list)  # descriptions in a sound summary
     indexed: dict[int, ChunkIndex] = field(default_factory=dict)  # by where the chunk stands
@@ -126,8 +128,10 @@ class Survey:
     def described(self) -> bool:
         """Whether the summary has every description that there is."""
         said = self.statistics
-        return said is not None and (said.channel_count, said.schema_count) == (
-            len(self.channels), len(self.schemas))  # fmt: skip
+        if said is None:
+            return False
+        counts = said.channel_count, said.schema_count, said.metadata_count
+        return counts == (len(self.channels), len(self.schemas), self.metadata_indexed)
 
 
 def note(found: Survey, record: McapRecord | None, belief: int, section: int = 0) -> None:
@@ -178,6 +182,7 @@ def read_summary(stream: IO[bytes], found: Survey) -> None:
         elif isinstance(record, ChunkIndex):
             found.indexed[record.chunk_start_offset] = record
         elif isinstance(record, MetadataIndex):
+            found.metadata_indexed += 1
             opcode, length, fault = head(stream, record.offset, found.size)
             if fault is None and opcode == Opcode.METADATA and length <= LARGEST_SUMMARY:
                 note(found, parsed(Metadata, stream.read(length)), SUMMED)

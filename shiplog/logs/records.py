@@ -71,6 +71,16 @@ def record(opcode: int, body: bytes | memoryview, whole: bool = True) -> McapRec
     return parsed(kind, bytes(body)) if kind and whole else None
 
 
+def exact(opcode: int, body: bytes) -> bool:
+    """Whether bytes are a schema or a channel from the first to the last, and nothing else."""
+    stream = _Body(BytesIO(body))
+    try:
+        made = KINDS[opcode].read(stream)
+    except Exception:
+        return False
+    return stream.count == len(body) and bool(getattr(made, "topic", None) or made.id)
+
+
 def unnamed(opcode: int, body: bytes | memoryview) -> Unnamed | None:
     """A broken description of a channel: its messages are counted all the same."""
     if opcode != Opcode.CHANNEL or len(body) < 8:

@@ -44,10 +44,11 @@ Item = Sound | Index | Alone
 
 LOOKED = 1 << 20  # bytes that are searched at once
 OVERLAP = len(MAGIC) + HEAD.size
-BEGINNING = re.compile(  # of a log; of a chunk below 1 TB; of a message below 16 MB
-    re.escape(MAGIC) + rb"\x01|\x06.{5}\0{3}|\x05.{3}\0{5}", re.DOTALL
+BEGINNING = re.compile(  # of a log; a chunk below 1 TB; a message or a description below 16 MB
+    re.escape(MAGIC) + rb"\x01|\x06.{5}\0{3}|[\x03-\x05].{3}\0{5}", re.DOTALL
 )
 LONGEST_ALONE = 1_000_000  # bytes of a message that a search takes: in most bytes is no message
+LEAST_DESCRIPTION, LARGEST_DESCRIPTION = 14, 1 << 22  # bytes; large schemas have 100 kB
 NEAR_NS = 10**14  # 28 h: how far from the others the log time of such a message may be
 LONGEST_FOOTER = 64  # bytes, of which 20 are known
 # What may be unpacked: real logs are packed to a tenth, seldom to a fiftieth, of their size.
@@ -201,7 +202,7 @@ class _Walk:
         if fault is None and opcode == Opcode.CHUNK:
             bad = self._open(position, length)
             if isinstance(bad, Sound):
-                return None, self._take(bad, after), after
+                return None, self._take(bad, bad.end), after
         entry = found.indexed.get(position)
         if entry and (fault or opcode != Opcode.CHUNK or after != position + entry.chunk_length):
             sound = self._open(position, entry.chunk_length - HEAD.size)
@@ -286,7 +287,9 @@ class _Walk:
             opened = chunks.opened(packed)
         except ValueError as error:
             return lost(position, str(error), packed)
-        return Sound(position, self._number(), opened)
+        begin = chunks.LEAST + len(packed.compression.encode())
+        end = position + HEAD.size + begin + len(packed.data)
+        return Sound(position, self._number(), opened, end)
 
     def _body(self, position: int, length: int) -> bytes:
         return read_at(self.stream, position + HEAD.size, length)
@@ -322,7 +325,11 @@ class _Walk:
         for at, kind in _beginnings(self.stream, start, limit):
             if kind == Opcode.CHUNK and self._checked(at):
                 return at
-            if kind == Opcode.HEADER or (kind == Opcode.MESSAGE and self._plausible(at)):
+            if kind == Opcode.MESSAGE and self._plausible(at):
+                return at
+            if kind in (Opcode.SCHEMA, Opcode.CHANNEL) and self._described(at, kind):
+                return at
+            if kind == Opcode.HEADER:
                 return at
         return limit if limit < self.found.end else None
 
@@ -347,6 +354,14 @@ class _Walk:
         channel, _, time, _ = MESSAGE.unpack(self._body(position, MESSAGE.size))
         known = channel + self.section * SECTION in self.found.channels
         return known and self.low - NEAR_NS <= time <= self.high + NEAR_NS
+
+    def _described(self, position: int, opcode: int) -> bool:
+        """Whether a description stands here: its lengths fill its record to the last byte."""
+        _, length, fault = head(self.stream, position, self.found.size)
+        if fault or not LEAST_DESCRIPTION <= length <= LARGEST_DESCRIPTION:
+            return False
+        self.work -= length
+        return records.exact(opcode, self._body(position, length))
 
     def _finish(self) -> None:
         """What only the end shows: a missing ending, and indexed chunks that were not met."""
