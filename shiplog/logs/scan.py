@@ -280,7 +280,8 @@ class _Walk:
         packed = chunks.chunk(self._body(position, length))
         if packed is None:
             return Loss("crc", position, "ends in the middle of its data", chunk=True)
-        self.work -= packed.uncompressed_size
+        if packed.uncompressed_size <= chunks.MOST_IN_A_CHUNK:  # else it is not unpacked
+            self.work -= packed.uncompressed_size
         if self.work < 0:
             raise _Enough
         try:

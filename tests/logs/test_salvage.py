@@ -107,6 +107,7 @@ DAMAGE = {  # the file, and the chunks of which nothing can be read
         changed(GOOD, places(GOOD, mcap.MESSAGE_INDEX)[0][0], bytes([mcap.FOOTER])), ()),
     "a length beyond the file": (changed(GOOD, CHUNK_AT[3][0] + 4, b"\x10"), (3,)),
     "a length within the file": (changed(GOOD, CHUNK_AT[3][0] + 2, b"\x02"), ()),
+    "a chunk that states 8 EB": (changed(GOOD, CHUNK_AT[3][0] + 25, b"\0" * 7 + b"\x7f"), (3,)),
     "a byte missing": (GOOD[: CHUNK_AT[3][0] + 50] + GOOD[CHUNK_AT[3][0] + 51 :], (3,)),
     "a byte inserted": (GOOD[: CHUNK_AT[3][0] + 50] + b"x" + GOOD[CHUNK_AT[3][0] + 50 :], (3,)),
     "a byte inserted between chunks": (GOOD[: CHUNK_AT[3][0]] + b"x" + GOOD[CHUNK_AT[3][0] :], ()),
