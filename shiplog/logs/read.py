@@ -172,10 +172,12 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
 def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> None:
     """Say why when a log gives nothing at all."""
     found, count = tables.found, sum(tally.counts.values())
-    if tables.undecodable and not frames:
-        reasons = ", ".join(sorted(set(tables.undecodable.values())))
+    reasons = sorted(set(tables.undecodable.values()))
+    reasons += ["their bytes do not fit their schema"] * bool(tables.failed)
+    reasons += ["they are too large"] * bool(tables.too_large)
+    if reasons and not frames:
         raise LogUnreadable(
-            f"{found.path} has {count} messages, but none can be decoded: {reasons}.",
+            f"{found.path} has {count} messages, but none can be decoded: {', '.join(reasons)}.",
             hint="shiplog reads protobuf, ROS 2 CDR (ros2msg) and JSON; convert or record again.",
         )
     if count:

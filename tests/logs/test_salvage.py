@@ -223,6 +223,12 @@ def test_an_integer_of_hundreds_of_digits_is_infinite(reading):
     assert found.frames["/a"]["x"].to_list() == [0.5, 0.5, 0.5, float("inf"), float("-inf")]
 
 
+def test_a_log_whose_payloads_are_all_spoilt_is_refused_with_the_reason(reading):
+    raw = described(("/a",)) + mcap.record(mcap.MESSAGE, mcap.message(1, 0, START, START, b"{"))
+    with pytest.raises(LogUnreadable, match="none can be decoded: their bytes do not fit"):
+        reading(file([parts()[0], (mcap.CHUNK, packed(raw, 0, 0))]))
+
+
 # --- claims of size
 
 
