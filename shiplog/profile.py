@@ -15,24 +15,35 @@ from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
-Accuracy = Annotated[float, Field(ge=0)]
+Accuracy = Annotated[float, Field(ge=0, le=1e6)]
+Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
+
+# What can be at all, so that a slip of the decimal point or of the unit is said and not computed
+# with. The largest ship has 460 m and 660 000 t; models of ships begin at half a metre.
+LONGEST_M, HEAVIEST_KG = 1_000.0, 2e9
+Length = Annotated[float, Field(gt=0, le=LONGEST_M)]
+Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]  # of a ship's part, from midship
+Area = Annotated[float, Field(gt=0, le=LONGEST_M * 100.0)]  # nothing on a ship is 100 m high
+Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
+Longitude = Annotated[float, Field(ge=-180.0, le=360.0)]
+Chart = Annotated[float, Field(ge=-1e7, le=1e7)]  # m, a quarter of the Earth's girth
 
 
 class Ship(Section):
     """Particulars. Missing values are estimated where they are needed, and reported."""
 
     name: str = Field(description="identifies the ship")
-    length_m: float = Field(gt=0, description="between perpendiculars, m")
-    breadth_m: float | None = Field(default=None, gt=0, description="m")
-    draught_m: float | None = Field(default=None, gt=0, description="m")
-    mass_kg: float | None = Field(default=None, gt=0, description="kg")
-    x_g_m: float | None = Field(
+    length_m: Length = Field(description="between perpendiculars, m")
+    breadth_m: Length | None = Field(default=None, description="m")
+    draught_m: Length | None = Field(default=None, description="m")
+    mass_kg: float | None = Field(default=None, gt=0, le=HEAVIEST_KG, description="kg")
+    x_g_m: Place | None = Field(
         default=None, description="centre of gravity ahead of midship, m; negative where astern"
     )
     block_coefficient: float | None = Field(default=None, gt=0, le=1, description="1")
-    frontal_area_m2: float | None = Field(default=None, gt=0, description="above water, m²")
-    lateral_area_m2: float | None = Field(default=None, gt=0, description="above water, m²")
-    outline: tuple[tuple[float, float], ...] | None = Field(
+    frontal_area_m2: Area | None = Field(default=None, description="above water, m²")
+    lateral_area_m2: Area | None = Field(default=None, description="above water, m²")
+    outline: tuple[tuple[Place, Place], ...] | None = Field(
         default=None, description="of the hull as it is drawn: points [ahead, starboard], m"
     )
 
@@ -53,10 +64,10 @@ class Source(Section):
     field: str | None = Field(default=None, description="the same where there is one value")
     unit: str | None = Field(default=None, description="of all values; SI where left out")
     units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
-    sign: float | tuple[float, ...] = Field(
+    sign: Number | tuple[Number, ...] = Field(
         default=1.0, description="-1 turns the values round; one number, or one for each field"
     )
-    offset: float | tuple[float, ...] = Field(
+    offset: Number | tuple[Number, ...] = Field(
         default=0.0, description="the raw value that stands for zero, in its unit"
     )
     clock: Clock = Field(
@@ -64,8 +75,8 @@ class Source(Section):
         "stamp, the recorder's, or the publisher's"
     )  # fmt: skip
     tolerance_s: float | None = Field(
-        default=None, gt=0, description="the longest time between two samples that are "
-        "interpolated, s; one and a half periods where left out"
+        default=None, gt=0, le=86_400.0, description="the longest time between two samples that "
+        "are interpolated, s; one and a half periods where left out"
     )  # fmt: skip
 
     @property
@@ -92,6 +103,8 @@ class Source(Section):
             raise ValueError("neither `field` nor `fields` is given")
         if self.field and self.fields:
             raise ValueError("both `field` and `fields` are given; keep one")
+        if 0.0 in self._each(self.sign):
+            raise ValueError("`sign` is 0, and every value would be; it is 1, -1 or another factor")
         for name in ("units", "sign", "offset"):
             value = getattr(self, name)
             if isinstance(value, tuple) and value and len(value) != len(self.paths):
@@ -103,7 +116,7 @@ class Sensor(Source):
     """A sensor of the ship's motion or of the wind."""
 
     kind: str | None = Field(default=None, description="see the kinds below; the first one")
-    lever_arm_m: tuple[float, float] = Field(
+    lever_arm_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="where it stands: [ahead, starboard] of midship, m"
     )
     sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = Field(
@@ -208,19 +221,21 @@ class Actuator(Source):
         description="an azimuth is the angle of a unit that turns all the way round, its thruster "
         "next to it at the same place"
     )
-    limits: tuple[float, float] | None = Field(
+    limits: tuple[Number, Number] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked"
     )
-    position_m: tuple[float, float] = Field(
+    position_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
     )
     direction_deg: float = Field(
         default=0.0,
+        ge=-360.0,
+        le=360.0,
         description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
-    diameter_m: float | None = Field(default=None, gt=0, description="of a screw, m")
-    area_m2: float | None = Field(default=None, gt=0, description="of a rudder, m²; estimated")
-    span_m: float | None = Field(default=None, gt=0, description="of a rudder, m; estimated")
+    diameter_m: Length | None = Field(default=None, description="of a screw, m")
+    area_m2: Area | None = Field(default=None, description="of a rudder, m²; estimated")
+    span_m: Length | None = Field(default=None, description="of a rudder, m; estimated")
 
     @model_validator(mode="after")
     def _limited(self) -> Actuator:
@@ -244,12 +259,14 @@ class Actuator(Source):
 class Site(Section):
     """What a chart shows; all optional."""
 
-    banks: tuple[tuple[tuple[float, float], ...], ...] = Field(
+    banks: tuple[tuple[tuple[Chart, Chart], ...], ...] = Field(
         default=(), description="vertical walls: lines of points [x0, y0], m"
     )
-    depth_m: float | None = Field(default=None, description="of the water, m")
-    density: float | None = Field(default=None, description="of the water, kg/m³")
-    datum: tuple[float, float] | None = Field(
+    depth_m: float | None = Field(default=None, gt=0, le=12_000.0, description="of the water, m")
+    density: float | None = Field(
+        default=None, ge=900.0, le=1_300.0, description="of the water, kg/m³"
+    )
+    datum: tuple[Latitude, Longitude] | None = Field(
         default=None, description="[latitude, longitude] of x0 = y0 = 0, deg; the first fix where "
         "left out"
     )  # fmt: skip
@@ -264,8 +281,8 @@ class Column(Section):
         '"s", "ms", "us" or "ns"; without one it is Unix time by its size, or else seconds from '
         "any start"
     )  # fmt: skip
-    sign: float = Field(default=1.0, description="-1 turns the column round")
-    offset: float = Field(
+    sign: Number = Field(default=1.0, description="-1 turns the column round")
+    offset: Number = Field(
         default=0.0, description="the value that stands for zero, in the column's unit"
     )
     format: str | None = Field(

@@ -1,8 +1,8 @@
-"""The MCAP container: what is intact is handed on, what is not is counted and named.
+"""What an MCAP file says of itself, and which copy of a description is believed.
 
-Records are parsed by the `mcap` library. Its readers give up at the first fault, though, and
-allocate whatever a damaged length says, so lengths are checked here against the file's size, chunks
-against their stated size and CRC, and a walk goes on at the next chunk that the summary knows.
+The messages come from `scan`, which reads what is sound wherever it stands. Here are the header,
+the summary and the descriptions of channels: of those that stand in a file several times, the copy
+that a CRC vouches for is taken.
 """
 
 from __future__ import annotations
@@ -12,14 +12,10 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from io import BytesIO
 from pathlib import Path
 from typing import IO
 
-import lz4.frame
 import numpy as np
-import zstandard
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
@@ -32,19 +28,26 @@ from mcap.records import (
     Schema,
     Statistics,
 )  # fmt: skip
-from mcap.stream_reader import StreamReader, breakup_chunk
 
-from .refusals import MAGIC, check_file, check_magic
+from . import records
+from .records import HEAD, parsed
+from .refusals import MAGIC
 
 log = logging.getLogger(__name__)
 
-HEAD = struct.Struct("<BQ")  # opcode and length of every record
 FOOTER = struct.Struct("<QQI")
-INDEX = struct.Struct("<HI")  # channel and bytes of a message index, before its pairs
 TAIL = HEAD.size + FOOTER.size + len(MAGIC)
 AFTER_CRC = 4 + len(MAGIC)  # the end of a file that the summary's checksum leaves out
-CARRIERS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX)
-MOST_IN_A_CHUNK = 1 << 30  # a size beyond this is taken for damage, not allocated
+LARGEST_SUMMARY = 256 << 20  # bytes; that of a day in chunks of a second has 10 MB
+FARTHEST = 1 << 48  # bytes: file systems refuse to look beyond what they can hold
+SECTION = 1 << 16  # numbers of channels and of schemas in a log, which are its own
+SUMMARY: dict[int, type] = {
+    Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.STATISTICS: Statistics,
+    Opcode.CHUNK_INDEX: ChunkIndex, Opcode.METADATA_INDEX: MetadataIndex,
+}  # fmt: skip
+
+# How far a copy of a description is believed: a better one replaces it, an equal one does not.
+BROKEN, LOOSE, SUMMED, VOUCHED = range(4)  # no CRC; that of the summary; that of its chunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +60,28 @@ class Loss:
     start: int | None = None  # ns, log time, where the chunk or its index says so
     end: int | None = None
     chunk: bool = False
+    held: dict[int, int] = field(default_factory=dict)  # messages by channel; 0: not known
 
 
 @dataclass(frozen=True, slots=True)
 class Sound:
-    """A chunk that is what it says, unpacked; or one record that stands in no chunk."""
+    """A chunk that is what it says (`chunks.opened`)."""
 
     offset: int
+    section: int
     chunk: Chunk
+    end: int  # byte behind its packed records
+
+
+@dataclass(frozen=True, slots=True)
+class Alone:
+    """A schema, a channel or a message outside any chunk, which no CRC vouches for."""
+
+    offset: int
+    section: int
+    opcode: int
+    body: bytes
+    whole: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,148 +94,128 @@ class Index:
 
 @dataclass(slots=True)
 class Survey:
-    """What the summary says, and what a walk through the file has met so far."""
+    """What a log says of itself, and what a walk through it has met so far.
+
+    The numbers of channels and schemas are the log's own; where several logs stand in one file,
+    those of the second are SECTION higher, and so on.
+    """
 
     path: Path
     size: int
     header: Header = field(default_factory=lambda: Header("", ""))
+    begin: int = len(MAGIC)  # where the first record stands
+    end: int = 0  # where the summary begins, if it is sound, else the file's end
     ended: bool = True  # a footer and the closing magic are there
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    metadata_indexed: int = 0  # records that the summary points to
     statistics: Statistics | None = None
+    summed: list[McapRecord] = field(default_factory=list)  # descriptions in a sound summary
     indexed: dict[int, ChunkIndex] = field(default_factory=dict)  # by where the chunk stands
+    sections: int = 1  # logs that stand in the file one behind the other
+    counts: dict[int, int] = field(default_factory=dict)  # messages by channel, if not in summary
     chunks: int = 0
     losses: list[Loss] = field(default_factory=list)
     unvouched: bool = False  # some messages stand outside any CRC
+    beliefs: dict[tuple[type, int | str], int] = field(default_factory=dict)
 
     @property
     def chunks_lost(self) -> int:
         return sum(loss.chunk for loss in self.losses)
 
-
-def survey(path: Path) -> Survey:
-    """Open a log: its magic, header and, when it has a sound one, its summary."""
-    check_file(path)
-    found = Survey(path, path.stat().st_size)
-    with path.open("rb") as stream:
-        check_magic(path, stream.read(len(MAGIC)), found.size)
-        _read_summary(stream, found)
-        opcode, length, fault = _head(stream, len(MAGIC), found.size)
-        if fault is None and opcode == Opcode.HEADER:
-            found.header = _parsed(Header, stream.read(length)) or found.header
-    return found
+    @property
+    def described(self) -> bool:
+        """Whether the summary has every description that there is."""
+        said = self.statistics
+        if said is None:
+            return False
+        counts = said.channel_count, said.schema_count, said.metadata_count
+        return counts == (len(self.channels), len(self.schemas), self.metadata_indexed)
 
 
-def _read_summary(stream: IO[bytes], found: Survey) -> None:
-    """Read the summary section, unless there is none or its checksum is wrong."""
-    tail = _read(stream, max(found.size - TAIL, 0), TAIL)
+def note(found: Survey, record: McapRecord | None, belief: int, section: int = 0) -> None:
+    """Keep a description, unless a better copy is known."""
+    first = section * SECTION
+    if isinstance(record, Metadata):  # of several with one name the last is the fullest (rosbag2)
+        found.metadata[record.name] = record.metadata
+        return
+    if not isinstance(record, (Schema, Channel)):
+        return
+    if section:
+        record = replace(record, id=record.id + first)
+        if isinstance(record, Channel) and record.schema_id:
+            record = replace(record, schema_id=record.schema_id + first)
+    key = (type(record), record.id)
+    if belief <= found.beliefs.get(key, -1):
+        return
+    found.beliefs[key] = belief
+    kept = found.schemas if isinstance(record, Schema) else found.channels
+    kept[record.id] = record  # type: ignore[assignment]
+
+
+def read_summary(stream: IO[bytes], found: Survey) -> None:
+    """Read the summary, unless there is none, its checksum is wrong or it is another log's."""
+    found.end = found.size
+    tail = read_at(stream, max(found.size - TAIL, 0), TAIL)
     if tail[: HEAD.size] != HEAD.pack(Opcode.FOOTER, FOOTER.size) or tail[-8:] != MAGIC:
-        found.ended = False
+        # a newer writer's footer may be longer; then the summary is left, and nothing else
+        found.ended = tail[-8:] == MAGIC and _longer_footer(stream, found.size)
         return
     start, _, crc = FOOTER.unpack_from(tail, HEAD.size)
     if start == 0:
         return  # written without one, which is no fault
-    try:
-        section = _read(stream, start, max(found.size - start, 0))
-        if crc and zlib.crc32(section[:-AFTER_CRC]) != crc:
-            raise ValueError("checksum of the summary")
-        records = list(StreamReader(BytesIO(section), skip_magic=True).records)
-    except Exception as error:
-        log.debug("summary: %s", error)
+    length = found.size - start
+    section = read_at(stream, start, length) if TAIL < length <= LARGEST_SUMMARY else b""
+    sound = len(section) == length and (not crc or zlib.crc32(section[:-AFTER_CRC]) == crc)
+    met = _tiled(section[: length - TAIL]) if sound else None
+    if met is None:
         reason = "has a damaged summary; what follows was counted from the data itself"
         found.losses.append(Loss("crc", found.size - TAIL, reason))
         return
-    for record in records:
-        note(found, record)
+    found.end = start
+    found.summed = [record for record in met if isinstance(record, (Schema, Channel))]
+    for record in met:
+        note(found, record, SUMMED)
         if isinstance(record, Statistics):
             found.statistics = record
         elif isinstance(record, ChunkIndex):
             found.indexed[record.chunk_start_offset] = record
         elif isinstance(record, MetadataIndex):
-            opcode, length, fault = _head(stream, record.offset, found.size)
-            if fault is None and opcode == Opcode.METADATA:
-                note(found, _parsed(Metadata, stream.read(length)))
+            found.metadata_indexed += 1
+            opcode, length, fault = head(stream, record.offset, found.size)
+            if fault is None and opcode == Opcode.METADATA and length <= LARGEST_SUMMARY:
+                note(found, parsed(Metadata, stream.read(length)), SUMMED)
 
 
-def note(found: Survey, record: McapRecord | None) -> None:
-    """Keep a description met among the data."""
-    if isinstance(record, Schema):
-        found.schemas.setdefault(record.id, record)
-    elif isinstance(record, Channel):
-        found.channels.setdefault(record.id, record)
-    elif isinstance(record, Metadata):  # of several with one name the last is the fullest (rosbag2)
-        found.metadata[record.name] = record.metadata
+def _longer_footer(stream: IO[bytes], size: int) -> bool:
+    """Whether the last record is a footer to which a newer writer has appended something."""
+    before = read_at(stream, max(size - TAIL - HEAD.size - 64, 0), TAIL + HEAD.size + 64)
+    return any(
+        before[at : at + HEAD.size] == HEAD.pack(Opcode.FOOTER, len(before) - at - HEAD.size - 8)
+        for at in range(len(before) - TAIL)
+    )
 
 
-def walk(found: Survey) -> Iterator[Sound | Index]:
-    """All that is sound, in file order; `found` is brought up to date on the way."""
-    with found.path.open("rb") as stream:
-        for offset, opcode, body in _records(stream, found):
-            if opcode == Opcode.CHUNK:
-                unpacked = _unpacked(offset, body)
-                if isinstance(unpacked, Sound):
-                    yield unpacked
-                else:
-                    found.losses.append(unpacked)
-            elif opcode == Opcode.MESSAGE_INDEX:
-                yield from _index(body)
-            else:
-                loose = HEAD.pack(opcode, len(body)) + body
-                yield Sound(offset, Chunk("", loose, 0, 0, 0, len(loose)))
-
-
-def contents_of(found: Survey, sound: Sound) -> list[McapRecord]:
-    """Schemas, channels and messages of a chunk; none when they are not what its size says."""
+def _tiled(section: bytes) -> list[McapRecord] | None:
+    """The records that fill a summary to its last byte; None where they do not."""
+    met = []
     try:
-        return breakup_chunk(sound.chunk)
-    except Exception as error:  # only where nothing had a checksum
-        log.debug("records at byte %d: %s", sound.offset, error)
-        found.losses.append(_lost(sound.offset, "does not hold sound records", sound.chunk))
-        return []
+        for data, places in records.split([section], len(section)):
+            for opcode, begin, stop in places:
+                if opcode in SUMMARY:
+                    met.append(parsed(SUMMARY[opcode], bytes(data[begin:stop])))
+    except ValueError:
+        return None
+    return None if None in met else met
 
 
-def _records(stream: IO[bytes], found: Survey) -> Iterator[tuple[int, int, bytes]]:
-    """Walk the data section: offset, opcode and body of each record that carries messages."""
-    position = len(MAGIC)
-    visited: set[int] = set()
-    while True:
-        opcode, length, fault = _head(stream, position, found.size)
-        if fault is None and opcode in (Opcode.DATA_END, Opcode.FOOTER):
-            break
-        if fault is not None:
-            resume = min((at for at in found.indexed if at > position), default=None)
-            # the loss of an indexed chunk is reported below, with its times
-            if position not in found.indexed:
-                kind = fault.kind if resume is None else "crc"
-                found.losses.append(replace(fault, kind=kind))
-            if resume is None:
-                break
-            position = resume
-            continue
-        if opcode in CARRIERS:
-            found.unvouched |= opcode == Opcode.MESSAGE
-            if opcode == Opcode.CHUNK:
-                found.chunks += 1
-                visited.add(position)
-            yield position, opcode, stream.read(length)
-        elif opcode == Opcode.METADATA:
-            note(found, _parsed(Metadata, stream.read(length)))
-        position += HEAD.size + length
-    if fault is None and not found.ended:
-        found.losses.append(Loss("truncated", found.size, "has a damaged or incomplete ending"))
-    for offset, index in found.indexed.items():
-        if offset not in visited:
-            found.chunks += 1
-            found.losses.append(_lost(offset, "has lost its beginning", index))
-
-
-def _head(stream: IO[bytes], position: int, size: int) -> tuple[int, int, Loss | None]:
+def head(stream: IO[bytes], position: int, size: int) -> tuple[int, int, Loss | None]:
     """Opcode and length of the record at `position`, refused when it cannot be true."""
-    head = _read(stream, position, HEAD.size)
-    if len(head) < HEAD.size:
+    begin = read_at(stream, position, HEAD.size)
+    if len(begin) < HEAD.size:
         return 0, 0, Loss("truncated", position, "ends in the middle of its data")
-    opcode, length = HEAD.unpack(head)
+    opcode, length = HEAD.unpack(begin)
     if opcode == 0:
         return 0, 0, Loss("crc", position, "holds no record where one should begin")
     there = size - position - HEAD.size
@@ -228,65 +225,22 @@ def _head(stream: IO[bytes], position: int, size: int) -> tuple[int, int, Loss |
     return opcode, length, None
 
 
-def _unpacked(offset: int, body: bytes) -> Sound | Loss:
-    """A chunk's records, if its size and its CRC are right."""
-    chunk = _parsed(Chunk, body)
-    if chunk is None:
-        return Loss("crc", offset, "states a size that cannot be", chunk=True)
-    try:
-        data = _decompressed(chunk)
-        if len(data) != chunk.uncompressed_size:
-            raise ValueError("does not have the size it states")
-        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-            raise ValueError("does not match its checksum")
-    except ValueError as error:
-        return _lost(offset, str(error), chunk)
-    except Exception as error:  # zstandard and lz4 each raise their own
-        log.debug("chunk at byte %d: %s", offset, error)
-        return _lost(offset, "cannot be decompressed", chunk)
-    return Sound(offset, replace(chunk, compression="", data=data))
-
-
-def _decompressed(chunk: Chunk) -> bytes:
-    """Never more than the chunk states, and that only when the frame agrees: no bombs."""
-    size = chunk.uncompressed_size
-    if size > MOST_IN_A_CHUNK:
-        raise ValueError("states a size that cannot be")
-    if chunk.compression == "":
-        return chunk.data
-    if chunk.compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-    if chunk.compression != "zstd":
-        raise ValueError(f"is compressed by unknown {chunk.compression[:16]!r}")
-    stated = zstandard.get_frame_parameters(chunk.data).content_size
-    if stated == size:
-        return zstandard.ZstdDecompressor().decompress(chunk.data)
-    if stated not in (0, zstandard.CONTENTSIZE_UNKNOWN):
-        raise ValueError("does not have the size it states")
-    return zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
-
-
-def _index(body: bytes) -> Iterator[Index]:
-    """A message index at once: the library's own loop over it takes longer than all the rest."""
-    if len(body) < INDEX.size or (len(body) - INDEX.size) % 16:
-        return  # its messages are then missing from the counts
-    pairs = np.frombuffer(body, "<i8", offset=INDEX.size).reshape(-1, 2)
-    in_file = pairs[np.argsort(pairs[:, 1], kind="stable")]
-    yield Index(INDEX.unpack_from(body)[0], in_file[:, 0])
-
-
-def _lost(offset: int, reason: str, stated: Chunk | ChunkIndex) -> Loss:
-    return Loss("crc", offset, reason, stated.message_start_time, stated.message_end_time, True)
-
-
-def _parsed(kind: type, body: bytes):
-    try:
-        return kind.read(ReadDataStream(BytesIO(body)))
-    except Exception as error:
-        log.debug("%s: %s", kind.__name__, error)
-        return None
-
-
-def _read(stream: IO[bytes], offset: int, length: int) -> bytes:
+def read_at(stream: IO[bytes], offset: int, length: int) -> bytes:
+    """Bytes of a file, fewer at its end; an offset that no file reaches is damage."""
+    if offset > FARTHEST:
+        return b""
     stream.seek(offset)
     return stream.read(length)
+
+
+def index_of(body: bytes, section: int) -> Iterator[Index]:
+    """A message index at once: the library's own loop over it takes longer than all the rest."""
+    begin = struct.Struct("<HI")  # channel and bytes of the pairs that follow
+    if len(body) < begin.size:
+        return  # its messages are then missing from the counts
+    channel, length = begin.unpack_from(body)
+    if length % 16 or begin.size + length > len(body):
+        return
+    pairs = np.frombuffer(body, "<i8", length // 8, begin.size).reshape(-1, 2)
+    in_file = pairs[np.argsort(pairs[:, 1], kind="stable")]
+    yield Index(channel + section * SECTION, in_file[:, 0])

@@ -6,12 +6,15 @@ from collections.abc import Iterable, Mapping
 
 import polars as pl
 
+from shiplog.exceptions import listed
 from shiplog.logs.health_report import Finding
 
 from .container import Loss
-from .tables import Order
+from .records import LARGEST_MESSAGE
+from .tables import Order, Tables
 
 SECOND = 1_000_000_000
+NAMED = 5  # topics of a loss; of a large log it may be hundreds
 OFFSET = 0.05  # s: closer clocks than this are one clock
 CLOCKS = (
     ("log_time", "publish_time", "The recorder's clock", "the publishers'"),
@@ -19,8 +22,10 @@ CLOCKS = (
 )
 
 
-def losses(found: list[Loss], first: int | None, lost: int | None) -> list[Finding]:
-    """Damage in the file, one finding a stretch."""
+def losses(
+    found: list[Loss], first: int | None, lost: int | None, topics: Mapping[int, str]
+) -> list[Finding]:
+    """Damage in the file, one finding a stretch: where, from when to when, and on which topics."""
     findings = []
     for loss in found:
         start, end = seconds(loss.start, first), seconds(loss.end, first)
@@ -28,24 +33,47 @@ def losses(found: list[Loss], first: int | None, lost: int | None) -> list[Findi
         sentence = f"{what} {loss.offset} {loss.reason}"
         if loss.kind == "truncated":
             sentence = f"The log is cut off: at byte {loss.offset} it {loss.reason}"
-        if loss.chunk and start is not None and end is not None:
-            sentence += f"; its messages from {start:.1f} s to {end:.1f} s are lost"
-        findings.append(Finding(loss.kind, "log", sentence + ".", start, end))
+        names = sorted({topics[number] for number in loss.held if number in topics})
+        if start is not None and end is not None:
+            sentence += f"; {_what(loss, names)} from {start:.1f} s to {end:.1f} s"
+            sentence += " are lost" if loss.chunk else " may be lost"
+        channel = names[0] if len(names) == 1 else "log"
+        findings.append(Finding(loss.kind, channel, sentence + ".", start, end))
     if lost and not found:
         sentence = f"{lost} messages that the log's own statistics count are not in it."
         findings.append(Finding("crc", "log", sentence, value=float(lost)))
     return findings
 
 
-def undecoded(orphans: int, failed: Mapping[str, int]) -> list[Finding]:
-    """Messages whose bytes arrived whole but do not fit their schema."""
+def _what(loss: Loss, names: list[str]) -> str:
+    """What a loss held, as far as the indexes say."""
+    count = sum(loss.held.values())
+    messages = f"its {count} messages" if count else "its messages" if loss.chunk else "messages"
+    return f"{messages} on {listed(names, most=NAMED)}" if names else messages
+
+
+def appended(sections: int) -> list[Finding]:
+    """Several logs in one file, as a recorder leaves them that appends."""
+    if sections < 2:
+        return []
+    sentence = f"The file holds {sections} logs, one behind the other; all of them were read."
+    return [Finding("out_of_order", "log", sentence, value=float(sections))]
+
+
+def left_out(orphans: int, tables: Tables) -> list[Finding]:
+    """Messages whose bytes arrived whole but that could not be kept."""
     findings = []
     if orphans:
         sentence = f"{orphans} messages belong to channels whose description is lost."
         findings.append(Finding("crc", "log", sentence, value=float(orphans)))
-    for topic, count in failed.items():
-        sentence = f"{count} messages on {topic} do not fit their schema; left out."
-        findings.append(Finding("crc", topic, sentence, value=float(count)))
+    for counts, what in (
+        (tables.failed, "do not fit their schema"),
+        (tables.too_large, f"are larger than {LARGEST_MESSAGE >> 20} MB"),
+        (tables.too_many, "are more than a log of this size can hold"),
+    ):
+        for topic, count in counts.items():
+            sentence = f"{count} messages on {topic} {what}; left out."
+            findings.append(Finding("crc", topic, sentence, value=float(count)))
     return findings
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 from collections.abc import Collection, Iterator, Sequence
 from io import BytesIO
 from typing import Any
@@ -75,12 +76,19 @@ def _leaves(message: dict, prefix: str = "", depth: int = 0) -> Iterator[tuple[s
 
 def _column(name: str, values: list[Any]) -> pl.Series:
     if any(isinstance(v, float) for v in values):
-        values = [float(v) if type(v) is int else v for v in values]
+        values = [_float(v) if type(v) is int else v for v in values]
     try:
         return pl.Series(name, values, strict=True)
     except Exception:  # mixed types: keep the values, as text
         text = [v if v is None or isinstance(v, str) else json.dumps(v) for v in values]
         return pl.Series(name, text, pl.String)
+
+
+def _float(number: int) -> float:
+    try:
+        return float(number)
+    except OverflowError:  # hundreds of digits: beyond any number, as 1e400 is
+        return math.inf if number > 0 else -math.inf
 
 
 def _stated_types(schema: Schema | None) -> dict[str, pl.DataType]:

@@ -16,7 +16,8 @@ import polars as pl
 from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding
 
-from . import container, faults, rerun_route, salvage
+from . import faults, rerun_route, salvage, scan
+from .container import Survey
 from .sample import sample
 from .tables import Tables, Tally
 
@@ -70,11 +71,9 @@ class Reading:
 
 def contents(path: str | Path) -> Contents:
     """Topics, counts and metadata: from the summary alone when there is a sound one."""
-    found = container.survey(Path(path))
-    if found.statistics is not None:
-        return _contents(found, found.statistics.channel_message_counts)
-    tally = salvage.read_all(Tables(found, {}))
-    return _contents(found, tally.counts)
+    found = scan.survey(Path(path))
+    stated = found.statistics
+    return _contents(found, stated.channel_message_counts if stated else found.counts)
 
 
 def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) -> Reading:
@@ -84,15 +83,17 @@ def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) 
             a list (`position_covariance[0]`) and step into JSON inside a text (`value.lon`).
     """
     path = Path(path)
-    tables = Tables(container.survey(path), wanted)
+    tables = Tables(scan.survey(path), wanted)
     done: set[str] = set()
     tally = None
-    if rerun_route.worth_it(tables):
+    quickly = rerun_route.worth_it(tables)
+    if quickly:
         tally = rerun_route.preflight(tables.found)
         if tally is not None:
             done = rerun_route.read_most(tables, tally)
     if tally is None or (left := tables.topics(tally) - done):
-        tables.found = container.survey(path)
+        if quickly:  # the check has walked through it
+            tables.found = scan.survey(path)
         tally = salvage.read_all(tables, None if tally is None else left)
     frames = tables.finish()
     _refuse_nothing(tables, tally, frames)
@@ -104,10 +105,10 @@ def fields(
     path: str | Path, topics: Iterable[str] | None = None
 ) -> dict[str, dict[str, pl.DataType]]:
     """Leaf fields of each topic and their types, JSON inside texts included."""
-    return sample(container.survey(Path(path)), topics)
+    return sample(scan.survey(Path(path)), topics)
 
 
-def _contents(found: container.Survey, counts: Mapping[int, int]) -> Contents:
+def _contents(found: Survey, counts: Mapping[int, int]) -> Contents:
     topics: dict[str, Topic] = {}
     for number, channel in found.channels.items():
         schema = found.schemas.get(channel.schema_id)
@@ -151,8 +152,10 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     lost: int | None = None if damaged else 0
     if found.statistics is not None:
         lost = max(found.statistics.message_count - count, 0)
-    findings = faults.losses(found.losses, tally.first, lost)
-    findings += faults.undecoded(tally.orphans, tables.failed)
+    topics = {number: channel.topic for number, channel in found.channels.items()}
+    findings = faults.losses(found.losses, tally.first, lost, topics)
+    findings += faults.appended(found.sections)
+    findings += faults.left_out(tally.orphans, tables)
     findings += faults.disorder([(found.channels[n].topic, o) for n, o in tally.order.items()])
     suspects = {topic: times for topic, frame in frames.items() if (times := faults.twice(frame))}
     again = salvage.repeated(found.path, suspects) if suspects else {}
@@ -169,10 +172,12 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
 def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> None:
     """Say why when a log gives nothing at all."""
     found, count = tables.found, sum(tally.counts.values())
-    if tables.undecodable and not frames:
-        reasons = ", ".join(sorted(set(tables.undecodable.values())))
+    reasons = sorted(set(tables.undecodable.values()))
+    reasons += ["their bytes do not fit their schema"] * bool(tables.failed)
+    reasons += ["they are too large"] * bool(tables.too_large)
+    if reasons and not frames:
         raise LogUnreadable(
-            f"{found.path} has {count} messages, but none can be decoded: {reasons}.",
+            f"{found.path} has {count} messages, but none can be decoded: {', '.join(reasons)}.",
             hint="shiplog reads protobuf, ROS 2 CDR (ros2msg) and JSON; convert or record again.",
         )
     if count:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable
@@ -22,28 +23,42 @@ def check_file(path: Path) -> None:
         raise LogUnreadable(f"{path} may not be read.", hint="change its permissions.")
 
 
-def check_magic(path: Path, start: bytes, size: int) -> None:
-    """Refuse a file that does not begin as every MCAP log does."""
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a file is no log; `final` where nothing of one can be in it."""
+
+    error: LogUnreadable
+    final: bool = True
+
+
+def refusal(path: Path, start: bytes, size: int) -> Refusal | None:
+    """Why a file that begins so is no log; None where it begins as every MCAP log does."""
     if start == MAGIC:
-        return
+        return None
     if size == 0:
-        raise LogUnreadable(f"{path} is empty (0 bytes).", hint="copy or record it again.")
+        return _refused(f"{path} is empty (0 bytes).", "copy or record it again.")
     if start[:4] == b"PAR1" or path.suffix.lower() in (".csv", ".parquet", ".txt"):
-        raise LogUnreadable(
+        return _refused(
             f"{path} is a table, not an MCAP log.",
-            hint="turn it into a log first: shiplog convert TABLE --profile P --out DIR.",
+            "turn it into a log first: shiplog convert TABLE --profile P --out DIR.",
         )
     found = start.hex(" ").upper()
     if start[:6] == MAGIC[:6]:
-        raise LogUnreadable(
+        return _refused(
             f"{path} begins with {found} instead of {MAGIC.hex(' ').upper()}: a line-ending "
             "conversion has stripped its CR bytes, as a git checkout or an FTP transfer in text "
             "mode does. Every such byte in the data is gone too, so the file cannot be mended.",
-            hint="copy the original again in binary mode (git: mark *.mcap as binary).",
+            "copy the original again in binary mode (git: mark *.mcap as binary).",
+            final=False,
         )
     if MAGIC.startswith(start):
-        raise LogUnreadable(f"{path} is cut off after {size} bytes.", hint="copy it again.")
-    raise LogUnreadable(
+        return _refused(f"{path} is cut off after {size} bytes.", "copy it again.")
+    return _refused(
         f"{path} is no MCAP log: it begins with {found}, expected {MAGIC.hex(' ').upper()}.",
-        hint="give an .mcap file; for a CSV or Parquet table use shiplog convert.",
+        "give an .mcap file; for a CSV or Parquet table use shiplog convert.",
+        final=False,
     )
+
+
+def _refused(message: str, hint: str, final: bool = True) -> Refusal:
+    return Refusal(LogUnreadable(message, hint=hint), final)

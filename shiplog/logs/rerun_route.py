@@ -24,7 +24,8 @@ import polars as pl
 
 from shiplog import files
 
-from . import container
+from . import scan
+from .container import Index, Survey
 from .tables import Tables, Tally
 
 log = logging.getLogger(__name__)
@@ -44,14 +45,14 @@ class Mismatch(Exception):
     """Rerun gave another type than the schema states."""
 
 
-def preflight(found: container.Survey) -> Tally | None:
+def preflight(found: Survey) -> Tally | None:
     """Check every chunk of a log and count its messages; None when it is not for Rerun.
 
     The counts are those of the message indexes, and must be those of the statistics.
     """
     tally = Tally()
-    for item in container.walk(found):
-        if isinstance(item, container.Index):
+    for item in scan.walk(found):
+        if isinstance(item, Index):
             tally.note(item.channel, item.times, known=item.channel in found.channels)
     stated = found.statistics and found.statistics.channel_message_counts
     counted = stated and {number: count for number, count in stated.items() if count}
@@ -60,10 +61,10 @@ def preflight(found: container.Survey) -> Tally | None:
 
 
 def worth_it(tables: Tables) -> bool:
-    """Whether a log says that it has enough wanted messages of the right kind."""
+    """Whether a log says that it has enough wanted messages of the right kind, and not too many."""
     counts = tables.found.statistics.channel_message_counts if tables.found.statistics else {}
     least = LEAST_WARM if worker().runs else LEAST_MESSAGES
-    return sum(counts[number] for number in _suitable(tables)) >= least
+    return least <= sum(counts[number] for number in _suitable(tables)) <= tables.room
 
 
 def read_most(tables: Tables, tally: Tally) -> set[str]:

@@ -13,26 +13,22 @@ import numpy as np
 import polars as pl
 from mcap.records import Channel, Message
 
-from . import container
+from . import scan
+from .container import Index, Survey
 from .messages import Decoder
+from .records import TooLarge
 from .tables import Tables, Tally
 
 BATCH = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap
+OVERHEAD = 64  # bytes that a message takes beside its payload: empty ones are not for nothing
 LARGE_TEXT = 4096  # bytes on average: an image or a video in base64, left out unless asked for
 
 
-def messages(found: container.Survey) -> Iterator[list[Message]]:
-    """The messages of each sound chunk, or each message that stands alone."""
-    for sound in container.walk(found):
-        if isinstance(sound, container.Sound):
-            here = []
-            for record in container.contents_of(found, sound):
-                if isinstance(record, Message):
-                    here.append(record)
-                else:
-                    container.note(found, record)
-            if here:
-                yield here
+def messages(found: Survey) -> Iterator[list[Message]]:
+    """The messages of each sound chunk in batches, or each message that stands alone."""
+    for item in scan.walk(found):
+        if not isinstance(item, Index):
+            yield from filter(None, scan.contents_of(found, item))
 
 
 def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
@@ -43,7 +39,7 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     for chunk in messages(tables.found):
         for message in chunk:
             batch.setdefault(message.channel_id, []).append(message)
-            held += len(message.data)
+            held += len(message.data) + OVERHEAD
         if held >= BATCH:
             _take(tables, topics, batch, tally)
             batch, held = {}, 0
@@ -64,7 +60,12 @@ def _take(
         if channel is None or (topics is not None and channel.topic not in topics):
             continue
         reader = tables.decoder(channel)
-        if reader is not None:
+        if reader is None:
+            continue
+        tables.room -= len(met)
+        if tables.room < 0:
+            tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
+        else:
             _decode(tables, channel, reader, met, logged)
 
 
@@ -72,7 +73,11 @@ def _decode(
     tables: Tables, channel: Channel, reader: Decoder, met: list[Message], logged: np.ndarray
 ) -> None:
     topic = channel.topic
-    frame, bad = reader.columns([m.data for m in met], tables.leaves(topic, reader))
+    kept = np.array([not isinstance(m.data, TooLarge) for m in met], bool)
+    if not kept.all():
+        tables.too_large[topic] = tables.too_large.get(topic, 0) + int((~kept).sum())
+        met, logged = [m for m, k in zip(met, kept, strict=True) if k], logged[kept]
+    frame, bad = _columns(reader, [m.data for m in met], tables.leaves(topic, reader))
     if tables.wanted is None and not reader.layout:
         frame = frame.drop(s.name for s in frame if _large(s))
     published = nanoseconds([m.publish_time for m in met])
@@ -81,9 +86,24 @@ def _decode(
     tables.add(topic, frame, pl.Series(logged[~bad]), pl.Series(published[~bad]))
 
 
+def _columns(
+    reader: Decoder, payloads: list[bytes], leaves: list[str] | None
+) -> tuple[pl.DataFrame, np.ndarray]:
+    """Each payload once, however often it was sent: millions of one kind cost no more than one."""
+    first = {payload: i for i, payload in enumerate(dict.fromkeys(payloads))}
+    if len(first) > len(payloads) // 2:
+        return reader.columns(payloads, leaves)
+    frame, bad = reader.columns(list(first), leaves)
+    which = np.fromiter((first[p] for p in payloads), np.int64, len(payloads))
+    if not frame.width:  # messages without a field
+        return frame, bad[which]
+    row = np.cumsum(~bad) - 1  # of each payload that decoded, in the frame
+    return frame[row[which[~bad[which]]]], bad[which]
+
+
 def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, list[int]]:
     """Log times of payloads that came before, among the messages with a suspect's log time [ns]."""
-    found = container.survey(path)
+    found = scan.survey(path)
     payloads: dict[str, set[int]] = {topic: set() for topic in suspects}
     again: dict[str, list[int]] = {topic: [] for topic in suspects}
     for chunk in messages(found):

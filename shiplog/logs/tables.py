@@ -15,6 +15,10 @@ from .decoders import decoder
 from .fields import is_text, locate, parsed, stamp_leaves, stamps, value
 from .messages import Decoder, Undecodable
 
+# Rows go with the file's size, not with what is said in it: three million empty messages fit into
+# 13 kB. Messages of instruments take 5 bytes and more, however well they are packed.
+LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
+
 log = logging.getLogger(__name__)
 
 TIMES = ("log_time", "publish_time", "stamp")
@@ -77,6 +81,9 @@ class Tables:
     def __init__(self, found: Survey, wanted: Mapping[str, Collection[str]] | None) -> None:
         self.found, self.wanted = found, wanted
         self.failed: dict[str, int] = {}  # messages by topic whose payload did not decode
+        self.too_large: dict[str, int] = {}  # messages by topic that were not kept
+        self.too_many: dict[str, int] = {}  # likewise, for being more than a log of this size holds
+        self.room = LEAST_ROWS + int(ROWS_PER_BYTE * found.size)  # rows
         self.undecodable: dict[str, str] = {}
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}

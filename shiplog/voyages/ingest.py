@@ -28,6 +28,11 @@ CLOCKS = {  # of a source: its column, and the one that it is held against
     "publish": ("publish_time", "log_time"),
 }  # fmt: skip
 
+CLOCK_NAMES = {
+    "stamp": "the messages' own stamps", "log_time": "the recorder's clock",
+    "publish_time": "the publisher's clock",
+}  # fmt: skip
+
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has
     "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
     "yaw_rate": channels.YAW_RATE, "wind": channels.WIND_SPEED,
@@ -189,7 +194,7 @@ def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[F
         how = f"{far / resampling.DAY_S:.3g} days" if far > resampling.DAY_S else f"{far:.0f} s"
         sentence = (
             f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
-            f"cannot be of this voyage, being up to {how} away."
+            f"cannot be of this voyage, being up to {how} away by {CLOCK_NAMES[clock]}."
         )
         findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
     return replace(reading, frames=frames), findings

@@ -178,6 +178,19 @@ PROFILES = {
     "length inf": (1, ["finite"], lambda d: d.through("length_m = 3.0", "length_m = inf")),
     "length in words": (1, ["ship.length_m"], lambda d: d.through("= 3.0", "= 'three'")),
     "lever arm NaN": (1, ["finite"], lambda d: d.through("= [0.7, -0.2]", "= [nan, 0.0]")),
+    "a ship of 30 km": (1, ["ship.length_m", "less than or equal to 1000"],
+                        lambda d: d.through("length_m = 3.0", "length_m = 30_000.0")),
+    "lever arm of 10 km": (1, ["lever_arm_m", "less than or equal to 1000"],
+                           lambda d: d.through("= [0.7, -0.2]", "= [1e4, 0.0]")),
+    "sign 0": (1, ["`sign` is 0"], lambda d: d.through(
+        'field = "heading_deg"', 'sign = 0.0\nfield = "heading_deg"')),
+    "scale 1e308": (1, ["sensors.heading.sign"], lambda d: d.through(
+        'field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
+    "offset 1e308": (1, ["sensors.heading.offset"], lambda d: d.through(
+        'field = "heading_deg"', 'offset = 1e308\nfield = "heading_deg"')),
+    "water of 1 kg/m³, 3 m above ground": (1, ["site.density", "site.depth_m", "site.datum.0"],
+        lambda d: d.through("[ship]", "[site]\ndensity = 1.0\ndepth_m = -3.0\ndatum = [100.0, 2.0]"
+                            "\n[ship]")),
     "sigma negative": (1, ["greater than or equal to 0"],
                        lambda d: d.through("sigma = 0.05", "sigma = -0.05")),
     "limits reversed": (1, ["the lower one stands first"],

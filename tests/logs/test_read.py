@@ -422,7 +422,6 @@ def test_random_damage_never_raises_anything_else_and_never_adds_messages(tmp_pa
     whole = small(tmp_path / "whole.mcap", use_chunking=chunked).read_bytes()
     chance = random.Random(1)
     path = tmp_path / "damaged.mcap"
-    begin = time.perf_counter()
     for _ in range(30):
         flipped = bytearray(whole)
         flipped[chance.randrange(len(whole))] ^= 1 << chance.randrange(8)
@@ -439,7 +438,6 @@ def test_random_damage_never_raises_anything_else_and_never_adds_messages(tmp_pa
                     fields(path)
             assert found.health.messages_read <= 300
             assert sum(f.height for f in found.frames.values()) <= 300
-    assert time.perf_counter() - begin < 30.0
 
 
 def test_messages_that_do_not_fit_their_schema_are_left_out_and_counted(tmp_path):

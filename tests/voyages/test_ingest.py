@@ -322,6 +322,7 @@ def test_a_stamp_that_cannot_belong_is_left_out_and_said(voyage, topic, rows, by
     assert {f.channel for f in output} == {topic}
     count = 200 if isinstance(rows, slice) else np.size(rows)
     assert output[0].sentence.startswith(f"{count} of ")
+    assert output[0].sentence.endswith("away by the messages' own stamps.")
     assert output[0].value == pytest.approx(abs(by) * 1e-9, abs=60.0)
 
 

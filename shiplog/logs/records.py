@@ -1,0 +1,122 @@
+"""MCAP records from their bytes: never beyond their end, and whatever a name's bytes are.
+
+The classes are those of the `mcap` library, and so are their fields' order and types. Its readers
+believe every length, take what a newer writer appended for the next record, and end at a name that
+is not UTF-8; here a record gets its own bytes and no more.
+"""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Iterable, Iterator
+from io import BytesIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import Channel, McapRecord, Message, Metadata, Schema
+
+log = logging.getLogger(__name__)
+
+HEAD = struct.Struct("<BQ")  # opcode and length of every record
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+LARGEST_MESSAGE = 32 << 20  # bytes: four times an uncompressed HD image; what is larger is left out
+Place = tuple[int, int, int]  # opcode, where the body begins, and where it ends if it is there
+KINDS: dict[int, type] = {
+    Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
+}  # fmt: skip
+
+
+class TooLarge(bytes):
+    """In place of a payload beyond LARGEST_MESSAGE: the message is counted, not kept."""
+
+
+class Unnamed(Channel):
+    """A channel of which only the number can be read."""
+
+
+class _Body(ReadDataStream):
+    def read(self, length: int) -> bytes:
+        data = super().read(length)
+        if len(data) < length:
+            raise EndOfFile
+        return data
+
+    def read_prefixed_string(self) -> str:
+        return self.read(self.read4()).decode("utf-8", "backslashreplace")
+
+
+def parsed(kind: type, body: bytes):
+    """One record; None where its bytes are not what they say."""
+    try:
+        return kind.read(_Body(BytesIO(body)))
+    except Exception as error:  # the library raises struct.error, EndOfFile and others
+        log.debug("%s: %s", kind.__name__, error)
+        return None
+
+
+def record(opcode: int, body: bytes | memoryview, whole: bool = True) -> McapRecord | None:
+    """A schema, channel, message or metadata record; None for any other, or where it is broken.
+
+    whole   False where `body` is only the beginning of a message too large to keep
+    """
+    if opcode == Opcode.MESSAGE:
+        if len(body) < MESSAGE.size:
+            return None
+        channel, sequence, logged, published = MESSAGE.unpack_from(body)
+        payload = bytes(body[MESSAGE.size :]) if whole else TooLarge()
+        return Message(channel, logged, payload, published, sequence)
+    kind = KINDS.get(opcode)
+    return parsed(kind, bytes(body)) if kind and whole else None
+
+
+def exact(opcode: int, body: bytes) -> bool:
+    """Whether bytes are a schema or a channel from the first to the last, and nothing else."""
+    stream = _Body(BytesIO(body))
+    try:
+        made = KINDS[opcode].read(stream)
+    except Exception:
+        return False
+    return stream.count == len(body) and bool(getattr(made, "topic", None) or made.id)
+
+
+def unnamed(opcode: int, body: bytes | memoryview) -> Unnamed | None:
+    """A broken description of a channel: its messages are counted all the same."""
+    if opcode != Opcode.CHANNEL or len(body) < 8:
+        return None
+    number = int.from_bytes(body[:2], "little")
+    return Unnamed(number, f"channel {number} (description damaged)", "", {}, 0)
+
+
+def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[memoryview, list[Place]]]:
+    """The records in bytes that come in pieces, `size` of them in all: piece by piece.
+
+    Raises ValueError where the bytes are no records.
+    """
+    kept, skip, seen = b"", 0, 0
+    for piece in pieces:
+        seen += len(piece)
+        if skip >= len(piece):
+            skip -= len(piece)
+            continue
+        data = memoryview(kept + piece[skip:] if kept or skip else piece)
+        skip, at, end, rest = 0, 0, len(data), size - seen
+        places: list[Place] = []
+        while at + HEAD.size <= end:
+            opcode, length = HEAD.unpack_from(data, at)
+            begin, stop = at + HEAD.size, at + HEAD.size + length
+            if opcode == 0 or stop - end > rest:
+                raise ValueError("does not hold sound records")
+            if stop <= end:
+                places.append((opcode, begin, stop))
+            elif length > LARGEST_MESSAGE and end - begin >= MESSAGE.size:
+                places.append((opcode, begin, stop))
+                skip = stop - end
+            else:
+                break
+            at = stop
+        kept = bytes(data[at:]) if at < end else b""
+        yield data, places
+    if skip or len(kept) >= HEAD.size:  # fewer bytes than a record has are nothing
+        raise ValueError("does not hold sound records")

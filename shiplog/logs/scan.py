@@ -1,0 +1,400 @@
+"""One walk through a log that yields what is sound, wherever it stands.
+
+Records follow each other as long as their lengths are true. Where one is not, everything since the
+last sound item is searched for the next one: a chunk whose CRC is right, a chunk that the summary
+knows, the beginning of another log. So damage costs what it hit, and no more.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex, Header, McapRecord, Message, Metadata
+
+from . import chunks, records
+from .container import (
+    BROKEN,
+    LARGEST_SUMMARY,
+    LOOSE,
+    SECTION,
+    SUMMED,
+    VOUCHED,
+    Alone,
+    Index,
+    Loss,
+    Sound,
+    Survey,
+    head,
+    index_of,
+    note,
+    read_at,
+    read_summary,
+)  # fmt: skip
+from .records import HEAD, MESSAGE, parsed
+from .refusals import MAGIC, check_file, refusal
+
+Item = Sound | Index | Alone
+
+LOOKED = 1 << 20  # bytes that are searched at once
+OVERLAP = len(MAGIC) + HEAD.size
+BEGINNING = re.compile(  # of a log; a chunk below 1 TB; a message or a description below 16 MB
+    re.escape(MAGIC) + rb"\x01|\x06.{5}\0{3}|[\x03-\x05].{3}\0{5}", re.DOTALL
+)
+LONGEST_ALONE = 1_000_000  # bytes of a message that a search takes: in most bytes is no message
+LEAST_DESCRIPTION, LARGEST_DESCRIPTION = 14, 1 << 22  # bytes; large schemas have 100 kB
+NEAR_NS = 10**14  # 28 h: how far from the others the log time of such a message may be
+LONGEST_FOOTER = 64  # bytes, of which 20 are known
+# What may be unpacked: real logs are packed to a tenth, seldom to a fiftieth, of their size.
+MOST_WORK, MOST_RATIO = 8 << 30, 50
+
+
+def survey(path: Path) -> Survey:
+    """Open a log: its magic, its header and every description that it holds.
+
+    Raises LogUnreadable for what is no log and holds nothing of one.
+    """
+    check_file(path)
+    found = Survey(path, path.stat().st_size)
+    with path.open("rb") as stream:
+        refused = refusal(path, stream.read(len(MAGIC)), found.size)
+        if refused is not None:
+            first = None if refused.final else _first_sound(stream, found)
+            if first is None:
+                raise refused.error
+            found.begin = first
+        read_summary(stream, found)
+        opcode, length, fault = head(stream, found.begin, found.size)
+        if fault is None and opcode == Opcode.HEADER and length <= LARGEST_SUMMARY:
+            found.header = parsed(Header, stream.read(length)) or found.header
+    if not found.described:
+        _describe(found)
+    return found
+
+
+def _first_sound(stream: IO[bytes], found: Survey) -> int | None:
+    """Where the first thing that can be read stands in a file without a log's magic."""
+    found.end = found.size
+    try:
+        return _Walk(stream, found).next_sound(0)
+    except _Enough:
+        return None
+
+
+def _describe(found: Survey) -> None:
+    """Walk once for the descriptions alone: one may stand behind the messages that need it."""
+    state = found.path.stat()
+    key = (str(found.path.resolve()), state.st_size, state.st_mtime_ns, state.st_ino)
+    if _last.get("key") != key:
+        trial = replace(found, losses=[], metadata=dict(found.metadata))
+        counts: Counter[int] = Counter()
+        for item in walk(trial):
+            if not isinstance(item, Index):
+                for _ in contents_of(trial, item, counts):
+                    pass
+        trial.counts = {n: count for n, count in counts.items() if n in trial.channels}
+        _last.update(key=key, trial=trial)
+    trial = _last["trial"]
+    for name in ("schemas", "channels", "metadata", "beliefs", "counts"):
+        setattr(found, name, dict(getattr(trial, name)))
+    found.sections = trial.sections
+    if found.sections > 1:  # each has its own, and none of them speaks for the file
+        found.losses, found.statistics = [], None
+
+
+_last: dict[str, Any] = {}  # the walk of `_describe`: a command opens one log several times
+
+
+def contents_of(
+    found: Survey, item: Sound | Alone, counts: Counter[int] | None = None
+) -> Iterator[list[Message]]:
+    """The messages of an item, in batches; its descriptions are noted in `found`.
+
+    counts  messages by channel so far: they are then counted here, and not handed on
+    """
+    here: Counter[int] | None = None if counts is None else Counter()
+    try:
+        if isinstance(item, Alone):
+            yield _noted(found, chunks.alone(item, here), LOOSE, item.section)
+        else:
+            belief = VOUCHED if item.chunk.uncompressed_crc else LOOSE
+            for batch in chunks.contents(item.chunk, here):
+                yield _noted(found, batch, belief, item.section)
+    except ValueError as error:  # only where nothing had a checksum
+        if isinstance(item, Sound):
+            found.losses.append(lost(item.offset, str(error), item.chunk))
+    else:
+        if counts is not None and here:
+            counts.update({n + item.section * SECTION: count for n, count in here.items()})
+
+
+def _noted(found: Survey, batch: Iterable[McapRecord], belief: int, section: int) -> list[Message]:
+    here = []
+    for record in batch:
+        if isinstance(record, Message):
+            record.channel_id += section * SECTION
+            here.append(record)
+        else:
+            whole = not isinstance(record, records.Unnamed)
+            note(found, record, belief if whole else BROKEN, section)
+    return here
+
+
+def walk(found: Survey) -> Iterator[Item]:
+    """All that is sound, in file order; `found` is brought up to date on the way."""
+    with found.path.open("rb") as stream:
+        yield from _Walk(stream, found).items()
+
+
+class _Enough(Exception):
+    """More was unpacked than a log of this size can hold."""
+
+
+class _Walk:
+    def __init__(self, stream: IO[bytes], found: Survey) -> None:
+        self.stream, self.found = stream, found
+        self.anchor = found.begin  # what stands before has been handed on, or its loss is known
+        self.section, self.closed, self.begun = 0, False, False
+        self.past_data = False  # behind a DATA_END: what is broken there is no message
+        self.chunked = False
+        self.visited: set[int] = set()
+        self.starts = sorted(found.indexed)
+        self.low: int | None = None  # ns, log times of the messages so far
+        self.high = 0
+        self.lost: Loss | None = None  # the chunk before, if it was not sound
+        self.open: int | None = None  # of the losses, the one whose end in time is not known yet
+        self.work = MOST_WORK + MOST_RATIO * found.size
+
+    def items(self) -> Iterator[Item]:
+        found = self.found
+        if read_at(self.stream, 0, len(MAGIC)) != MAGIC:
+            found.losses.append(Loss("crc", 0, "does not begin as an MCAP log does"))
+        position: int | None = found.begin
+        try:
+            while position is not None and position < found.end:
+                fault, item, after = self._step(position)
+                if fault is not None:
+                    position = self._resume(position, fault)
+                    continue
+                if item is not None:
+                    yield item
+                position = after
+        except _Enough:
+            reason = "unpacks to far more than a log of its size can; what follows was not read"
+            found.losses.append(Loss("crc", self.anchor, reason, start=self.high))
+        self._finish()
+
+    def _step(self, position: int) -> tuple[Loss | None, Item | None, int]:
+        """What stands at `position`: a fault, or an item or none and where the next record is."""
+        found = self.found
+        if read_at(self.stream, position, len(MAGIC)) == MAGIC:
+            self.closed = self.begun
+            return None, None, position + len(MAGIC)
+        opcode, length, fault = head(self.stream, position, found.size)
+        after = position + HEAD.size + length
+        bad = None
+        if fault is None and opcode == Opcode.CHUNK:
+            bad = self._open(position, length)
+            if isinstance(bad, Sound):
+                return None, self._take(bad, bad.end), after
+        entry = found.indexed.get(position)
+        if entry and (fault or opcode != Opcode.CHUNK or after != position + entry.chunk_length):
+            sound = self._open(position, entry.chunk_length - HEAD.size)
+            if isinstance(sound, Sound):
+                after = position + entry.chunk_length
+                return None, self._take(sound, after), after
+        if fault is not None:
+            return fault, None, 0
+        beyond = bisect_right(self.starts, position)
+        if beyond < len(self.starts) and after > self.starts[beyond]:
+            reason = f"holds a record of {length} bytes that reaches into the next chunk"
+            return Loss("crc", position, reason), None, 0
+        if isinstance(bad, Loss):
+            self._lose(bad)
+            return None, None, after
+        return None, self._other(position, opcode, length), after
+
+    def _other(self, position: int, opcode: int, length: int) -> Item | None:
+        """A record that is no chunk."""
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            whole = length <= records.LARGEST_MESSAGE
+            body = self._body(position, length if whole else MESSAGE.size)
+            self.found.unvouched |= opcode == Opcode.MESSAGE
+            item = Alone(position, self._number(), opcode, body, whole)
+            return self._take(item, position + HEAD.size + length)
+        if opcode == Opcode.MESSAGE_INDEX and length <= LARGEST_SUMMARY:
+            index = next(index_of(self._body(position, length), self.section), None)
+            if index is not None and self.lost is not None:
+                held = self.lost.held
+                held[index.channel] = held.get(index.channel, 0) + len(index.times)
+                return None
+            return index
+        if opcode == Opcode.METADATA and length <= LARGEST_SUMMARY:
+            note(self.found, parsed(Metadata, self._body(position, length)), LOOSE)
+        self.past_data |= opcode == Opcode.DATA_END and length <= LONGEST_FOOTER
+        return None
+
+    def _take(self, item: Sound | Alone, after: int) -> Sound | Alone:
+        """Note where a sound item ends, and what it says of time."""
+        self.anchor, self.begun, self.lost = after, True, None
+        times: tuple[int, ...] = ()
+        if isinstance(item, Sound):
+            self.chunked, self.past_data = True, False
+            self.found.chunks += 1
+            self.visited.add(item.offset)
+            times = (item.chunk.message_start_time, item.chunk.message_end_time)
+        elif item.opcode == Opcode.MESSAGE and len(item.body) >= MESSAGE.size:
+            times = (MESSAGE.unpack_from(item.body)[2],)
+            self.past_data = False
+        if times:
+            if self.open is not None:
+                losses = self.found.losses
+                losses[self.open] = replace(losses[self.open], end=times[0])
+                self.open = None
+            self.low = times[0] if self.low is None else min(self.low, times[0])
+            self.high = max(self.high, times[-1])
+        return item
+
+    def _number(self) -> int:
+        """The section of what is handed on now; a closing magic before it begins another."""
+        if self.closed:
+            self.closed = self.past_data = False
+            self.section += 1
+            self.found.sections = max(self.found.sections, self.section + 1)
+            for record in self.found.summed:
+                note(self.found, record, SUMMED, self.section)
+        return self.section
+
+    def _open(self, position: int, length: int) -> Sound | Loss:
+        """The chunk whose body of this length follows the head at `position`, checked."""
+        start = read_at(
+            self.stream, position + HEAD.size, chunks.LEAST + chunks.LONGEST_NAME)  # fmt: skip
+        if chunks.stated(start[: max(length, 0)], length) is None:
+            return Loss("crc", position, "states a size that cannot be", chunk=True)
+        packed = chunks.chunk(self._body(position, length))
+        if packed is None:
+            return Loss("crc", position, "ends in the middle of its data", chunk=True)
+        if packed.uncompressed_size <= chunks.MOST_IN_A_CHUNK:  # else it is not unpacked
+            self.work -= packed.uncompressed_size
+        if self.work < 0:
+            raise _Enough
+        try:
+            opened = chunks.opened(packed)
+        except ValueError as error:
+            return lost(position, str(error), packed)
+        begin = chunks.LEAST + len(packed.compression.encode())
+        end = position + HEAD.size + begin + len(packed.data)
+        return Sound(position, self._number(), opened, end)
+
+    def _body(self, position: int, length: int) -> bytes:
+        return read_at(self.stream, position + HEAD.size, length)
+
+    def _lose(self, loss: Loss) -> None:
+        """A chunk at its place that is not sound; the indexes behind it say what it held."""
+        self.found.chunks += 1
+        self.visited.add(loss.offset)
+        entry = self.found.indexed.get(loss.offset)
+        loss = replace(loss, held=_held(entry))
+        self.found.losses.append(loss)
+        self.lost = loss
+
+    def _resume(self, position: int, fault: Loss) -> int | None:
+        """Note a fault, unless it is noted elsewhere, and find where it goes on."""
+        found = self.found
+        after = self.next_sound(self.anchor)
+        known = position in found.indexed or any(x.offset == position for x in found.losses)
+        if not known and not self.past_data and not self.closed:
+            kind = fault.kind if after is None else "crc"
+            self.open = len(found.losses)
+            found.losses.append(replace(fault, kind=kind, start=self.high or None))
+        self.lost = None
+        if after is not None:  # the next search begins behind it, whatever it turns out to be
+            self.anchor = after + 1
+        return after
+
+    def next_sound(self, start: int) -> int | None:
+        """Where the next chunk, message or log begins that can be read, from `start` on."""
+        limit = next(
+            (at for at in self.starts if at >= start and self._indexed(at)), self.found.end
+        )
+        for at, kind in _beginnings(self.stream, start, limit):
+            if kind == Opcode.CHUNK and self._checked(at):
+                return at
+            if kind == Opcode.MESSAGE and self._plausible(at):
+                return at
+            if kind in (Opcode.SCHEMA, Opcode.CHANNEL) and self._described(at, kind):
+                return at
+            if kind == Opcode.HEADER:
+                return at
+        return limit if limit < self.found.end else None
+
+    def _indexed(self, position: int) -> bool:
+        length = self.found.indexed[position].chunk_length - HEAD.size
+        return isinstance(self._open(position, length), Sound)
+
+    def _checked(self, position: int) -> bool:
+        """Whether a chunk stands here whose CRC is right, and is one."""
+        _, length, fault = head(self.stream, position, self.found.size)
+        if fault is not None or length <= chunks.LEAST:
+            return False
+        self.work -= chunks.LEAST
+        sound = self._open(position, length)
+        return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
+
+    def _plausible(self, position: int) -> bool:
+        """Whether a message may stand here; only where there are no chunks, which vouch for it."""
+        _, length, fault = head(self.stream, position, self.found.size)
+        if self.chunked or fault or not MESSAGE.size <= length < LONGEST_ALONE or self.low is None:
+            return False
+        channel, _, time, _ = MESSAGE.unpack(self._body(position, MESSAGE.size))
+        known = channel + self.section * SECTION in self.found.channels
+        return known and self.low - NEAR_NS <= time <= self.high + NEAR_NS
+
+    def _described(self, position: int, opcode: int) -> bool:
+        """Whether a description stands here: its lengths fill its record to the last byte."""
+        _, length, fault = head(self.stream, position, self.found.size)
+        if fault or not LEAST_DESCRIPTION <= length <= LARGEST_DESCRIPTION:
+            return False
+        self.work -= length
+        return records.exact(opcode, self._body(position, length))
+
+    def _finish(self) -> None:
+        """What only the end shows: a missing ending, and indexed chunks that were not met."""
+        found = self.found
+        if not found.ended and not any(loss.kind == "truncated" for loss in found.losses):
+            found.losses.append(Loss("truncated", found.size, "has a damaged or incomplete ending"))
+        for offset, entry in found.indexed.items():
+            if offset not in self.visited:
+                found.chunks += 1
+                found.losses.append(
+                    replace(lost(offset, "has lost its beginning", entry), held=_held(entry))
+                )
+
+
+def _beginnings(stream: IO[bytes], start: int, limit: int) -> Iterator[tuple[int, int]]:
+    """Where in [start, limit) a log, a chunk or a message may begin, and which (its opcode)."""
+    while start < limit:
+        window = read_at(stream, start, LOOKED + OVERLAP)
+        at = 0
+        while at < LOOKED and (hit := BEGINNING.search(window, at)):
+            at = hit.start()
+            if at >= LOOKED or start + at >= limit:
+                break
+            yield start + at, Opcode.HEADER if window[at] == MAGIC[0] else window[at]
+            at += 1
+        start += LOOKED
+
+
+def lost(offset: int, reason: str, stated: Chunk | ChunkIndex) -> Loss:
+    """The loss of a chunk that says from when to when it reached."""
+    return Loss("crc", offset, reason, stated.message_start_time, stated.message_end_time, True)
+
+
+def _held(entry: ChunkIndex | None) -> dict[int, int]:
+    return dict.fromkeys(entry.message_index_offsets, 0) if entry else {}

@@ -1,0 +1,326 @@
+"""Damaged files: what a search can find is read, and what is lost is said by topic and time."""
+
+from __future__ import annotations
+
+import json
+import random
+import struct
+import zlib
+
+import mcap_bytes as mcap
+import pytest
+import zstandard
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shiplog.exceptions import LogUnreadable
+from shiplog.logs import chunks, records, scan
+from shiplog.logs.read import contents, read
+
+TOPICS = ("/gyro", "/wind", "/rudder")
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+CHUNKS, EACH = 10, 12  # messages of a chunk, on each topic in turn
+
+
+def payload(k: int) -> bytes:
+    return json.dumps({"x": k, "text": "a" * (k % 7)}).encode()
+
+
+def packed(raw: bytes, first: int, last: int, kind: str = "zstd", **claims) -> bytes:
+    data = zstandard.ZstdCompressor().compress(raw) if kind == "zstd" else raw
+    return mcap.chunk(raw, START + first * SECOND, START + last * SECOND, data, kind, **claims)
+
+
+def described(topics=TOPICS) -> bytes:
+    return b"".join(
+        mcap.record(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(topics, 1)
+    )
+
+
+def parts(topics=TOPICS, kind: str = "zstd") -> list[tuple[int, bytes]]:
+    """The records of the data section; message k comes k seconds after the start."""
+    made = [(mcap.HEADER, mcap.text("") + mcap.text("test"))]
+    for number in range(CHUNKS):
+        first = number * EACH
+        raw, pairs = described(topics) if number == 0 else b"", {}
+        for k in range(first, first + EACH):
+            channel = k % len(topics) + 1
+            pairs.setdefault(channel, []).append((START + k * SECOND, len(raw)))
+            body = mcap.message(channel, k, START + k * SECOND, START + k * SECOND, payload(k))
+            raw += mcap.record(mcap.MESSAGE, body)
+        made.append((mcap.CHUNK, packed(raw, first, first + EACH - 1, kind)))
+        for channel, entries in pairs.items():
+            inside = b"".join(struct.pack("<QQ", *pair) for pair in entries)
+            made.append((mcap.MESSAGE_INDEX, struct.pack("<H", channel) + mcap.text(inside)))
+    return made
+
+
+def file(made: list[tuple[int, bytes]], summary: bytes = b"", ended: bool = True) -> bytes:
+    data = mcap.MAGIC + b"".join(mcap.record(*one) for one in made)
+    if not ended:
+        return data
+    data += mcap.record(mcap.DATA_END, bytes(4))
+    start = len(data) if summary else 0
+    footer = struct.pack("<BQ", mcap.FOOTER, 20) + struct.pack("<QQ", start, 0)
+    crc = zlib.crc32(summary + footer) if summary else 0
+    return data + summary + footer + struct.pack("<I", crc) + mcap.MAGIC
+
+
+def places(data: bytes, opcode: int) -> list[tuple[int, int]]:
+    return [(at, length) for kind, at, length in mcap.records(data) if kind == opcode]
+
+
+@pytest.fixture
+def reading(tmp_path):
+    def build(data: bytes, name: str = "log.mcap"):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return read(path)
+
+    return build
+
+
+def numbers(found) -> list[int]:
+    """The messages that were read, by their number; several of one number stay several."""
+    return sorted(int(x) for frame in found.frames.values() for x in frame["x"])
+
+
+def without(*lost: int) -> list[int]:
+    """All messages but those of the chunks `lost`."""
+    return [k for k in range(CHUNKS * EACH) if k // EACH not in lost]
+
+
+GOOD = file(parts())
+CHUNK_AT = places(GOOD, mcap.CHUNK)
+
+
+def changed(data: bytes, at: int, new: bytes) -> bytes:
+    return data[:at] + new + data[at + len(new) :]
+
+
+DAMAGE = {  # the file, and the chunks of which nothing can be read
+    "whole": (GOOD, ()),
+    "an index that claims to be the end": (
+        changed(GOOD, places(GOOD, mcap.MESSAGE_INDEX)[0][0], bytes([mcap.DATA_END])), ()),
+    "an index that claims to be a footer": (
+        changed(GOOD, places(GOOD, mcap.MESSAGE_INDEX)[0][0], bytes([mcap.FOOTER])), ()),
+    "a length beyond the file": (changed(GOOD, CHUNK_AT[3][0] + 4, b"\x10"), (3,)),
+    "a length within the file": (changed(GOOD, CHUNK_AT[3][0] + 2, b"\x02"), ()),
+    "a chunk that states 8 EB": (changed(GOOD, CHUNK_AT[3][0] + 25, b"\0" * 7 + b"\x7f"), (3,)),
+    "a byte missing": (GOOD[: CHUNK_AT[3][0] + 50] + GOOD[CHUNK_AT[3][0] + 51 :], (3,)),
+    "a byte inserted": (GOOD[: CHUNK_AT[3][0] + 50] + b"x" + GOOD[CHUNK_AT[3][0] + 50 :], (3,)),
+    "a byte inserted between chunks": (GOOD[: CHUNK_AT[3][0]] + b"x" + GOOD[CHUNK_AT[3][0] :], ()),
+    "zeros over two chunks": (
+        changed(GOOD, CHUNK_AT[3][0], bytes(CHUNK_AT[5][0] - CHUNK_AT[3][0])), (3, 4)),
+    "a chunk that fails its CRC": (changed(GOOD, CHUNK_AT[3][0] + 33, b"\x00\x00"), (3,)),
+    "no magic": (GOOD[8:], ()),
+    "bytes before the magic": (b"\xef\xbb\xbf" + GOOD, ()),
+    "cut off in the last chunk": (GOOD[: CHUNK_AT[9][0] + 60], (9,)),
+    "bytes behind the end": (GOOD + bytes(5000), ()),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_all_that_a_search_can_find_is_read(reading, name):
+    data, lost = DAMAGE[name]
+    found = reading(data)
+    assert numbers(found) == without(*lost)
+    assert found.health.messages_read == len(without(*lost))
+    kinds = {f.kind for f in found.health.findings}
+    harmless = name == "whole" or name.startswith("an index")
+    assert bool(kinds & {"crc", "truncated"}) == (not harmless)
+
+
+def test_a_lost_chunk_is_named_by_topic_number_and_time(reading):
+    found = reading(DAMAGE["a chunk that fails its CRC"][0])
+    (finding,) = found.health.findings
+    assert "its 12 messages on /gyro, /rudder, /wind from 36.0 s to 47.0 s are lost" in (
+        finding.sentence
+    )
+    assert (finding.start_s, finding.end_s) == (36.0, 47.0)
+
+
+def test_a_loss_that_has_no_times_lies_between_its_neighbours(reading):
+    (finding, *_) = reading(DAMAGE["zeros over two chunks"][0]).health.findings
+    assert (finding.start_s, finding.end_s) == (35.0, 60.0)
+
+
+def test_two_logs_one_behind_the_other_are_both_read(reading):
+    """Their channels have the same numbers and other topics."""
+    other = tuple(reversed(TOPICS))
+    found = reading(GOOD + file(parts(other)))
+    assert numbers(found) == sorted(2 * without())
+    assert found.frames["/gyro"].height == 80
+    by_number = {k: "/gyro" for k in range(0, 120, 3)} | {k: "/rudder" for k in range(2, 120, 3)}
+    first = sorted(k for k in by_number if by_number[k] == "/gyro")
+    second = sorted(k for k in range(2, 120, 3))
+    assert sorted(int(x) for x in found.frames["/gyro"]["x"]) == sorted(first + second)
+    assert any("2 logs" in f.sentence for f in found.health.findings)
+    assert found.health.messages_lost == 0
+
+
+def test_the_second_log_is_read_where_the_first_was_cut_off(reading):
+    found = reading(GOOD[: CHUNK_AT[9][0] + 60] + file(parts(tuple(reversed(TOPICS)))))
+    assert numbers(found) == sorted(without(9) + without())
+    assert sorted(int(x) for x in found.frames["/wind"]["x"]) == sorted(
+        [k for k in without(9) if k % 3 == 1] + list(range(1, 120, 3))
+    )
+
+
+@pytest.mark.parametrize("bit", [3, 40, 100, -20])
+def test_a_damaged_summary_still_describes_channels_whose_first_chunk_is_lost(reading, bit):
+    made = parts()
+    made[1] = (mcap.CHUNK, b"\0" * 40 + made[1][1][40:])
+    summary = described() + mcap.record(mcap.STATISTICS, bytes(46))
+    whole = file(made, summary)
+    assert numbers(reading(whole)) == without(0)
+    at = len(whole) - 37 + bit if bit < 0 else whole.index(summary, 500) + bit
+    found = reading(changed(whole, at, bytes([whole[at] ^ 0x20])), "spoilt.mcap")
+    spoilt = {3: 1, 40: 2, 100: 3}.get(bit)  # the channel whose only copy was hit
+    assert numbers(found) == [k for k in without(0) if spoilt is None or k % 3 + 1 != spoilt]
+    assert found.health.findings
+
+
+def test_a_description_that_a_crc_vouches_for_is_taken_before_one_that_none_does(reading):
+    data = file(parts(), described(("/gyrp", "/winp", "/rudda")))
+    end = len(data) - 12
+    found = reading(changed(data, end, bytes([data[end] ^ 1])))  # the summary's CRC
+    assert set(found.frames) == set(TOPICS)
+
+
+def test_a_topic_that_is_no_text_costs_nothing(reading):
+    found = reading(file(parts((b"/\xff\xfe", "/wind", "/rudder"))))
+    assert found.health.messages_read == CHUNKS * EACH
+    assert set(found.frames) == {"/\\xff\\xfe", "/wind", "/rudder"}
+
+
+def test_descriptions_may_stand_behind_the_messages_that_need_them(reading):
+    header, first, *rest = parts()
+    assert numbers(reading(file([header, *reversed(rest), first]))) == without()
+
+
+def test_offsets_that_no_file_has_are_damage(reading):
+    for big in (2**62, 2**63, 2**64 - 1):
+        summary = described() + mcap.record(
+            mcap.METADATA_INDEX, struct.pack("<QQ", big, 1) + mcap.text("x")
+        )
+        summary += mcap.record(
+            mcap.CHUNK_INDEX,
+            struct.pack("<QQQQ", 0, 1, big, big) + mcap.numbers({}) + struct.pack("<Q", 0)
+            + mcap.text("") + struct.pack("<QQ", 1, 1),
+        )  # fmt: skip
+        assert numbers(reading(file(parts(), summary))) == without()
+
+
+def test_an_integer_of_hundreds_of_digits_is_infinite(reading):
+    huge = b'{"x": 1' + b"0" * 400 + b"}"
+    bodies = [mcap.message(1, k, START, START, b'{"x": 0.5}') for k in range(3)]
+    bodies += [mcap.message(1, k, START, START, sign + huge[6:]) for k, sign in
+               ((3, b'{"x": '), (4, b'{"x": -'))]  # fmt: skip
+    raw = described(("/a",)) + b"".join(mcap.record(mcap.MESSAGE, body) for body in bodies)
+    found = reading(file([parts()[0], (mcap.CHUNK, packed(raw, 0, 1))]))
+    assert found.frames["/a"]["x"].to_list() == [0.5, 0.5, 0.5, float("inf"), float("-inf")]
+
+
+def test_a_log_whose_payloads_are_all_spoilt_is_refused_with_the_reason(reading):
+    raw = described(("/a",)) + mcap.record(mcap.MESSAGE, mcap.message(1, 0, START, START, b"{"))
+    with pytest.raises(LogUnreadable, match="none can be decoded: their bytes do not fit"):
+        reading(file([parts()[0], (mcap.CHUNK, packed(raw, 0, 0))]))
+
+
+# --- claims of size
+
+
+def bomb(size: int, head: bytes = b"", said: int | None = None, crc: int | None = 0) -> bytes:
+    """A chunk of zeros behind `head`, packed to a ten-thousandth."""
+    pack = zstandard.ZstdCompressor().compressobj()
+    body = pack.compress(head) + pack.compress(bytes(size - len(head))) + pack.flush()
+    said = size if said is None else said
+    return struct.pack("<QQQI", START, START, said, crc or 0) + mcap.text("zstd") + (
+        struct.pack("<Q", len(body)) + body)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "made",
+    [bomb(200 << 20), bomb(200 << 20, said=1000), bomb(64 << 20, said=2 << 30)],
+    ids=["of nothing", "that states less", "that states more"],
+)
+def test_a_chunk_that_unpacks_to_nothing_is_lost_and_is_never_held(reading, made, monkeypatch):
+    held = []
+    whole = chunks._pieces
+    monkeypatch.setattr(
+        chunks, "_pieces", lambda *a: (held.append(len(p)) or p for p in whole(*a)))  # fmt: skip
+    header, *rest = parts()
+    found = reading(file([header, rest[0], (mcap.CHUNK, made), *rest[1:]]))
+    assert numbers(found) == without()
+    assert [f.kind for f in found.health.findings] == ["crc"]
+    assert max(held) <= chunks.PIECE
+
+
+def test_a_message_that_is_too_large_is_counted_and_left_out(reading):
+    body = mcap.message(1, 7, START, START, b"")
+    size = records.LARGEST_MESSAGE + (1 << 20)
+    head = struct.pack("<BQ", mcap.MESSAGE, size - 9) + body
+    header, *rest = parts()
+    found = reading(file([header, rest[0], (mcap.CHUNK, bomb(size, head)), *rest[1:]]))
+    assert numbers(found) == without()
+    assert found.health.messages_read == CHUNKS * EACH + 1
+    (finding,) = [f for f in found.health.findings if f.kind == "crc"]
+    assert (finding.channel, finding.value) == ("/gyro", 1.0) and "32 MB" in finding.sentence
+
+
+def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(reading, monkeypatch):
+    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 60)
+    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    found = reading(GOOD)
+    assert found.health.messages_read == CHUNKS * EACH
+    assert sum(frame.height for frame in found.frames.values()) <= 60
+    assert {f.kind for f in found.health.findings} == {"crc"}
+
+
+def test_unpacking_ends_where_a_log_of_this_size_cannot_go_on(reading, monkeypatch):
+    monkeypatch.setattr(scan, "MOST_WORK", 2000)
+    monkeypatch.setattr(scan, "MOST_RATIO", 0)
+    found = reading(GOOD)
+    assert 0 < found.health.messages_read < CHUNKS * EACH
+    assert "unpacks to far more" in found.health.findings[0].sentence
+
+
+# --- any damage at all
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_damage_costs_what_it_hits_and_no_more(tmp_path_factory, data):
+    """A stretch is overwritten, cut out or inserted: every chunk that it leaves whole is read."""
+    at = data.draw(st.integers(len(mcap.MAGIC), len(GOOD)))
+    length = data.draw(st.integers(1, 400))
+    how = data.draw(st.sampled_from(["overwrite", "cut", "insert"]))
+    new = random.Random(data.draw(st.integers(0, 999))).randbytes(length)
+    if how == "insert":
+        damaged, end = GOOD[:at] + new + GOOD[at:], at
+    else:
+        end = min(at + length, len(GOOD))
+        damaged = GOOD[:at] + (new[: end - at] if how == "overwrite" else b"") + GOOD[end:]
+    spared = [
+        number for number, (begin, size) in enumerate(CHUNK_AT)
+        if begin + size <= at or (begin >= end and not begin < at < begin + size)
+    ]  # fmt: skip
+    path = tmp_path_factory.getbasetemp() / "hypothesis.mcap"
+    path.write_bytes(damaged)
+    if 0 not in spared:  # with it the descriptions are gone, and there is no summary
+        return
+    found = read(path)
+    assert set(numbers(found)) >= {k for k in without() if k // EACH in spared}
+    assert found.health.messages_read <= CHUNKS * EACH
+    assert contents(path).topics.keys() == set(TOPICS)
+
+
+@given(st.binary(max_size=300))
+@settings(max_examples=100, deadline=None)
+def test_rubbish_behind_the_magic_is_refused_with_a_sentence(tmp_path_factory, rubbish):
+    path = tmp_path_factory.getbasetemp() / "rubbish.mcap"
+    path.write_bytes(mcap.MAGIC + rubbish)
+    with pytest.raises(LogUnreadable, match=r"rubbish\.mcap"):
+        read(path)
