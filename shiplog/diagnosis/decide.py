@@ -56,7 +56,7 @@ def decide(
     nothing = Fit(table.first, table.nothing.found, reported.remainder)
     return Decision(
         verdict, named, structure, side_force, traces,
-        _reasons(table, found, refuted | dict(doubted or {}), named),
+        _reasons(search, found, refuted | dict(doubted or {}), named),
         found.ranking(), reported, nothing, search.expected,
     ), found  # fmt: skip
 
@@ -137,10 +137,10 @@ def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
 
 
 def _reasons(
-    table: Hypotheses, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
+    search: Search, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
 ) -> dict[str, str]:
     """Label → why it is not named."""
-    reasons = dict(refuted)
+    reasons, table = dict(refuted), search.table
     kept = {n.cause.name for n in named}
     for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:8]:
         name = name_of(label)
@@ -150,5 +150,7 @@ def _reasons(
         why = f"log Bayes factor {gained:+.0f} nats by itself"
         if misfit >= 1.0:
             why += f", of which a nominal voyage has {misfit:.0f} too"
+        if label in search.diverged:
+            why += ", and no fit: it diverges from there"
         reasons[label] = f"{why}; probability {found.names.get(name, 0.0):.2f}"
     return reasons

@@ -91,8 +91,9 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
             none += float(p)
     weight = float(np.exp(score - score.max()).sum())
     hidden: dict[str, float] = {}
+    weighed = {h.causes for h in kept} | {(label,) for label in search.diverged}
     for label, one in search.scanned.items():
-        if name_of(label) not in refuted and (label,) not in {h.causes for h in kept}:
+        if name_of(label) not in refuted and (label,) not in weighed:
             name = name_of(label)
             hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
     order = sorted(names, key=lambda name: -names[name])

@@ -69,6 +69,15 @@ class Search:
         self._expanded.clear()
         self.run()
 
+    @property
+    def diverged(self) -> set[str]:
+        """Labels of causes that explain something where they are linearised, and whose fit by
+        themselves diverges from there."""
+        return {
+            labels[0] for labels in self._tried
+            if len(labels) == 1 and (labels, NOMINAL) not in self.table.found
+        }  # fmt: skip
+
     def _weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
         self._tried.add(labels)
         weigh(self.table, labels, numbers, at, self.banned)

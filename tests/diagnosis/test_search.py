@@ -88,6 +88,24 @@ def test_a_hidden_cause_is_found_and_sized(one):
     assert found.names["drag"] > 0.9
 
 
+def test_a_cause_whose_fit_diverges_is_no_answer(monkeypatch):
+    """Where it is linearised it explains much, and no fit of it holds: neither a name nor a
+    probability is left of that, and the reason is reported."""
+    before = weighing.converge
+
+    def diverges(trial, included, numbers, *more, **others):
+        point, found = before(trial, included, numbers, *more, **others)
+        return point, replace(found, evidence=-math.inf) if "drag" in included else found
+
+    monkeypatch.setattr(weighing, "converge", diverges)
+    made = searched({"drag": [1.2]})
+    assert made.diverged == {"drag"} and made.scanned["drag"] > 20.0
+    decision, found = decide(made)
+    assert "drag" not in found.ranking()
+    assert "it diverges from there" in decision.rejected["drag"]
+    assert decision.named == ()
+
+
 def test_the_order_of_the_catalogue_does_not_matter(one):
     """The same data with its causes in reverse: the same hypotheses with the same probabilities."""
     other = searched({"drag": [1.2]}, causes=CAUSES[::-1])
