@@ -18,9 +18,8 @@ JUDGEMENTS: dict[str, str] = {
     ),
     "kvlcc2, full scale": ("Believable. All six tests are of one series."),
     "blueboat": (
-        "Not believable as a change of the ship: nothing is known to have changed in these sixteen "
-        "runs of one afternoon, two thirds of them with neutral thrust. The process noise of the "
-        "runs that were trained on is too small for the others, and they are too few to say so."
+        "Believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: nothing "
+        "is known to have changed, and the data are too few to be sure of it."
     ),
     "milliampere": (
         "Believable. Three runs at about 0.1 m/s: it says how much more is needed, and of "
