@@ -105,6 +105,15 @@ def write_log(
         os.fsync(stream.fileno())
 
 
+def refuse_existing(path: Path) -> None:
+    """Raises ShiplogError for a log that is there already, which may be the only one of its
+    kind."""
+    if path.exists():
+        raise ShiplogError(
+            f"{path} exists already.", hint="choose another --out, or remove that log."
+        )
+
+
 def _refuse_twins(series: Sequence[Series]) -> None:
     """One topic, one channel: readers disagree on what two channels of one topic mean."""
     topics = [one.topic for one in series]

@@ -34,6 +34,17 @@ SLOWER = 0.5
 NAMED = 8  # vessels that a message names
 
 
+def required(profile: Profile | None, path: Path) -> Profile:
+    """The profile that a table is read by. Raises ProfileError where none was given."""
+    if profile is None:
+        raise ProfileError(
+            f"{path.name} is a table, and only a profile says what its columns are.",
+            hint=f"draft one with `shiplog profile {path} --out my-ship.toml`, look it over, "
+            "and give it with --profile.",
+        )
+    return profile
+
+
 def voyages(
     table: DelimitedTable, profile: Profile, path: Path
 ) -> Iterator[tuple[str, pl.DataFrame]]:
