@@ -307,7 +307,7 @@ def _event(
 
 
 def _merged(events: list[tuple[float, Stretch]], names: tuple[str, ...]) -> Iterator[Stretch]:
-    """Over channels and short breaks; what is shorter than LEAST after all is left out."""
+    """Over channels and short breaks; what is shorter than SHORTEST_S after all is left out."""
     groups: list[list[tuple[float, Stretch]]] = []
     for event in sorted(events, key=lambda e: (names.index(e[1].voyage), e[1].start_s)):
         last = [e for _, e in groups[-1]] if groups else []

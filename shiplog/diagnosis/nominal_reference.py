@@ -34,7 +34,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-ROUNDS = 20  # of moving the coefficients to where they are linearised, at most
+LINEARISATIONS = 20  # of moving the coefficients to where they are linearised, at most
 LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
 NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
 AT_BOUNDS = 0.05  # plausible spreads: all that can still move has converged
@@ -170,7 +170,7 @@ class Converged:
 
 
 def converged(
-    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS,
+    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = LINEARISATIONS,
     seen: Sequence[str] = (),
 ) -> Converged:  # fmt: skip
     """Coefficients moved to where they are linearised, all causes' numbers together with them, and
@@ -407,7 +407,7 @@ def assume(
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
-    at = converged(model, setting, start, record, rounds=0 if given else ROUNDS)
+    at = converged(model, setting, start, record, rounds=0 if given else LINEARISATIONS)
     kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
     whole = learn(model, setting, start, record, at, kappa, least, inputs)
     columns = whole.columns

@@ -18,7 +18,7 @@ from shiplog.diagnosis.trial import Trial
 RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 STEP_NATS = 100.0  # nats: no step of a converging fit loses as much
-SHORTER = 3  # times that a step is halved where the fit diverges
+MOST_HALVINGS = 3  # times that a step is halved where the fit diverges
 AT_REST = 0.02  # of a number's size: it rests
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
 
@@ -48,7 +48,7 @@ def converge(
             point = trial.at(numbers, near, noise_factor, remainder)
             base = _fitted(trial, point, included, remainder, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
-            if shorter == SHORTER:
+            if shorter == MOST_HALVINGS:
                 assert trial.first is not None
                 return trial.first, Found("+".join(included), -np.inf, noise_factor, numbers)
             shorter += 1

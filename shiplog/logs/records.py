@@ -23,7 +23,7 @@ HEAD = struct.Struct("<BQ")  # opcode and length of every record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 LARGEST_MESSAGE = 32 << 20  # bytes: four times an uncompressed HD image; what is larger is left out
 Place = tuple[int, int, int]  # opcode, where the body begins, and where it ends if it is there
-KINDS: dict[int, type] = {
+RECORD_TYPES: dict[int, type] = {
     Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
 }  # fmt: skip
 
@@ -67,7 +67,7 @@ def record(opcode: int, body: bytes | memoryview, whole: bool = True) -> McapRec
         channel, sequence, logged, published = MESSAGE.unpack_from(body)
         payload = bytes(body[MESSAGE.size :]) if whole else TooLarge()
         return Message(channel, logged, payload, published, sequence)
-    kind = KINDS.get(opcode)
+    kind = RECORD_TYPES.get(opcode)
     return parsed(kind, bytes(body)) if kind and whole else None
 
 
@@ -75,7 +75,7 @@ def exact(opcode: int, body: bytes) -> bool:
     """Whether bytes are a schema or a channel from the first to the last, and nothing else."""
     stream = _Body(BytesIO(body))
     try:
-        made = KINDS[opcode].read(stream)
+        made = RECORD_TYPES[opcode].read(stream)
     except Exception:
         return False
     return stream.count == len(body) and bool(getattr(made, "topic", None) or made.id)

@@ -22,7 +22,7 @@ from shiplog.jit_cache import traced
 from shiplog.simulation.scoring import trapezoid, window_loss
 from shiplog.voyages.windows import Windows
 
-VELOCITY = np.array(VELOCITY_IN_STATE)
+VELOCITY_COLUMNS = np.array(VELOCITY_IN_STATE)
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
 
@@ -249,8 +249,8 @@ def linearised(
 def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=None):
     states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free=free)
     scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
-    error = (states[..., VELOCITY] - measured[..., VELOCITY]) * scale
-    slope = slopes[:, :, VELOCITY] * scale[..., None]
+    error = (states[..., VELOCITY_COLUMNS] - measured[..., VELOCITY_COLUMNS]) * scale
+    slope = slopes[:, :, VELOCITY_COLUMNS] * scale[..., None]
     pull = jnp.einsum("nki,nkip->np", error, slope)
     loss = (error**2).sum((1, 2))
     # A window of weight 0 may have diverged, and 0 · inf is not 0.

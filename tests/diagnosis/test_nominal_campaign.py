@@ -140,7 +140,7 @@ def test_characteristics_say_every_group_once(learned):
     assert set(found.deviation) == {"hull", "rudder", "two", "drag", "motion", "controls", "wind"}
     assert set(found.size) == set(discrepancy.SEEN)
     assert all(0.0 < value < 1.0 for value in found.deviation.values())
-    assert found.share in campaign_prior.SHARES
+    assert found.share in campaign_prior.INFORMATION_SHARES
     # what a trial is given is by these names, column by column
     columns = made.reference.columns
     for label in ("two", "drag"):

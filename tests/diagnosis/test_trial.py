@@ -177,9 +177,9 @@ def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, fami
     point = trial.at({})
     base = level(trial, point, 1.4, included)
     gained, size = fits.changed(trial, point, base, included, family, Remainder())
-    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.SIZES]
+    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
-    assert size == remainder.SIZES[int(np.argmax(each))]
+    assert size == remainder.CHANGE_SIZES[int(np.argmax(each))]
     with_it = nats(trial, point, 1.4, included, (family,), size)
     assert gained == pytest.approx(with_it - nats(trial, point, 1.4, included), abs=1e-3)
 

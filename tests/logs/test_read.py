@@ -627,7 +627,7 @@ def test_a_payload_that_ends_reruns_process_is_read_all_the_same(good, by_rerun)
 def test_rerun_is_not_waited_for_longer_than_it_may_take(tmp_path, by_rerun, monkeypatch):
     path = known_colours(tmp_path / "log.mcap")
     with monkeypatch.context() as impatient:
-        impatient.setattr(rerun_route, "PATIENCE", 0.0)
+        impatient.setattr(rerun_route, "START_TIMEOUT_S", 0.0)
         impatient.setattr(rerun_route, "PACE", 1e12)
         assert_same(path)
         assert by_rerun == []

@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 from shiplog.channels import STATE
 from shiplog.report import viewer
-from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.report.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.report.viewer import diagnosis
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
@@ -67,7 +67,7 @@ def exhibit():
         tracks=pl.concat(
             [tracks(v, model, u) for model, u in ((BEFORE, 0.8), (AFTER, 0.6)) for v in both]
         ),
-        errors=pl.DataFrame(rows, schema=ERRORS, orient="row"),
+        errors=pl.DataFrame(rows, schema=ERROR_COLUMNS, orient="row"),
         report="# Diagnosis\n\n    RᵀV of 0.1 m/s\n",
     )
 
@@ -197,7 +197,10 @@ def test_a_verdict_that_names_nothing_shows_what_is_left(exhibit, tmp_path):
 
 def test_too_short_for_a_window_no_panel_is_empty(exhibit, tmp_path):
     short = replace(
-        exhibit, tracks=pl.DataFrame(schema=TRACKS), errors=pl.DataFrame(schema=ERRORS), extended=()
+        exhibit,
+        tracks=pl.DataFrame(schema=TRACKS),
+        errors=pl.DataFrame(schema=ERROR_COLUMNS),
+        extended=(),
     )
     viewer.save_diagnosis(short, tmp_path / "short.rrd")
     names = [name for name, _ in views(diagnosis.blueprint(diagnosis.pictured(short)))]

@@ -276,7 +276,7 @@ def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, second):
             told.append(record.getMessage())
             go.touch()
 
-    monkeypatch.setattr(stores, "SILENT_S", 0.05)
+    monkeypatch.setattr(stores, "SILENT_WAIT_S", 0.05)
     monkeypatch.setattr(stores.log, "handlers", [Release()])
     monkeypatch.setattr(stores.log, "level", logging.INFO)
     first.start()
