@@ -18,7 +18,7 @@ Clock = Literal["message", "log", "publish"]
 Accuracy = Annotated[float, Field(ge=0, le=1e6)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
 
-# What can be at all, so that a slip of the decimal point or of the unit is said and not computed
+# What can be at all, so that a slip of the decimal point or of the unit is reported, not computed
 # with. The largest ship has 460 m and 660 000 t; models of ships begin at half a metre.
 LONGEST_M, HEAVIEST_KG = 1_000.0, 2e9
 Length = Annotated[float, Field(gt=0, le=LONGEST_M)]

@@ -166,7 +166,7 @@ def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndar
 def _noise_of_parts(
     made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
 ) -> ProcessNoise:
-    """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
+    """Noise of the residuals of the `kept` [S] segments when every part has its own numbers."""
     assert effects.numbers is not None
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):

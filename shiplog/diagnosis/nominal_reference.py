@@ -44,7 +44,7 @@ KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
 VOYAGES = 2.0  # and between voyages, together with the error of a network on all of them
 CAREFUL_KAPPA = 11.0  # of too few voyages
-UNREST_TIME = 4.0  # s, of a three-metre ship
+PROCESS_NOISE_TIME_S = 4.0  # s, of a three-metre ship
 FIRST_SIZE = 1.0  # of a family's weights, in units of the process noise
 LEAST_SIZE = 0.01  # the same: a model without discrepancy has none of it
 SIZE_STEPS = 3  # of expectation-maximisation, of these sizes, each time
@@ -187,7 +187,7 @@ def converged(
     process_noise = ProcessNoise(
         wide.noise,
         0.04 * wide.acceleration,
-        UNREST_TIME * of.factor,
+        PROCESS_NOISE_TIME_S * of.factor,
         wide.start,
         bin=of.bin,
         knot=of.knot,

@@ -59,7 +59,7 @@ class _Knots:
     visible  [K, G]  a rough model's features of all inputs of the model
     carried  [K, H]  what a missing effect may be proportional to
     runs     [K]     voyage
-    folds    [K]     what is left out together
+    folds    [K]     the group that is held out together
     """
 
     y: np.ndarray
@@ -155,7 +155,7 @@ def _drive(knots: pl.DataFrame, profile: Profile) -> np.ndarray:
 
 
 def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
-    """[K] what is left out together: voyages, groups of them in order, or halves of one."""
+    """[K] the fold of each: voyages, groups of them in order, or halves of one."""
     count = int(runs.max()) + 1
     if count == 1:
         return (np.arange(len(runs)) >= len(runs) // 2).astype(int), "halves"

@@ -1,4 +1,5 @@
-"""What is named, linearised again where it was found, with a path of its own, until it rests."""
+"""The named causes, linearised again at their estimates, with a path of their own, until they
+converge."""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are hel
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 STEP_NATS = 100.0  # nats: no step of a converging fit loses as much
 MOST_HALVINGS = 3  # times that a step is halved where the fit diverges
-AT_REST = 0.02  # of a number's size: it rests
-STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
+AT_REST = 0.02  # of a number's size: it has converged
+STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 
 
 def converge(

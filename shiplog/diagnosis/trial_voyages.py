@@ -33,7 +33,7 @@ def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
     if wanted:
         return store.select(list(wanted))
     stored = store.select()
-    names = [n for n in stored if not parts.overlapping([n], run.made_on)]
+    names = [n for n in stored if not parts.overlapping([n], run.trained_on)]
     names += [n for n in store.there(run.config.split.test) if n not in stored]
     if not names:
         raise StoreError(

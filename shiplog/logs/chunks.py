@@ -144,13 +144,13 @@ def _checked(packed: Chunk) -> Iterator[bytes]:
 
 def _unpacked(packed: Chunk) -> Iterator[bytes]:
     """A chunk's bytes in pieces. Raises ValueError where they are not as many as it states."""
-    seen = 0
+    unpacked = 0
     for piece in _pieces(packed, min(packed.uncompressed_size + 1, PIECE)):
-        seen += len(piece)
-        if seen > packed.uncompressed_size:
+        unpacked += len(piece)
+        if unpacked > packed.uncompressed_size:
             break
         yield piece
-    if seen != packed.uncompressed_size:
+    if unpacked != packed.uncompressed_size:
         raise ValueError("does not have the size it states")
 
 

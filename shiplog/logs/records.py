@@ -94,14 +94,14 @@ def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[memoryview, list
 
     Raises ValueError where the bytes are no records.
     """
-    kept, skip, seen = b"", 0, 0
+    kept, skip, taken = b"", 0, 0
     for piece in pieces:
-        seen += len(piece)
+        taken += len(piece)
         if skip >= len(piece):
             skip -= len(piece)
             continue
         data = memoryview(kept + piece[skip:] if kept or skip else piece)
-        skip, at, end, rest = 0, 0, len(data), size - seen
+        skip, at, end, rest = 0, 0, len(data), size - taken
         places: list[Place] = []
         while at + HEAD.size <= end:
             opcode, length = HEAD.unpack_from(data, at)

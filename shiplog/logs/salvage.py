@@ -20,7 +20,7 @@ from .records import TooLarge
 from .tables import Tables, Tally
 
 BATCH_BYTES = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap
-OVERHEAD = 64  # bytes that a message takes beside its payload: empty ones are not for nothing
+OVERHEAD = 64  # bytes that a message takes without its payload: empty ones are not for nothing
 LARGE_TEXT = 4096  # bytes on average: an image or a video in base64, left out unless asked for
 
 

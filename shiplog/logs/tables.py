@@ -15,7 +15,7 @@ from .decoders import decoder
 from .fields import is_text, locate, parsed, stamp_leaves, stamps, value
 from .messages import Decoder, Undecodable
 
-# Rows go with the file's size, not with what is said in it: three million empty messages fit into
+# Rows go with the file's size, not with its messages: three million empty messages fit into
 # 13 kB. Messages of instruments take 5 bytes and more, however well they are packed.
 LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
 

@@ -20,7 +20,7 @@ from shiplog.simulation.sensitivities import Physical, WindowSeries, losses, nor
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
 LEAST_VARIANCE = 1e-12  # noise of data that a model fits exactly
 REWEIGHTINGS = 3  # of weighing the ridge by the noise that the fit before it left
-TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit rests
+TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit has converged
 MOST_EVALUATIONS = 60
 
 

@@ -247,8 +247,8 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
             return travel - p[[DRIFT_X, DRIFT_Y]], logged(p[TAU_V], p[OFFSET])
 
         def model(p: np.ndarray) -> np.ndarray:
-            travel, said = sides(p)
-            return travel - said / (1.0 + p[SPEED_SCALE])
+            travel, logged_change = sides(p)
+            return travel - logged_change / (1.0 + p[SPEED_SCALE])
 
         def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
             return {SPEED_SCALE: sides(p)[0] / (1.0 + p[SPEED_SCALE])}

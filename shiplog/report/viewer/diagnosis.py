@@ -1,5 +1,5 @@
-"""What a diagnosis found: where it tells most on the chart, the force that no model had beside the
-force of what was named, and the error before and after."""
+"""What a diagnosis found: where it tells most on the chart, the missing force together with the
+force of the named causes, and the error before and after."""
 
 from __future__ import annotations
 
