@@ -94,7 +94,7 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
         ((), "has no position and no velocity and no heading,"),
     ],
 )
-def test_what_a_log_does_not_have_is_said_with_what_records_it(sensors, said):
+def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, said):
     sections = sailing.PROFILE.split("[sensors.")
     kept = [part for part in sections[1:] if part.startswith(sensors)]
     ship, actuators = sections[0], "[[actuators]]" + sailing.PROFILE.split("[[actuators]]", 1)[1]

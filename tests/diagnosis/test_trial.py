@@ -359,7 +359,7 @@ def test_a_few_segments_do_not_decide(made):
 
 
 def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
-    """What is left of each segment in units of its covariance: weights are by its median."""
+    """The residual of each segment in units of its covariance: weights are by its median."""
     nominal, record, given = made
     trial = straight.trial(nominal, record, given)
     point = trial.at({})
@@ -377,7 +377,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
 
 
 def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
-    """Points come and go while a fit settles, and one may stand where another stood in memory."""
+    """Points come and go while a fit converges, and one may stand where another stood in memory."""
     first, there, last = (trial.at({"drag": np.array([size])}) for size in (0.1, 0.5, 0.7))
     here = trial.at({"drag": np.array([0.0])})
     products = straight.trial(trial.campaign, trial.record, trial.given).products

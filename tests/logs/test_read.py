@@ -335,7 +335,7 @@ def test_other_ways_of_writing_give_the_same_tables(good, tmp_path, options):
         assert_frame_equal(found.frames[topic], frame)
 
 
-def test_jittered_log_times_are_sorted_and_said(tmp_path):
+def test_jittered_log_times_are_sorted_and_reported(tmp_path):
     path = protobuf_log(
         tmp_path / "jitter.mcap",
         times=lambda k: START + k * SECOND // 10 + (SECOND if k % 10 == 0 else 0),

@@ -947,7 +947,7 @@ def test_a_section_of_a_force_that_the_ship_lacks_is_refused_unless_it_was_left_
     assert not any("wind" in name for name in parameters.load(path, calm, without=["wind"]).names)
 
 
-def test_published_values_lie_beside_their_profile(tmp_path):
+def test_published_values_lie_next_to_their_profile(tmp_path):
     assert parameters.published_file("esso-osaka").name == "esso-osaka.mmg.toml"
     assert (
         parameters.published_file("esso-vectwin") is None and parameters.published_file("") is None

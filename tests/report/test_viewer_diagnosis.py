@@ -114,7 +114,7 @@ def views(containers):
             yield from views(part.contents)
 
 
-def test_the_window_that_improved_most_is_told_first(exhibit):
+def test_the_window_that_improved_most_comes_first(exhibit):
     assert exhibit.telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]
     unnamed = exhibit.errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
     telling = replace(exhibit, errors=unnamed).telling
@@ -125,7 +125,7 @@ def test_the_window_that_improved_most_is_told_first(exhibit):
     ("axis", "lacks", "sd", "named"),
     [("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw", 0.5, 0.1, 0.25)],
 )
-def test_what_the_model_lacks_is_beside_the_named_force(saved, axis, lacks, sd, named):
+def test_the_missing_force_is_drawn_with_the_named_force(saved, axis, lacks, sd, named):
     path = f"/unexplained/home/{axis}"
     values = scalars(saved, f"{path}/lacks")
     assert len(values) == 89 + 1 and np.isnan(values[10])  # the gap is not bridged
@@ -165,7 +165,7 @@ def test_a_hull_lies_nowhere_before_its_window(saved):
     assert hull["sim_time"].dt.total_seconds().to_list() == [100]
 
 
-def test_each_voyage_has_its_tab_with_units_and_colours_said(exhibit):
+def test_each_voyage_has_its_tab_with_units_and_colours_reported(exhibit):
     tabs = diagnosis.blueprint(diagnosis.pictured(exhibit))
     assert [tab.name for tab in tabs] == ["out", "home"]
     assert [name for name, _ in views(tabs[:1])] == [
