@@ -24,7 +24,7 @@ store.voyages()  # a polars frame
 run = shiplog.train(store, "tour/mmg", model="mmg", voyages=["voyage_1", "voyage_2"], folds=0)
 
 # %% [markdown]
-# The model against a voyage that it has not seen, and two baselines.
+# The model against a voyage that it was not trained on, and two baselines.
 
 # %%
 scored = shiplog.evaluate(run, store, "voyage_6")

@@ -10,14 +10,14 @@ from pathlib import Path
 
 from pipelines.bars import drawable, tracked
 from shiplog import files
-from shiplog.exceptions import ProfileError, ShiplogError
+from shiplog.exceptions import ShiplogError
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
-from shiplog.logs.write import Series, write_log
+from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.paths import check_there
 from shiplog.profile import Profile
 from shiplog.unexpected import unexpected
@@ -68,49 +68,36 @@ def draft(path: Path, vessel: str | None = None) -> str:
             return draft_log(target, vessel)
 
 
-def _free(target: Path) -> Path:
-    """Raises ShiplogError for a log that is there already, which may be the only one of its
-    kind."""
-    if target.exists():
-        raise ShiplogError(
-            f"{target} exists already.", hint="choose another --out, or remove that log."
-        )
-    return target
-
-
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
     check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table a topic")
     ship = profile.ship.name if profile else path.stem
     target = out / f"{path.stem if path.is_file() else path.name}.mcap"
     if is_bag(path):
-        _free(target).parent.mkdir(parents=True, exist_ok=True)
+        refuse_existing(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
         if left_out := bag_to_log(path, target, ship):
             done.lost[str(path)] = "; ".join(f"{t}: {why}" for t, why in left_out.items())
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
         parts = folder_to_series(path, profile)
-        yield _written(_free(target), parts, profile, ship, path)
+        yield _written(target, parts, profile, ship, path)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
             done.lost[str(path)] = f"{damaged} damaged sentences"
-        yield _written(_free(target), parts, profile, ship, path)
+        yield _written(target, parts, profile, ship, path)
     else:
-        if profile is None:
-            raise ProfileError(
-                f"{path.name} is a table, and only a profile says what its columns are.",
-                hint=f"draft one with `shiplog profile {path} --out my-ship.toml`, look it over, "
-                "and give it with --profile.",
-            )
+        profile = columns.required(profile, path)
         for name, part in columns.voyages(read_table(path, profile.table), profile, path):
             series = columns.series(part, profile)
-            yield _written(_free(out / f"{name}.mcap"), series, profile, ship, path)
+            yield _written(out / f"{name}.mcap", series, profile, ship, path)
 
 
 def _written(
     target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
 ) -> Path:
+    refuse_existing(target)
     datum = profile.site.datum if profile else None
     target.parent.mkdir(parents=True, exist_ok=True)
     write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})

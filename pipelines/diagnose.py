@@ -76,7 +76,7 @@ def diagnose_run(
             hint="diagnose a ship with a model of its own.",
         )
     recorded = trial_voyages.record_of(store, names, profile)
-    before_effect = not parts.overlapping(names, run.made_on) and not run.given
+    before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
     nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
     if not answer.enough(recorded):
@@ -191,7 +191,7 @@ def _of_own_voyages(run: Run, decision: Decision) -> list[str]:
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     """The training voyages of the run; None where the store does not have them."""
-    there = store.there(run.made_on)
+    there = store.there(run.trained_on)
     if not there:
         return None
     return trial_voyages.record_of(store, there, profile)

@@ -34,7 +34,7 @@ class EvaluatedRuns:
     """Every run and both baselines on the same test windows.
 
     errors     run, seed, voyage, window, elapsed, wind_speed (mean apparent, m/s) and
-               evaluate.ERRORS: one row a window and seed
+               scoring.ERRORS: one row a window and seed
     rollouts   run, seed, voyage, window, time [s into the voyage], the six states, d
     coverage   voyage, window, coverage, outside_<channel>, reason: against the first run's data
     baseline_losses  L of every window [N]: of holding the velocity, and of quadratic least

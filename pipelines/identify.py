@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import polars as pl
 from threadpoolctl import threadpool_limits
 
 from pipelines.bars import reach, staged
-from shiplog.exceptions import RunError, listed
+from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models import MODELS
 from shiplog.report import tables
@@ -22,6 +22,7 @@ from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
 from shiplog.training import identifiability, load_model, run_folder, seed_files
 from shiplog.training.cross_validation import CrossValidated, cross_validate
+from shiplog.training.held_out import HeldOutErrors, refuse_nothing_held_out
 from shiplog.training.load_model import Run
 from shiplog.training.model_selection import choose_network, choose_ridge, physics
 from shiplog.training.options import TrainOptions
@@ -97,13 +98,7 @@ def _begin(
     held = rows.filter(pl.col("voyage").is_in(split.validation))
     planned = plan(learnt, config.data, config.window)
     ready = prepare(config, profile, learnt, held, planned, parameters)
-    able = len(set(ready.voyages)) > 1 and config.physics.folds > 1
-    if MODELS[config.model].residual and not able and not held.height:
-        raise RunError(
-            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
-            hint="name a second voyage with --voyages and leave --folds out, or name one with "
-            "--validation.",
-        )
+    refuse_nothing_held_out(config, ready, held)
     resolved = {"parameters": ready.start.source, "substeps": ready.model.substeps}
     settings = config.physics.model_copy(update=resolved)
     config = config.model_copy(update={"physics": settings})
@@ -154,51 +149,6 @@ def _identify(run: RunFolder, ready: Prepared) -> tuple[list[str], dict]:
         run.save_cross_validation(held_out.table())
     _band(run, ready, validated)
     return notes, choices
-
-
-class HeldOutErrors(NamedTuple):
-    """Windows rolled out by fits that did not know their voyage, or their day.
-
-    before    [N] L of the starting values
-    by_day    None where a day is a voyage; both None where nothing can be held out
-    """
-
-    before: np.ndarray
-    by_voyage: CrossValidated | None
-    by_day: CrossValidated | None
-
-    @property
-    def parts(self) -> list[tuple[str, CrossValidated]]:
-        both = (("voyages", self.by_voyage), ("days", self.by_day))
-        return [(name, one) for name, one in both if one is not None]
-
-    def sentences(self, ready: Prepared, found: Identified, folds: int) -> list[str]:
-        """The gain on the training windows and on held-out ones."""
-        after = losses(ready.model, found.values, ready.data)
-        notes = [_sentence("training windows", self.before, after)]
-        notes += [
-            _sentence(f"windows of held-out {name}", self.before, one.loss)
-            for name, one in self.parts
-        ]
-        if self.by_voyage is None:
-            why = "One voyage only" if folds > 1 else "--folds is below two"
-            notes.append(f"{why}: nothing was held out, so the gain is not tested.")
-        return notes
-
-    def table(self) -> pl.DataFrame:
-        """A row a window: held_out (voyages or days), group, window, start, loss."""
-        return pl.concat(
-            pl.DataFrame(
-                {
-                    "held_out": [name] * len(self.before),
-                    "group": one.groups,
-                    "window": np.arange(len(self.before)),
-                    "start": self.before,
-                    "loss": one.loss,
-                }
-            )
-            for name, one in self.parts
-        )
 
 
 def _hold_out(
@@ -289,14 +239,6 @@ def _band(run: RunFolder, ready: Prepared, validated: CrossValidated | None) -> 
         run.save_band(
             prediction_interval.calibrate(np.concatenate(errors), np.concatenate(spreads), groups)
         )
-
-
-def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
-    share = after.mean() / before.mean()
-    return (
-        f"Mean L over {len(before)} {where}: {before.mean():.0f} at the start, "
-        f"{after.mean():.0f} identified ({share:.3f})."
-    )
 
 
 def identify_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:

@@ -9,14 +9,15 @@ from pathlib import Path
 
 from pipelines.bars import tracked
 from shiplog import profile_file as profiles
-from shiplog.exceptions import ProfileError, ShiplogError, listed
+from shiplog.exceptions import ShiplogError
 from shiplog.logs.check import check
 from shiplog.logs.health_report import Finding, VoyageReport
-from shiplog.logs.read import Contents, contents
+from shiplog.logs.read import contents
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
 from shiplog.voyages import sensor_consistency
+from shiplog.voyages.fitting_profile import fitting_profile
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.sensor_correction import corrected
 from shiplog.voyages.store import Store
@@ -78,30 +79,6 @@ def ingest_logs(
         reports.append(voyage.report)
         log.info("%s: %s", voyage.name, state)
     return IngestedLogs(reports, refused)
-
-
-def fitting_profile(found: Contents) -> Profile:
-    """The shipped profile that a log names, or whose topics it carries. Raises ProfileError."""
-    path = found.path
-    ship = found.metadata.get("voyage", {}).get("ship")
-    fitting = [
-        candidate
-        for candidate in map(profiles.load, profiles.shipped())
-        if set(candidate.wanted()) <= set(found.topics)
-    ]
-    named = [candidate for candidate in fitting if candidate.ship.name == ship]
-    if len(named or fitting) == 1:
-        return (named or fitting)[0]
-    topics = listed(found.topics)
-    if fitting:
-        raise ProfileError(
-            f"{path.name} fits several profiles: {listed(c.source for c in fitting)}.",
-            hint="say which with --profile.",
-        )
-    raise ProfileError(
-        f"No shipped profile fits {path.name}. Its topics: {topics}.",
-        hint=f"draft one with `shiplog profile {path}`, look it over, and give it with --profile.",
-    )
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 LIMIT = 400_000_000  # bytes: some forty ships' compiled equations and campaigns
-KINDS = {  # folder: what is kept in it
+FOLDERS = {  # folder: what is kept in it
     "jax": "machine code of compiled functions",
     "traced": "traced equations of ships",
     "settled": "posteriors of nominal campaigns",
@@ -50,8 +50,8 @@ def files() -> list[tuple[float, int, Path]]:
 
 
 def sizes() -> dict[str, tuple[int, int]]:
-    """Folder → number of files and bytes in it; every folder of KINDS, and others that exist."""
-    found: dict[str, tuple[int, int]] = {kind: (0, 0) for kind in KINDS}
+    """Folder → number of files and bytes in it; all of FOLDERS, and others that exist."""
+    found: dict[str, tuple[int, int]] = {kind: (0, 0) for kind in FOLDERS}
     for _, bytes_, path in files():
         kind = path.relative_to(folder()).parts[0]
         count, total = found.get(kind, (0, 0))

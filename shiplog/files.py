@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MACHINE = f"{zlib.crc32(platform.node().encode()):08x}"  # a disk may be shared
 WRITER = re.compile(rf"[.-]{MACHINE}-(\d+)(?:-\w*|\.partial)$")  # how names of leavings end
-SECOND = 1.0  # file systems and process tables round their times
+CLOCK_TOLERANCE_S = 1.0  # file systems and process tables round their times
 
 
 @contextmanager
@@ -132,7 +132,9 @@ def _left(path: Path) -> bool:
     if writer is None or int(writer[1]) == os.getpid():
         return False
     try:
-        return psutil.Process(int(writer[1])).create_time() > path.stat().st_mtime + SECOND
+        return (
+            psutil.Process(int(writer[1])).create_time() > path.stat().st_mtime + CLOCK_TOLERANCE_S
+        )
     except psutil.NoSuchProcess:
         return True
     except (psutil.Error, OSError):  # another user's process; or gone meanwhile

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymap3d
@@ -46,21 +46,29 @@ def earth_velocity(speed: np.ndarray, course: np.ndarray) -> np.ndarray:
     return np.stack((speed * np.cos(course), speed * np.sin(course)), axis=-1)
 
 
+def in_body_axes(north: Any, east: Any, cos: Any, sin: Any) -> tuple[Any, Any]:
+    """(ahead, starboard) of earth-fixed components and the heading's cosine and sine.
+
+    Numbers or arrays of one shape, of numpy, JAX or numba: the one place of this rotation.
+    """
+    return cos * north + sin * east, cos * east - sin * north
+
+
+def in_earth_axes(ahead: Any, starboard: Any, cos: Any, sin: Any) -> tuple[Any, Any]:
+    """(north, east) of body components: the inverse of `in_body_axes`."""
+    return cos * ahead - sin * starboard, sin * ahead + cos * starboard
+
+
 def to_body(earth: np.ndarray, heading: np.ndarray | Axes) -> np.ndarray:
     """Earth-fixed (north, east) [n, 2] to body axes (ahead, starboard) [n, 2]."""
-    c, s = axes(heading)
-    return np.stack(
-        (c * earth[:, 0] + s * earth[:, 1], -s * earth[:, 0] + c * earth[:, 1]), axis=-1
-    )
+    return np.stack(in_body_axes(earth[:, 0], earth[:, 1], *axes(heading)), axis=-1)
 
 
 def position_at_midship(
     position: np.ndarray, heading: np.ndarray | Axes, arm: tuple[float, float]
 ) -> np.ndarray:
     """Antenna position [n, 2] minus the lever arm (ahead, starboard) turned by the heading."""
-    c, s = axes(heading)
-    ahead, starboard = arm
-    return position - np.stack((c * ahead - s * starboard, s * ahead + c * starboard), axis=-1)
+    return position - np.stack(in_earth_axes(*arm, *axes(heading)), axis=-1)
 
 
 def velocity_at_midship(

@@ -18,7 +18,7 @@ Clock = Literal["message", "log", "publish"]
 Accuracy = Annotated[float, Field(ge=0, le=1e6)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
 
-# What can be at all, so that a slip of the decimal point or of the unit is said and not computed
+# What can be at all, so that a slip of the decimal point or of the unit is reported, not computed
 # with. The largest ship has 460 m and 660 000 t; models of ships begin at half a metre.
 LONGEST_M, HEAVIEST_KG = 1_000.0, 2e9
 Length = Annotated[float, Field(gt=0, le=LONGEST_M)]
@@ -124,7 +124,7 @@ class Sensor(Source):
     )
 
 
-KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
+SENSOR_KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
     "position": ("geodetic", "local"),
     "velocity": ("sog_cog", "body", "ned", "enu"),
     "heading": ("angle", "quaternion_enu", "quaternion_ned"),
@@ -136,7 +136,7 @@ NEEDED = {  # sensors without which there is no table, and what records them
     "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
 }
-WIDTH = {
+FIELD_COUNT = {
     "geodetic": 2,
     "local": 2,
     "sog_cog": 2,
@@ -165,7 +165,7 @@ TABLE_CHANNELS = {
     ("yaw_rate", "rate"): ("yaw_rate",),
     ("wind", "from_bow"): ("wind_speed", "wind_angle"),
 }
-LABELS = {  # columns of a table that say whose row it is, and when
+TABLE_LABELS = {  # columns of a table that say whose row it is, and when
     "time": "the row's time",
     "date": "belongs to a `time` that is a time of day",
     "voyage": "cuts the table into one log a value",
@@ -182,22 +182,22 @@ class Sensors(Section):
 
     @model_validator(mode="after")
     def _kinds(self) -> Sensors:
-        for name, kinds in KINDS.items():
+        for name, kinds in SENSOR_KINDS.items():
             sensor = getattr(self, name)
             if sensor is None:
                 continue
             kind = sensor.kind or kinds[0]
             if kind not in kinds:
                 raise ValueError(f"sensors.{name}.kind is {kind!r}; it can be {listed(kinds)}")
-            if len(sensor.paths) != WIDTH[kind]:
+            if len(sensor.paths) != FIELD_COUNT[kind]:
                 raise ValueError(
-                    f"sensors.{name} of kind {kind!r} needs {WIDTH[kind]} field(s), "
+                    f"sensors.{name} of kind {kind!r} needs {FIELD_COUNT[kind]} field(s), "
                     f"not {len(sensor.paths)}"
                 )
         return self
 
     def kind(self, name: str) -> str:
-        return getattr(self, name).kind or KINDS[name][0]
+        return getattr(self, name).kind or SENSOR_KINDS[name][0]
 
     def noise(self, name: str) -> float:
         """Stated accuracy of a sensor in SI (position in m), 0 where none is stated."""
@@ -208,7 +208,9 @@ class Sensors(Section):
         return first if name == "position" else first * abs(sensor.scale()[0][1])
 
     def items(self) -> list[tuple[str, Sensor]]:
-        return [(name, getattr(self, name)) for name in KINDS if getattr(self, name) is not None]
+        return [
+            (name, getattr(self, name)) for name in SENSOR_KINDS if getattr(self, name) is not None
+        ]
 
 
 class Actuator(Source):
@@ -311,7 +313,7 @@ class Profile(Section):
     def _names(self) -> Profile:
         names = [actuator.name for actuator in self.actuators]
         canonical = {c.name for c in (*channels.STATE, *channels.WIND)} | {"quality"}
-        columns = {name for pair in TABLE_CHANNELS.values() for name in pair} | {*LABELS}
+        columns = {name for pair in TABLE_CHANNELS.values() for name in pair} | {*TABLE_LABELS}
         taken = canonical | columns
         doubled = {name for name in names if names.count(name) > 1 or name in taken}
         if doubled:

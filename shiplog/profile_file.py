@@ -78,7 +78,7 @@ def parse(text: str, source: str) -> Profile:
     try:
         profile = Profile.model_validate({**content, "source": source})
         for item in (*(s for _, s in profile.sensors.items()), *profile.actuators):
-            item.scale()  # a unit that is not known is said now, not in the middle of a log
+            item.scale()  # an unknown unit is reported now, not in the middle of a log
         for column in profile.table.values():
             units.factor(column.unit or "1")
         return profile
@@ -105,7 +105,7 @@ def _sensors_lacking(error: ValidationError) -> list[str]:
     return lacking if len(lacking) == len(places) else []
 
 
-SAID = {  # pydantic's kinds of error in a user's words
+MESSAGES = {  # pydantic's kinds of error in a user's words
     "finite_number": "has to be a finite number",
     "float_type": "has to be a number",
     "float_parsing": "has to be a number",
@@ -128,8 +128,8 @@ def advice(error: ValidationError) -> str:
             sentence = f"is not a known key{nearest(str(item['loc'][-1]), known)}"
         elif item["type"] == "missing":
             sentence = "is missing"
-        elif item["type"] in SAID:
-            sentence = SAID[item["type"]]
+        elif item["type"] in MESSAGES:
+            sentence = MESSAGES[item["type"]]
         else:
             words = item["msg"].removeprefix("Value error, ")
             sentence = words.replace("Input should be", "has to be")

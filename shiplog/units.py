@@ -5,6 +5,7 @@ from __future__ import annotations
 from shiplog.channels import DEGREE
 from shiplog.exceptions import ProfileError, listed, nearest
 
+SECOND_NS = 1_000_000_000  # ns: logs count time in whole nanoseconds
 TO_SI = {
     "1": 1.0, "%": 0.01, "permille": 0.001,
     "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048,

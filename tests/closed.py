@@ -80,7 +80,7 @@ def record(
         c, s = np.cos(turned), np.sin(turned)
         body = np.stack((c * body[:, 0] - s * body[:, 1], s * body[:, 0] + c * body[:, 1]), -1)
 
-    # ingest: arms as the profile has them, angles and rates as they are shown
+    # ingest: arms as the profile has them, angles and rates as they are displayed
     c, s = np.cos(compass), np.sin(compass)
     a, b = sensors.position.lever_arm_m
     x0, y0 = antenna[:, 0] - a * c + b * s, antenna[:, 1] - a * s - b * c

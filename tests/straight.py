@@ -114,7 +114,7 @@ def passed(
 
     noise    times the standard deviations of UNREST that the noise and the acceleration have
     sensitivity  what one unit of a number moves an observation by, in its standard deviations
-    pushed   [S, 3J] accelerations beside the process noise
+    pushed   [S, 3J] accelerations in addition to the process noise
     """
     rng = np.random.default_rng(seed)
     g = segments.grid(record)

@@ -119,20 +119,23 @@ def test_names_are_not_patterns(tmp_path, name):
 def test_a_full_disk_is_named_with_the_path_that_was_asked_for(tmp_path, error):
     path = tmp_path / "a.parquet"
     path.write_text("as it was")
-    with pytest.raises(OSError, match="No space left on device") as told, files.whole(path) as part:
+    with (
+        pytest.raises(OSError, match="No space left on device") as raised,
+        files.whole(path) as part,
+    ):
         part.write_text("half")
         raise error
-    assert told.value.filename == str(path)
-    assert told.value.errno == 28
+    assert raised.value.filename == str(path)
+    assert raised.value.errno == 28
     assert path.read_text() == "as it was"
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_faults_of_other_kinds_and_paths_stay_what_they_are(tmp_path):
     for error in (ValueError("no number"), FileNotFoundError(2, "No such file", "/elsewhere")):
-        with pytest.raises(type(error)) as told, files.whole(tmp_path / "a"):
+        with pytest.raises(type(error)) as raised, files.whole(tmp_path / "a"):
             raise error
-        assert told.value is error
+        assert raised.value is error
     assert list(tmp_path.iterdir()) == []
 
 

@@ -101,7 +101,7 @@ def test_equations_of_others_are_not_kept(counted, static):
     assert traces and not list(counted.glob("*"))
 
 
-def test_every_cause_of_the_catalogue_is_told_from_the_others(counted):
+def test_every_cause_of_the_catalogue_is_distinguished_from_the_others(counted):
     """Each in its own file: what a cause consists of is in its name and numbers."""
     for cause in CATALOGUE:
         same(Traced(bent)(Held((cause,)), X, 0.5))

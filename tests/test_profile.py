@@ -70,9 +70,16 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     page = profile_reference.text()
     sections = (profile.Ship, profile.Sensor, profile.Actuator, profile.Site, profile.Column)
     keys = {key for section in sections for key in section.model_fields}
-    kinds = {f'"{kind}"' for each in profile.KINDS.values() for kind in each}
+    kinds = {f'"{kind}"' for each in profile.SENSOR_KINDS.values() for kind in each}
     channels = {name for names in profile.TABLE_CHANNELS.values() for name in names}
-    for word in (*keys, *kinds, *channels, *profile.LABELS, *units.TO_SI, *profile_file.shipped()):
+    for word in (
+        *keys,
+        *kinds,
+        *channels,
+        *profile.TABLE_LABELS,
+        *units.TO_SI,
+        *profile_file.shipped(),
+    ):
         assert f"`{word}`" in page
     example = page[page.index("    [ship]") : page.index("Position, velocity and heading")]
     ship = profile_file.parse(textwrap.dedent(example), "docs/profile.md")
@@ -87,7 +94,7 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
         ((), "has no position and no velocity and no heading,"),
     ],
 )
-def test_what_a_log_does_not_have_is_said_with_what_records_it(sensors, said):
+def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, said):
     sections = sailing.PROFILE.split("[sensors.")
     kept = [part for part in sections[1:] if part.startswith(sensors)]
     ship, actuators = sections[0], "[[actuators]]" + sailing.PROFILE.split("[[actuators]]", 1)[1]

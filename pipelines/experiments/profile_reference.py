@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 from shiplog import profile, profile_file, units
-from shiplog.profile import KINDS, LABELS, TABLE_CHANNELS, Section
+from shiplog.profile import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS, Section
 from shiplog.report import tables
 
 HEAD = """# The ship profile
@@ -155,8 +155,8 @@ def _toml(value: object) -> str:
 
 def _kinds() -> str:
     rows = [
-        (f"`{sensor}`", f"`{_toml(kind)}`", str(profile.WIDTH[kind]), MEANT[kind])
-        for sensor, kinds in KINDS.items()
+        (f"`{sensor}`", f"`{_toml(kind)}`", str(profile.FIELD_COUNT[kind]), MEANT[kind])
+        for sensor, kinds in SENSOR_KINDS.items()
         for kind in kinds
     ]
     return tables.table(("sensor", "kind", "fields", "what they are"), rows)
@@ -167,7 +167,7 @@ def _channels() -> str:
         (" and ".join(f"`{c}`" for c in names), f"`{sensor}` of kind `{_toml(kind)}`")
         for (sensor, kind), names in TABLE_CHANNELS.items()
     ]
-    rows += [(f"`{name}`", what) for name, what in LABELS.items()]
+    rows += [(f"`{name}`", what) for name, what in TABLE_LABELS.items()]
     rows.append(("an actuator's name", "that actuator"))
     return tables.table(("channel", "what it is for"), rows)
 

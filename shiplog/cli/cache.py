@@ -25,7 +25,7 @@ def cache(
     sizes = disk_cache.sizes()
     kept = sum(total for _, total in sizes.values())
     rows = [
-        (kind, disk_cache.KINDS.get(kind, "-"), count, total / 1e6)
+        (kind, disk_cache.FOLDERS.get(kind, "-"), count, total / 1e6)
         for kind, (count, total) in sizes.items()
     ]
     text = (

@@ -115,7 +115,7 @@ def train(
 
 
 def _refuse_others(options: TrainOptions) -> None:
-    """Raises UsageError where something is asked of a run that is to be repeated as it was."""
+    """Raises UsageError for options that would change a run which is to be repeated as it was."""
     given = options.given()
     if given:
         flags = listed(f"--{name.replace('_', '-')}" for name in given)

@@ -24,7 +24,7 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
     """
     if run.lacks or not run.judges_itself:
         return run.lacks
-    cut = windows_of(run, store, run.made_on, profile)
+    cut = windows_of(run, store, run.trained_on, profile)
     voyages = [] if cut is None else cut.plan["voyage"].to_list()
     names = list(dict.fromkeys(voyages))
     if cut is None or len(names) < 2:

@@ -32,7 +32,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-ROUNDS = 3  # of deviations, noise and paths in turn
+LEARNING_ROUNDS = 3  # of deviations, noise and paths in turn
 NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
 
 
@@ -108,13 +108,13 @@ def characteristics(
     groups = groups_of(model, columns, made.families)
     sized = [family.columns for family in made.families.families]
     weight = np.ones(len(made.linear.e))
-    for round_ in range(ROUNDS):
+    for round_ in range(LEARNING_ROUNDS):
         modes = likelihood.modes(
             likelihood.weighed(made.linear, process_noise), process_noise
         ).joined(made.accelerations)
         each = products(modes, made.rows, columns.unit, weight)
         effects = voyage_effects.learn(each, known, held, list(groups.values()), sized)
-        if round_ == ROUNDS - 1:
+        if round_ == LEARNING_ROUNDS - 1:
             break
         # what parts disagree in is no noise, nor what a few segments are off by
         weight = _weights(modes, made, effects)
@@ -166,7 +166,7 @@ def _weights(modes: Modes, made: NominalPass, effects: VoyageEffects) -> np.ndar
 def _noise_of_parts(
     made: NominalPass, effects: VoyageEffects, process_noise: ProcessNoise, kept: np.ndarray
 ) -> ProcessNoise:
-    """Noise of what is left of the `kept` [S] segments when every part has its own numbers."""
+    """Noise of the residuals of the `kept` [S] segments when every part has its own numbers."""
     assert effects.numbers is not None
     own = np.empty((len(made.linear.e), len(made.columns.unit)))
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):

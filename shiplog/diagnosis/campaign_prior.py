@@ -15,8 +15,8 @@ import numpy as np
 from shiplog.diagnosis import nominal_reference
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 
-APART = (0.0, 0.25, 0.5, 1.0)  # of voyages, in deviations of their parts; each as likely
-SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
+VOYAGE_SPREADS = (0.0, 0.25, 0.5, 1.0)  # of voyages, in deviations of their parts; each as likely
+INFORMATION_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 
 
 def prior(
@@ -59,14 +59,14 @@ def learn(
     """How far voyages are from each other, in deviations of their parts, and how much of itself a
     voyage counts (a power posterior: Grünwald & van Ommen 2017).
 
-    One voyage alone says nothing of this: all of `APART` stay as likely as before.
+    One voyage alone says nothing of this: all of `VOYAGE_SPREADS` stay as likely as before.
     """
     known = effects.size**-2.0
     count = len(np.unique(voyages))
-    best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(APART)))), 1.0)
-    tried = [of_voyages(parts, voyages, apart * effects.deviation) for apart in APART]
-    for share in SHARES if count > 1 else ():
-        scores = np.zeros(len(APART))
+    best, chosen = -np.inf, (float(np.sqrt(np.mean(np.square(VOYAGE_SPREADS)))), 1.0)
+    tried = [of_voyages(parts, voyages, apart * effects.deviation) for apart in VOYAGE_SPREADS]
+    for share in INFORMATION_SHARES if count > 1 else ():
+        scores = np.zeros(len(VOYAGE_SPREADS))
         for i, (each, volumes) in enumerate(tried):
             for left, (gram, volume) in enumerate(zip(each, volumes, strict=True)):
                 kept = [g for j, g in enumerate(each) if j != left]
@@ -76,5 +76,5 @@ def learn(
         if whole < best:
             break
         weight = np.exp(scores - whole)
-        best, chosen = whole, (float(np.sqrt(weight @ np.square(APART))), share)
+        best, chosen = whole, (float(np.sqrt(weight @ np.square(VOYAGE_SPREADS))), share)
     return chosen

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog import frames
 from shiplog.diagnosis import segment_nodes
 from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid
@@ -178,10 +179,8 @@ def apparent_flow(knots: Knots) -> np.ndarray:
     """[..., 2] where the apparent wind comes from, ahead and to starboard [m/s]."""
     state = knots.state
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
-    north, east = knots.driven[..., -2], knots.driven[..., -1]
-    return np.stack(
-        (c * north + s * east + state[..., 1], c * east - s * north + state[..., 3]), -1
-    )
+    ahead, starboard = frames.in_body_axes(knots.driven[..., -2], knots.driven[..., -1], c, s)
+    return np.stack((ahead + state[..., 1], starboard + state[..., 3]), -1)
 
 
 def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:

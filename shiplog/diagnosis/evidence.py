@@ -19,7 +19,7 @@ from shiplog.diagnosis.trial import Numbers, Trial
 from shiplog.models.causes import Cause
 
 NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the nominal
-FINER = 1.08  # step about the best of them
+FINE_STEP = 1.08  # step about the best of them
 NO_CHANGE_OF_NOISE = Remainder()
 
 
@@ -123,11 +123,11 @@ def levels(
         here = NOISES[best]
     else:
         here = near
-    below, middle_value, above = at(here / FINER), at(here), at(here * FINER)
+    below, middle_value, above = at(here / FINE_STEP), at(here), at(here * FINE_STEP)
     bend = below - 2.0 * middle_value + above
     top = float(np.clip(0.5 * (below - above) / bend, -3.0, 3.0)) if bend < 0.0 else 0.0
     if abs(top) > 1.0:  # of the parabola through them, and beyond them
-        at(here * FINER**top)
+        at(here * FINE_STEP**top)
     return list(tried.values())
 
 

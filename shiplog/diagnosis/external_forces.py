@@ -30,7 +30,7 @@ from shiplog.voyages.recording import Record
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 GUST = 1.2  # of the measured wind speed, from whichever side is worst
 STILL = 0.05  # of full power: below, a screw stands
-RESTS = 5.0  # s that screws have stood before their jets are gone
+JETS_GONE_S = 5.0  # s that screws have stood before their jets are gone
 RESTING = 0.5  # of its means that stay allowed then: a thruster that nobody records
 DOUBT = 5.0  # s around a jump of position or heading, where velocities are not believed
 SHORTEST_S = 2.0  # s of an event
@@ -230,13 +230,13 @@ def _ranges(record: Record) -> list[np.ndarray]:
 
 
 def _resting(record: Record, physics: MMG, rows: np.ndarray) -> np.ndarray:
-    """[K] bool: no screw has turned for RESTS."""
+    """[K] bool: no screw has turned for JETS_GONE_S."""
     drives = [u.column for u in (*physics.geometry.propellers, *physics.geometry.thrusters)]
     ranges = _ranges(record)
     most = np.array([np.abs(ranges[i]).max() for i in drives])
     power = (np.abs(record.actuator[:, drives]) / np.maximum(most, 1e-9)).max(1)
     turned = np.concatenate(([0], np.cumsum(power > STILL)))
-    before = np.maximum(rows - round(RESTS / record.step), record.firsts[rows])
+    before = np.maximum(rows - round(JETS_GONE_S / record.step), record.firsts[rows])
     after = np.minimum(rows + round(0.5 * record.timescale.knot / record.step), record.lasts[rows])
     return turned[after + 1] == turned[before]
 
@@ -307,7 +307,7 @@ def _event(
 
 
 def _merged(events: list[tuple[float, Stretch]], names: tuple[str, ...]) -> Iterator[Stretch]:
-    """Over channels and short breaks; what is shorter than LEAST after all is left out."""
+    """Over channels and short breaks; what is shorter than SHORTEST_S after all is left out."""
     groups: list[list[tuple[float, Stretch]]] = []
     for event in sorted(events, key=lambda e: (names.index(e[1].voyage), e[1].start_s)):
         last = [e for _, e in groups[-1]] if groups else []

@@ -11,7 +11,7 @@ from shiplog import channels
 from shiplog.diagnosis import discrepancy, evidence, thresholds
 from shiplog.diagnosis.fitted import Fit, Level, Point
 from shiplog.diagnosis.linear_segments import Linear
-from shiplog.diagnosis.remainder import SIZES, Remainder
+from shiplog.diagnosis.remainder import CHANGE_SIZES, Remainder
 from shiplog.diagnosis.trial import Trial
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
@@ -105,7 +105,7 @@ def changed(trial: Trial, point: Point, level: Level, included: tuple[str, ...],
     pull = ref.counts * total[1 + columns, 0] - joined.T @ level.solution
     own = ref.counts * total[np.ix_(1 + columns, 1 + columns)] - joined.T @ level.inverse @ joined
     found = []
-    for size in SIZES:
+    for size in CHANGE_SIZES:
         whole = size**2 * own + np.eye(len(own))
         gained = 0.5 * size**2 * float(pull @ np.linalg.solve(whole, pull))
         found.append((gained - 0.5 * float(np.linalg.slogdet(whole)[1]), size))
@@ -136,7 +136,7 @@ def imitated(trial: Trial, one: Fit, label: str) -> float:
 
 def acts_on(trial: Trial, one: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts."""
-    changed_by = Remainder(family, SIZES[1], intermittent=one.remainder.intermittent)
+    changed_by = Remainder(family, CHANGE_SIZES[1], intermittent=one.remainder.intermittent)
     level = evidence.level(trial, one.point, one.found.noise_factor, one.included, changed_by)
     of = trial.unseen if family in discrepancy.UNSEEN else trial.campaign.discrepancy
     columns = trial.families[family]

@@ -24,7 +24,7 @@ class Hypotheses:
 
     first      the trial linearised with the model as it stands
     placebo    label or remainder → its log Bayes factor on nominal voyages, in nats
-    catalogue  causes that a hypothesis may contain, beside those that the model has already
+    catalogue  causes that a hypothesis may contain in addition to those of the model
     found      causes and kind of remainder → hypothesis
     alone      label → log Bayes factor of that cause by itself, over no cause
     """

@@ -20,7 +20,7 @@ from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.compiled_network import Network
 
-SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary process noise
+INPUT_SIZES = (1.0, 3.0, 9.0, 27.0)  # of the accelerations, in units of the ordinary process noise
 SUMS = 200  # of the features in a channel, of which others hardly differ where ships go
 FELT = 1.0  # least that voyages say of a weight, in units of what was known of it
 
@@ -69,7 +69,7 @@ def of(
     by = np.concatenate(([1.0], unit, np.ones(3 * count)))
     total = modes.joined(whole.accelerations(cut, g)).total(np.ones(len(cut)))
     total = total * np.outer(by, by)
-    size = max(SIZES, key=lambda one: _likelihood(total, known, one))
+    size = max(INPUT_SIZES, key=lambda one: _likelihood(total, known, one))
     information = total[1 + len(known) :, 1 + len(known) :]
     felt, turned = np.linalg.eigh(size**2 * information)
     return Misfit(network, axes @ (size * turned[:, felt > FELT]))

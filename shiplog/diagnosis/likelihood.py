@@ -18,7 +18,15 @@ import numpy as np
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.timescale import BIN, KNOT
 
-SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)  # of the noise's variance, that may be coloured
+COLOURED_SHARES = (
+    0.0,
+    0.2,
+    0.4,
+    0.6,
+    0.8,
+    0.9,
+    0.95,
+)  # of the noise's variance, that may be coloured
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
 LEAP = 16.0  # steps at once, at most
 ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it
@@ -365,7 +373,7 @@ def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> 
         second = gap[..., 0].T @ gap[..., 0]
         second += (columns @ covariance @ np.swapaxes(columns, 1, 2)).sum(0)
         best = np.inf
-        for share in SHARES:
+        for share in COLOURED_SHARES:
             for time in FADES if share > 0.0 else FADES[:1]:
                 correlation = _correlation(share, time, process_noise.bin * np.arange(bins))
                 variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))

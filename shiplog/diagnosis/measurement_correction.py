@@ -14,7 +14,7 @@ from shiplog.models.causes import Cause, Setting
 from shiplog.models.extended import Extended
 from shiplog.voyages.recording import Record
 
-SMOOTH = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
+AVERAGING_S = 2.0  # s: a clock's column is a derivative, and its noise would pass for what it tells
 # Of a cause's size, to see how it changes what is read: less, and noise drowns a delay
 READ_STEP = 0.3
 
@@ -49,7 +49,7 @@ def read(
             continue
         here = given.get(cause.label, np.zeros(cause.count))
         low, high = cause.bounds(setting)
-        moving = before.smoothed(SMOOTH) if cause.shifts else before
+        moving = before.smoothed(AVERAGING_S) if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = READ_STEP * sizes[cause.label][i]

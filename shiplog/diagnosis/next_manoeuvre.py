@@ -19,7 +19,7 @@ from shiplog.simulation.sensitivities import WindowSeries, rollout
 from shiplog.voyages.recording import Record
 
 MANOEUVRE_S = 300.0  # of a manoeuvre of a three-metre ship; other ships take theirs in ship time
-STEP_S = 0.5  # s of the simulation
+SIMULATION_STEP_S = 0.5  # s of the simulation
 HARD = np.radians(35.0)  # farther no rudder is laid, and no thruster turned
 OFF_THE_POND = 1e3  # m, m/s: a simulation beyond has left the pond
 
@@ -150,14 +150,14 @@ def simulated(trial: Trial, theta: np.ndarray) -> tuple[Record, np.ndarray]:
     """All manoeuvres in the trial's mean wind, a voyage each; which stayed in the pond [M]."""
     record, model = trial.record, trial.reference.model
     factor = record.timescale.factor
-    time = np.arange(0.0, factor * MANOEUVRE_S + STEP_S, STEP_S)
+    time = np.arange(0.0, factor * MANOEUVRE_S + SIMULATION_STEP_S, SIMULATION_STEP_S)
     actuator = np.stack([driven(record, m, time / factor) for m in MANOEUVRES])
     count, rows = actuator.shape[:2]
     wind = np.broadcast_to(record.true_wind[record.measured].mean(0), (count, rows, 2))
     share = np.full((count, rows, 1), record.share[-1])
     series = WindowSeries(
         np.zeros((count, rows, 6)), np.concatenate((actuator, share), -1), np.array(wind),
-        np.full((count, rows - 1), STEP_S), np.ones(count),
+        np.full((count, rows - 1), SIMULATION_STEP_S), np.ones(count),
     )  # fmt: skip
     with np.errstate(all="ignore"):
         states = rollout(model, theta, series)

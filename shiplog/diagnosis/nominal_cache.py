@@ -27,7 +27,7 @@ from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
-TIMES = ("time", "bin", "knot")
+TIME_FIELDS = ("time", "bin", "knot")
 
 log = logging.getLogger(__name__)
 
@@ -82,11 +82,11 @@ def _read(kept: File) -> dict | None:
 
 def _process_noise(process_noise: ProcessNoise) -> dict:
     whole = {f"process_noise_{name}": getattr(process_noise, name) for name in PROCESS_NOISE}
-    return whole | {name: getattr(process_noise, name) for name in TIMES}
+    return whole | {name: getattr(process_noise, name) for name in TIME_FIELDS}
 
 
 def _known_process_noise(arrays: dict) -> ProcessNoise:
-    times = {n: float(arrays[n]) for n in TIMES}
+    times = {n: float(arrays[n]) for n in TIME_FIELDS}
     return ProcessNoise(**times, **{n: arrays[f"process_noise_{n}"] for n in PROCESS_NOISE})
 
 

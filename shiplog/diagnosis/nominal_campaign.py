@@ -183,7 +183,12 @@ def assumed(
         return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
     at = nominal_reference.converged(
-        model, setting, start, record, 0 if given else nominal_reference.ROUNDS, discrepancy.SEEN
+        model,
+        setting,
+        start,
+        record,
+        0 if given else nominal_reference.LINEARISATIONS,
+        discrepancy.SEEN,
     )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference

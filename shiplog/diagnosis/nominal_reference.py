@@ -34,7 +34,7 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-ROUNDS = 20  # of moving the coefficients to where they are linearised, at most
+LINEARISATIONS = 20  # of moving the coefficients to where they are linearised, at most
 LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
 NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
 AT_BOUNDS = 0.05  # plausible spreads: all that can still move has converged
@@ -44,7 +44,7 @@ KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
 CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
 VOYAGES = 2.0  # and between voyages, together with the error of a network on all of them
 CAREFUL_KAPPA = 11.0  # of too few voyages
-UNREST_TIME = 4.0  # s, of a three-metre ship
+PROCESS_NOISE_TIME_S = 4.0  # s, of a three-metre ship
 FIRST_SIZE = 1.0  # of a family's weights, in units of the process noise
 LEAST_SIZE = 0.01  # the same: a model without discrepancy has none of it
 SIZE_STEPS = 3  # of expectation-maximisation, of these sizes, each time
@@ -170,7 +170,7 @@ class Converged:
 
 
 def converged(
-    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = ROUNDS,
+    model: Extended, setting: Setting, start: Start, record: Record, rounds: int = LINEARISATIONS,
     seen: Sequence[str] = (),
 ) -> Converged:  # fmt: skip
     """Coefficients moved to where they are linearised, all causes' numbers together with them, and
@@ -187,7 +187,7 @@ def converged(
     process_noise = ProcessNoise(
         wide.noise,
         0.04 * wide.acceleration,
-        UNREST_TIME * of.factor,
+        PROCESS_NOISE_TIME_S * of.factor,
         wide.start,
         bin=of.bin,
         knot=of.knot,
@@ -407,7 +407,7 @@ def assume(
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
-    at = converged(model, setting, start, record, rounds=0 if given else ROUNDS)
+    at = converged(model, setting, start, record, rounds=0 if given else LINEARISATIONS)
     kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
     whole = learn(model, setting, start, record, at, kappa, least, inputs)
     columns = whole.columns

@@ -23,10 +23,10 @@ CHANNELS = tuple(c.name for c in channels.VELOCITY)
 LEAST_R2 = 0.05  # of the variance: what a model misfits itself reaches half of it in another season
 BEYOND = 4.0  # standard deviations of what chance reaches
 SHIFTS = 20
-APART = 30  # nodes, the least shift: random forces are no longer correlated by then
+LEAST_SHIFT = 30  # nodes, the least shift: random forces are no longer correlated by then
 EXCHANGED_S = 300.0  # s, exchanged to make time mean nothing
 VOYAGE_FOLDS = 8  # more voyages are left out in groups
-PLACES = 12
+MAP_CENTRES = 12
 OUTLIER = 6.0  # robust standard deviations; a ship that was pushed by hand must not decide
 PENALTIES = 10.0 ** np.arange(-4.0, 2.0)  # of the mean square of a feature
 
@@ -59,7 +59,7 @@ class _Knots:
     visible  [K, G]  a rough model's features of all inputs of the model
     carried  [K, H]  what a missing effect may be proportional to
     runs     [K]     voyage
-    folds    [K]     what is left out together
+    folds    [K]     the group that is held out together
     """
 
     y: np.ndarray
@@ -155,7 +155,7 @@ def _drive(knots: pl.DataFrame, profile: Profile) -> np.ndarray:
 
 
 def _folds(runs: np.ndarray) -> tuple[np.ndarray, str]:
-    """[K] what is left out together: voyages, groups of them in order, or halves of one."""
+    """[K] the fold of each: voyages, groups of them in order, or halves of one."""
     count = int(runs.max()) + 1
     if count == 1:
         return (np.arange(len(runs)) >= len(runs) // 2).astype(int), "halves"
@@ -193,11 +193,11 @@ def _heading(psi: np.ndarray, carried: np.ndarray) -> Callable[[Indices], np.nda
 def _position(place: np.ndarray, psi: np.ndarray) -> Callable[[Indices], np.ndarray]:
     """Bumps over the places it was at: forces in body axes, and earth-fixed ones turned there."""
     centres = [place.mean(0)]
-    for _ in range(PLACES - 1):  # each as far as can be from those before
+    for _ in range(MAP_CENTRES - 1):  # each as far as can be from those before
         away = np.min([((place - c) ** 2).sum(1) for c in centres], axis=0)
         centres.append(place[away.argmax()])
     grid = np.array(centres)
-    between = np.linalg.norm(grid[:, None] - grid, axis=-1) + np.diag(np.full(PLACES, np.inf))
+    between = np.linalg.norm(grid[:, None] - grid, axis=-1) + np.diag(np.full(MAP_CENTRES, np.inf))
     width = max(float(np.median(between.min(0))), 1e-6)
     bumps = np.exp(-0.5 * ((place[:, None] - grid) ** 2).sum(-1) / width**2)
     axes = np.stack((np.ones(len(psi)), np.cos(psi), np.sin(psi)), 1)
@@ -222,11 +222,11 @@ def _controls(
 
 
 def _shifted(runs: np.ndarray, time: np.ndarray, rng: np.random.Generator) -> Indices:
-    """Round and round within each voyage, by APART at least."""
+    """Round and round within each voyage, by LEAST_SHIFT at least."""
     moved = np.arange(len(runs))
     for run in np.unique(runs):
         rows = np.flatnonzero(runs == run)
-        least = min(APART, len(rows) // 2)
+        least = min(LEAST_SHIFT, len(rows) // 2)
         moved[rows] = np.roll(rows, rng.integers(least, len(rows) - least + 1))
     return moved
 

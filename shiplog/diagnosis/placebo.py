@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shiplog.diagnosis.nominal_campaign import Campaign
-from shiplog.diagnosis.remainder import SIZES
+from shiplog.diagnosis.remainder import CHANGE_SIZES
 
 
 def placebos(campaign: Campaign) -> Mapping[str, float]:
@@ -20,7 +20,7 @@ def placebos(campaign: Campaign) -> Mapping[str, float]:
     tested: dict[str, tuple[np.ndarray, tuple[float, ...]]]
     tested = {label: (at, (1.0,)) for label, at in columns.of.items()}
     for family in (*campaign.discrepancy.families, *campaign.unseen.families):
-        tested[family.name] = (family.columns, SIZES)
+        tested[family.name] = (family.columns, CHANGE_SIZES)
     most = dict.fromkeys(tested, 0.0)
     for left_out, gram in enumerate(campaign.voyages):
         information, pull = campaign.prior_without(left_out)

@@ -57,8 +57,10 @@ def judged(
         gain = held.gain(decision)
         worths = [gain]
         if len(decision.named) > 1:
-            rests = [decisions.without(search.table.trial, decision, one) for one in decision.named]
-            worths = [held.worth(rest, decision) for rest in rests]
+            reduced = [
+                decisions.without(search.table.trial, decision, one) for one in decision.named
+            ]
+            worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
         if not worse and not gain.real and _in_doubt(search, found, decision):

@@ -1,4 +1,5 @@
-"""What is named, linearised again where it was found, with a path of its own, until it rests."""
+"""The named causes, linearised again at their estimates, with a path of their own, until they
+converge."""
 
 from __future__ import annotations
 
@@ -18,9 +19,9 @@ from shiplog.diagnosis.trial import Trial
 RELINEARISATIONS = 10  # of linearising again, at most: a map whose ends are held takes nine
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 STEP_NATS = 100.0  # nats: no step of a converging fit loses as much
-SHORTER = 3  # times that a step is halved where the fit diverges
-AT_REST = 0.02  # of a number's size: it rests
-STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: it rests
+MOST_HALVINGS = 3  # times that a step is halved where the fit diverges
+AT_REST = 0.02  # of a number's size: it has converged
+STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 
 
 def converge(
@@ -48,7 +49,7 @@ def converge(
             point = trial.at(numbers, near, noise_factor, remainder)
             base = _fitted(trial, point, included, remainder, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
-            if shorter == SHORTER:
+            if shorter == MOST_HALVINGS:
                 assert trial.first is not None
                 return trial.first, Found("+".join(included), -np.inf, noise_factor, numbers)
             shorter += 1

@@ -10,7 +10,7 @@ import numpy as np
 from shiplog.diagnosis.likelihood import ProcessNoise
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
-SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
+CHANGE_SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
 LEAST_SPREAD = 0.05  # of the logarithm of the process noise: two campaigns are never alike
 RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either way
 

@@ -78,6 +78,6 @@ ACTS = 1.0 / 3.0
 # by so many standard deviations of its estimate.
 EXTERNAL_SPREADS = 3.0
 
-# Ratio. What the model usually leaves of this ship, times this, is allowed in addition to those
+# Ratio. The nominal misfit of this ship, times this, is allowed in addition to those
 # forces.
 EXTERNAL_MISFIT = 5.0

@@ -74,7 +74,7 @@ class Trial:
     begun     whether it is known where the model itself diverges
     products  of the points at which it was linearised
     readings  of the record
-    settled   causes and remainder → numbers, path and λ at which a fit of them converged
+    converged  causes and remainder → numbers, path and λ at which a fit of them converged
     """
 
     campaign: Campaign

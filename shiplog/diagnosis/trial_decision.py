@@ -1,8 +1,8 @@
 """Voyages in question to a decision: set-up, search, refutation; for a given model more than once.
 
 Of a given model no nominal campaign shows the discrepancy. It is learned from the voyages in
-question, where it takes in what causes do; so it is learned again without what the named causes
-explain, until the same causes are named.
+question, where it absorbs the effects of causes; so it is learned again without the effects of
+the named causes, until the same causes are named.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.voyage_effects import reduced
 
-KEPT_TOTALS = 41  # of one point about a dozen levels are asked for, and again for each family
+KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
 
 
 class Products:

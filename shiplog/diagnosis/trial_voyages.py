@@ -23,7 +23,7 @@ from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
 
-PLACES = 12  # of a map of the bottom
+BOTTOM_MAP_PLACES = 12  # of a map of the bottom
 WORKING = 0.95  # quantile of the speed: a ship that waits at a berth is no slower for it
 
 
@@ -33,7 +33,7 @@ def voyages_of(run: Run, store: Store, wanted: Sequence[str]) -> list[str]:
     if wanted:
         return store.select(list(wanted))
     stored = store.select()
-    names = [n for n in stored if not parts.overlapping([n], run.made_on)]
+    names = [n for n in stored if not parts.overlapping([n], run.trained_on)]
     names += [n for n in store.there(run.config.split.test) if n not in stored]
     if not names:
         raise StoreError(
@@ -106,7 +106,7 @@ def setting_of(run: Run, nominal: Record, recorded: Record) -> Setting:
     """Ship and place of a diagnosis; its speed is that of the `nominal` voyages."""
     speed = float(np.sqrt((nominal.state[:, [1, 3]] ** 2).sum(1).mean()))
     ship, main, _ = mmg.geometry_of(run.profile, run.config.physics.without)
-    places, spacing = _places(recorded, PLACES)
+    places, spacing = _places(recorded, BOTTOM_MAP_PLACES)
     scale = {
         "speed": max(speed, 1e-3), "length": main.length, "mass": main.mass,
         "moment": main.mass * main.length,

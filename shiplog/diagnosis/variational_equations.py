@@ -12,6 +12,11 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from shiplog import frames
+
+# Compiled into the loops below, whose caches do not notice when `frames` changes.
+_in_earth_axes = numba.njit(fastmath={"contract"})(frames.in_earth_axes)
+
 
 @numba.njit(cache=True, fastmath={"contract"})
 def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
@@ -51,8 +56,10 @@ def columns(states, by_state, by_driven, by_theta, moved, hats, step, bins):
                     for i in range(q):
                         acceleration[c, at_moved + i] += slope * moved[s, k, d, i]
             cos, sin = np.cos(states[s, k, 4]), np.sin(states[s, k, 4])
-            u, v = states[s, k, 1], states[s, k, 3]
-            north, east = -(sin * u + cos * v), cos * u - sin * v
+            velocity_north, velocity_east = _in_earth_axes(
+                states[s, k, 1], states[s, k, 3], cos, sin
+            )
+            north, east = -velocity_east, velocity_north  # a quarter turn on: by heading
             new, old = (step, 0.0) if k == 0 else (1.5 * step, -0.5 * step)
             _slope(now, cos, sin, north, east, by_state[s, k], acceleration, change)
             _step(now, before, change, out[s, k // per], new, old, 0.5 / per)
@@ -64,9 +71,9 @@ def _slope(now, cos, sin, north, east, a, acceleration, change):
     """δ̇ [6, W] into `change`."""
     x, du, y, dv, heading, dr = now[0], now[1], now[2], now[3], now[4], now[5]
     for i in range(now.shape[1]):
-        change[0, i] = cos * du[i] - sin * dv[i] + north * heading[i]
+        change[0, i] = _in_earth_axes(du[i], dv[i], cos, sin)[0] + north * heading[i]
     for i in range(now.shape[1]):
-        change[2, i] = sin * du[i] + cos * dv[i] + east * heading[i]
+        change[2, i] = _in_earth_axes(du[i], dv[i], cos, sin)[1] + east * heading[i]
     for i in range(now.shape[1]):
         change[4, i] = dr[i]
     for c in range(3):

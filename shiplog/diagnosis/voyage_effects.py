@@ -168,5 +168,5 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def _mean(total: float, count: int) -> float:
-    """Mean square, one pseudo-observation of LEAST among the others."""
+    """Mean square, one pseudo-observation of LEAST_DEVIATION among the others."""
     return (total + LEAST_DEVIATION**2) / (count + 1.0)

@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog import files
 from shiplog.exceptions import LogUnreadable, listed
-from shiplog.logs.write import CHUNK_BYTES, CONTRACT
+from shiplog.logs.write import CHUNK_BYTES, LOG_CONTRACT
 
 log = logging.getLogger(__name__)
 
@@ -75,7 +75,7 @@ def _write(reader, stream, ship: str, name: str) -> dict[str, str]:
         enable_crcs=True,
     )  # fmt: skip
     writer.start(profile="")
-    writer.add_metadata("voyage", {"ship": ship, "contract": CONTRACT, "table": name})
+    writer.add_metadata("voyage", {"ship": ship, "contract": LOG_CONTRACT, "table": name})
     channels: dict[tuple[int, int], int] = {}  # of each connection in each file of the bag
     schemas: dict[str, int] = {}
     topics: dict[str, int] = {}

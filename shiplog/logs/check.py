@@ -7,6 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.logs.health_report import Finding, VoyageReport
+from shiplog.units import SECOND_NS
 
 from . import faults
 from .read import Reading, read
@@ -33,7 +34,7 @@ def check(path: str | Path) -> VoyageReport:
         messages_read=reading.health.messages_read,
         messages_lost=reading.health.messages_lost,
         rows=0,  # rows are what `ingest` makes
-        seconds=(last - first) / faults.SECOND,
+        seconds=(last - first) / SECOND_NS,
         findings=tuple(findings),
     )
 
@@ -47,7 +48,7 @@ def late(topic: str, frame: pl.DataFrame) -> list[Finding]:
     median, low, high = faults.quantiles(delay)
     if median is None:
         return []
-    most = float(delay.max() or 0) / faults.SECOND  # type: ignore[arg-type]
+    most = float(delay.max() or 0) / SECOND_NS  # type: ignore[arg-type]
     if (median <= LATE and most <= VERY_LATE) or (median > LATE and high - low <= median):
         return []
     sentence = (
@@ -63,7 +64,7 @@ def dropouts(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
     times = frame["stamp" if times_are_stamps else "log_time"].sort()
     steps = times.diff()
     period = float(steps.median() or 0)  # type: ignore[arg-type]
-    least = max(DROPOUT * period, LEAST_GAP * faults.SECOND)
+    least = max(DROPOUT * period, LEAST_GAP * SECOND_NS)
     ends = (steps > least).arg_true().to_list()
     if not ends or period <= 0:
         return []
@@ -71,12 +72,12 @@ def dropouts(topic: str, frame: pl.DataFrame, first: int) -> list[Finding]:
     offset = offset if times_are_stamps else 0  # reported on the log's own time line
     findings = []
     for end in ends[:MOST_GAPS]:
-        start_s, end_s = ((int(times[i]) + offset - first) / faults.SECOND for i in (end - 1, end))
+        start_s, end_s = ((int(times[i]) + offset - first) / SECOND_NS for i in (end - 1, end))
         sentence = f"{topic} is silent for {end_s - start_s:.3g} s from {start_s:.1f} s."
         findings.append(Finding("gap", topic, sentence, start_s, end_s, end_s - start_s, unit="s"))
     if len(ends) > MOST_GAPS:
         rest = ends[MOST_GAPS:]
-        total = sum(int(times[i]) - int(times[i - 1]) for i in rest) / faults.SECOND
+        total = sum(int(times[i]) - int(times[i - 1]) for i in rest) / SECOND_NS
         sentence = f"{topic} is silent {len(rest)} times more, {total:.3g} s in all."
         findings.append(Finding("gap", topic, sentence, value=total, unit="s"))
     return findings

@@ -26,24 +26,24 @@ log = logging.getLogger(__name__)
 
 FIXED = struct.Struct("<QQQII")  # times, size, CRC, and how long the compression's name is
 LENGTH = struct.Struct("<Q")  # of the packed records, behind the compression's name
-LEAST = FIXED.size + LENGTH.size
+FIXED_BYTES = FIXED.size + LENGTH.size
 LONGEST_NAME = 16  # of a compression
 MOST_IN_A_CHUNK = 1 << 30  # bytes; writers make chunks of 1 to 10 MB
 AT_ONCE = 16 << 20  # bytes of a chunk that is unpacked at once
 PIECE = 4 << 20  # bytes of a larger one that are unpacked at a time
-WINDOW = 128 << 20  # bytes that zstd may keep to look back into, its own default
-BATCH = 10_000  # records handed on at once
+ZSTD_WINDOW_BYTES = 128 << 20  # bytes that zstd may keep to look back into, its own default
+BATCH_RECORDS = 10_000  # records handed on at once
 
 
 def stated(head: bytes, length: int) -> tuple[int, int, int] | None:
     """Where the packed records begin, their unpacked size and CRC; None: this is no chunk.
 
-    head    [>= LEAST + LONGEST_NAME bytes, or all that there are] of a body of `length` bytes
+    head    [>= FIXED_BYTES + LONGEST_NAME bytes, or all that there are] of a body of `length` bytes
     """
-    if len(head) < LEAST:
+    if len(head) < FIXED_BYTES:
         return None
     *_, size, crc, name = FIXED.unpack_from(head)
-    begin = LEAST + name
+    begin = FIXED_BYTES + name
     if name > LONGEST_NAME or len(head) < begin:
         return None
     (packed,) = LENGTH.unpack_from(head, begin - LENGTH.size)
@@ -52,7 +52,7 @@ def stated(head: bytes, length: int) -> tuple[int, int, int] | None:
 
 def chunk(body: bytes) -> Chunk | None:
     """A chunk record; None where its lengths contradict each other."""
-    where = stated(body[: LEAST + LONGEST_NAME], len(body))
+    where = stated(body[: FIXED_BYTES + LONGEST_NAME], len(body))
     if where is None:
         return None
     start, end, size, crc, name = FIXED.unpack_from(body)
@@ -96,8 +96,8 @@ def contents(sound: Chunk, counts: Counter[int] | None = None) -> Iterator[list[
         for _ in records.split(_unpacked(sound), size):
             pass
     for data, places in records.split(_unpacked(sound), size):
-        for first in range(0, len(places), BATCH):
-            batch = places[first : first + BATCH]
+        for first in range(0, len(places), BATCH_RECORDS):
+            batch = places[first : first + BATCH_RECORDS]
             bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in batch)
             yield list(_made(bodies, counts))
 
@@ -144,13 +144,13 @@ def _checked(packed: Chunk) -> Iterator[bytes]:
 
 def _unpacked(packed: Chunk) -> Iterator[bytes]:
     """A chunk's bytes in pieces. Raises ValueError where they are not as many as it states."""
-    seen = 0
+    unpacked = 0
     for piece in _pieces(packed, min(packed.uncompressed_size + 1, PIECE)):
-        seen += len(piece)
-        if seen > packed.uncompressed_size:
+        unpacked += len(piece)
+        if unpacked > packed.uncompressed_size:
             break
         yield piece
-    if seen != packed.uncompressed_size:
+    if unpacked != packed.uncompressed_size:
         raise ValueError("does not have the size it states")
 
 
@@ -166,7 +166,9 @@ def _pieces(packed: Chunk, most: int) -> Iterator[bytes]:
             yield piece
             piece = b"" if frame.eof else frame.decompress(b"", max_length=most)
     elif packed.compression == "zstd":
-        whole = zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(packed.data)
+        whole = zstandard.ZstdDecompressor(max_window_size=ZSTD_WINDOW_BYTES).stream_reader(
+            packed.data
+        )
         while piece := whole.read(most):
             yield piece
     else:

@@ -127,10 +127,10 @@ class Survey:
     @property
     def described(self) -> bool:
         """Whether the summary has every description that there is."""
-        said = self.statistics
-        if said is None:
+        stated = self.statistics
+        if stated is None:
             return False
-        counts = said.channel_count, said.schema_count, said.metadata_count
+        counts = stated.channel_count, stated.schema_count, stated.metadata_count
         return counts == (len(self.channels), len(self.schemas), self.metadata_indexed)
 
 

@@ -8,15 +8,15 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import Finding
+from shiplog.units import SECOND_NS
 
 from .container import Loss
 from .records import LARGEST_MESSAGE
 from .tables import Order, Tables
 
-SECOND = 1_000_000_000
-NAMED = 5  # topics of a loss; of a large log it may be hundreds
+MOST_TOPICS = 5  # topics of a loss; of a large log it may be hundreds
 OFFSET = 0.05  # s: closer clocks than this are one clock
-CLOCKS = (
+CLOCK_PAIRS = (
     ("log_time", "publish_time", "The recorder's clock", "the publishers'"),
     ("publish_time", "stamp", "The publishers' clock", "the messages' own stamps"),
 )
@@ -49,7 +49,7 @@ def _what(loss: Loss, names: list[str]) -> str:
     """What a loss held, as far as the indexes say."""
     count = sum(loss.held.values())
     messages = f"its {count} messages" if count else "its messages" if loss.chunk else "messages"
-    return f"{messages} on {listed(names, most=NAMED)}" if names else messages
+    return f"{messages} on {listed(names, most=MOST_TOPICS)}" if names else messages
 
 
 def appended(sections: int) -> list[Finding]:
@@ -83,7 +83,7 @@ def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
     if not back:
         return []
     count = sum(o.back for _, o in back)
-    largest = max(o.largest for _, o in back) / SECOND
+    largest = max(o.largest for _, o in back) / SECOND_NS
     sentence = (
         f"The log's times step back {count} times on {_topics({topic for topic, _ in back})}, "
         f"by up to {largest:.3g} s; the messages were sorted."
@@ -104,7 +104,7 @@ def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> li
     step = frame["stamp"].drop_nulls().diff()
     back = step.filter(step < 0)
     if len(back):
-        largest = -float(back.min()) / SECOND  # type: ignore[arg-type]
+        largest = -float(back.min()) / SECOND_NS  # type: ignore[arg-type]
         sentence = f"The stamps on {topic} step back {len(back)} times, by up to {largest:.3g} s."
         findings.append(Finding("out_of_order", topic, sentence, value=largest, unit="s"))
     if again:
@@ -120,7 +120,7 @@ def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> li
 def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
     """Steady offsets between the recorder's, the publishers' and the messages' own clocks."""
     findings = []
-    for ahead, behind, one, other in CLOCKS:
+    for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}
         for topic, frame in frames.items():
             median, low, high = spread(frame, ahead, behind)
@@ -149,14 +149,14 @@ def quantiles(difference: pl.Series) -> tuple[float | None, float, float]:
     if difference.is_empty():
         return None, 0.0, 0.0
     low, median, high = (
-        float(difference.quantile(q, "nearest") or 0) / SECOND for q in (0.05, 0.5, 0.95)
+        float(difference.quantile(q, "nearest") or 0) / SECOND_NS for q in (0.05, 0.5, 0.95)
     )
     return median, low, high
 
 
 def seconds(time: int | None, first: int | None) -> float | None:
     """Seconds from the first message."""
-    return None if time is None or first is None else (time - int(first)) / SECOND
+    return None if time is None or first is None else (time - int(first)) / SECOND_NS
 
 
 def _pooled(

@@ -7,13 +7,19 @@ from collections.abc import Mapping
 
 import polars as pl
 
-NANOS = 1_000_000_000
-STAMPS = (
+from shiplog.units import SECOND_NS
+
+STAMP_FIELDS = (
     "timestamp", "stamp", "header.stamp", "header.timestamp",
     "transforms[0].timestamp", "transforms[0].header.stamp",
 )  # fmt: skip
-PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
-EPOCHS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000), (1e8, NANOS))  # a number's unit, by its size
+STAMP_PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
+EPOCHS = (
+    (1e17, 1),
+    (1e14, 1_000),
+    (1e11, 1_000_000),
+    (1e8, SECOND_NS),
+)  # a number's unit, by its size
 
 Steps = tuple[str | int, ...]
 
@@ -101,8 +107,8 @@ def parsed(column: pl.Series) -> pl.Series:
 
 def stamp_leaves(layout: Mapping[str, pl.DataType]) -> tuple[str, ...]:
     """The paths a message's own measurement time is made of: (seconds, nanos), (one value,), ()."""
-    for base in STAMPS:
-        for pair in PARTS:
+    for base in STAMP_FIELDS:
+        for pair in STAMP_PARTS:
             if all((at := locate(f"{base}.{part}", layout)) and not is_text(*at, layout)
                    for part in pair):  # fmt: skip
                 return f"{base}.{pair[0]}", f"{base}.{pair[1]}"
@@ -126,7 +132,7 @@ def stamps(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series:
     if len(columns) == 2:
         seconds, nanos = (c.cast(pl.Int64, strict=False) for c in columns)
         beyond = seconds.abs() > 9_000_000_000  # would overflow; no clock says so
-        return (seconds.set(beyond, None) * NANOS + nanos).rename("stamp")
+        return (seconds.set(beyond, None) * SECOND_NS + nanos).rename("stamp")
     return _single(columns[0]) if columns[0].dtype != pl.Null else nothing
 
 

@@ -11,7 +11,7 @@ CONTRACT = 1
 class Finding:
     """One thing that is not as it should be. Times are seconds from the voyage's first row."""
 
-    kind: str  # one of KINDS
+    kind: str  # one of FINDING_KINDS
     channel: str  # a canonical channel, an actuator, a topic, or "log"
     sentence: str
     start_s: float | None = None
@@ -22,7 +22,7 @@ class Finding:
     unit: str = ""
 
 
-KINDS = (
+FINDING_KINDS = (
     "gap",
     "held",
     "spike",

@@ -14,7 +14,7 @@ from .messages import Messages, leaves_of
 
 F = FieldDescriptor
 DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read
-KINDS: dict[int, pl.DataType] = {
+SCALAR_TYPES: dict[int, pl.DataType] = {
     F.TYPE_DOUBLE: pl.Float64(), F.TYPE_FLOAT: pl.Float64(), F.TYPE_BOOL: pl.Boolean(),
     F.TYPE_INT32: pl.Int32(), F.TYPE_SINT32: pl.Int32(), F.TYPE_SFIXED32: pl.Int32(),
     F.TYPE_INT64: pl.Int64(), F.TYPE_SINT64: pl.Int64(), F.TYPE_SFIXED64: pl.Int64(),
@@ -43,7 +43,7 @@ def _struct(kind: Descriptor, inside: tuple[str, ...]) -> pl.Struct:
 
 def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | None:
     """The type of a field; None for what holds nothing, or would contain itself."""
-    single = KINDS.get(field.type)
+    single = SCALAR_TYPES.get(field.type)
     if single is None:
         kind = field.message_type
         if field.type == F.TYPE_GROUP or kind is None or kind.full_name in inside:

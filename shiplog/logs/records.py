@@ -23,7 +23,7 @@ HEAD = struct.Struct("<BQ")  # opcode and length of every record
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 LARGEST_MESSAGE = 32 << 20  # bytes: four times an uncompressed HD image; what is larger is left out
 Place = tuple[int, int, int]  # opcode, where the body begins, and where it ends if it is there
-KINDS: dict[int, type] = {
+RECORD_TYPES: dict[int, type] = {
     Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
 }  # fmt: skip
 
@@ -67,7 +67,7 @@ def record(opcode: int, body: bytes | memoryview, whole: bool = True) -> McapRec
         channel, sequence, logged, published = MESSAGE.unpack_from(body)
         payload = bytes(body[MESSAGE.size :]) if whole else TooLarge()
         return Message(channel, logged, payload, published, sequence)
-    kind = KINDS.get(opcode)
+    kind = RECORD_TYPES.get(opcode)
     return parsed(kind, bytes(body)) if kind and whole else None
 
 
@@ -75,7 +75,7 @@ def exact(opcode: int, body: bytes) -> bool:
     """Whether bytes are a schema or a channel from the first to the last, and nothing else."""
     stream = _Body(BytesIO(body))
     try:
-        made = KINDS[opcode].read(stream)
+        made = RECORD_TYPES[opcode].read(stream)
     except Exception:
         return False
     return stream.count == len(body) and bool(getattr(made, "topic", None) or made.id)
@@ -94,14 +94,14 @@ def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[memoryview, list
 
     Raises ValueError where the bytes are no records.
     """
-    kept, skip, seen = b"", 0, 0
+    kept, skip, taken = b"", 0, 0
     for piece in pieces:
-        seen += len(piece)
+        taken += len(piece)
         if skip >= len(piece):
             skip -= len(piece)
             continue
         data = memoryview(kept + piece[skip:] if kept or skip else piece)
-        skip, at, end, rest = 0, 0, len(data), size - seen
+        skip, at, end, rest = 0, 0, len(data), size - taken
         places: list[Place] = []
         while at + HEAD.size <= end:
             opcode, length = HEAD.unpack_from(data, at)

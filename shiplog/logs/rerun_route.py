@@ -35,7 +35,7 @@ LEAST_MESSAGES = (
     20_000  # wanted messages: the process takes as long to start as 35 000 take to decode here,
 )
 LEAST_WARM = 2_000  # which the next log gets back; once it runs, a request costs 15 ms and no more
-PATIENCE = 30.0  # s, of which it needs 1 to start, more on a busy machine
+START_TIMEOUT_S = 30.0  # s, of which it needs 1 to start, more on a busy machine
 PACE = 20_000  # messages/s that must at least come back; 600 000 do
 MAP = {"key", "value"}
 ENCODINGS = {("protobuf", "protobuf"), ("cdr", "ros2msg")}
@@ -77,7 +77,7 @@ def read_most(tables: Tables, tally: Tally) -> set[str]:
             asked[topic], expected[topic] = leaves, tally.counts[number]
     done: set[str] = set()
     with files.temporary_folder() as folder:
-        seconds = PATIENCE + sum(expected.values()) / PACE
+        seconds = START_TIMEOUT_S + sum(expected.values()) / PACE
         request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
         rows = worker().ask(request | {"seconds": seconds}, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):

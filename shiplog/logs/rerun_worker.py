@@ -22,7 +22,7 @@ import pyarrow.compute as pc
 from rerun.chunk import McapReader
 
 DECODERS = ["protobuf", "ros2_reflection"]  # the lossless ones: the others reshape what they know
-TIMES = ("log_time", "publish_time")
+RECORDER_TIMES = ("log_time", "publish_time")
 
 
 def entity(topic: str) -> str:
@@ -64,7 +64,7 @@ def columns(batch: pa.RecordBatch, fields: Sequence[str]) -> pa.RecordBatch | No
     messages = batch.column(found[0]).flatten()
     if len(messages) != batch.num_rows or messages.null_count:
         return None
-    made = {f":{name}": batch.column(f"message_{name}").cast(pa.int64()) for name in TIMES}
+    made = {f":{name}": batch.column(f"message_{name}").cast(pa.int64()) for name in RECORDER_TIMES}
     for field in fields:
         made[field] = pc.struct_field(messages, field.split("."))  # type: ignore[attr-defined]
     return pa.RecordBatch.from_pydict(made)

@@ -12,7 +12,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from .messages import Messages
 
-KINDS: dict[str, pl.DataType] = {
+SCALAR_TYPES: dict[str, pl.DataType] = {
     "bool": pl.Boolean(), "byte": pl.UInt8(), "char": pl.UInt8(),  # `char` is unsigned in ROS 2
     "int8": pl.Int8(), "uint8": pl.UInt8(), "int16": pl.Int16(), "uint16": pl.UInt16(),
     "int32": pl.Int32(), "uint32": pl.UInt32(), "int64": pl.Int64(), "uint64": pl.UInt64(),
@@ -53,7 +53,7 @@ class _Kinds:
         for field in self._fields[kind]:
             one = field.type
             if one.is_primitive_type():
-                single = KINDS[one.type]
+                single = SCALAR_TYPES[one.type]
             else:
                 single = self.struct(f"{one.pkg_name}/{one.type}", f"{prefix}{field.name}.")
                 if not single.fields:

@@ -19,8 +19,8 @@ from .messages import Decoder
 from .records import TooLarge
 from .tables import Tables, Tally
 
-BATCH = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap
-OVERHEAD = 64  # bytes that a message takes beside its payload: empty ones are not for nothing
+BATCH_BYTES = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap
+OVERHEAD = 64  # bytes that a message takes without its payload: empty ones are not for nothing
 LARGE_TEXT = 4096  # bytes on average: an image or a video in base64, left out unless asked for
 
 
@@ -40,7 +40,7 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
         for message in chunk:
             batch.setdefault(message.channel_id, []).append(message)
             held += len(message.data) + OVERHEAD
-        if held >= BATCH:
+        if held >= BATCH_BYTES:
             _take(tables, topics, batch, tally)
             batch, held = {}, 0
     _take(tables, topics, batch, tally)

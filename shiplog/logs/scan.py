@@ -273,8 +273,8 @@ class _Walk:
 
     def _open(self, position: int, length: int) -> Sound | Loss:
         """The chunk whose body of this length follows the head at `position`, checked."""
-        start = read_at(
-            self.stream, position + HEAD.size, chunks.LEAST + chunks.LONGEST_NAME)  # fmt: skip
+        most = chunks.FIXED_BYTES + chunks.LONGEST_NAME
+        start = read_at(self.stream, position + HEAD.size, most)
         if chunks.stated(start[: max(length, 0)], length) is None:
             return Loss("crc", position, "states a size that cannot be", chunk=True)
         packed = chunks.chunk(self._body(position, length))
@@ -288,7 +288,7 @@ class _Walk:
             opened = chunks.opened(packed)
         except ValueError as error:
             return lost(position, str(error), packed)
-        begin = chunks.LEAST + len(packed.compression.encode())
+        begin = chunks.FIXED_BYTES + len(packed.compression.encode())
         end = position + HEAD.size + begin + len(packed.data)
         return Sound(position, self._number(), opened, end)
 
@@ -341,9 +341,9 @@ class _Walk:
     def _checked(self, position: int) -> bool:
         """Whether a chunk stands here whose CRC is right, and is one."""
         _, length, fault = head(self.stream, position, self.found.size)
-        if fault is not None or length <= chunks.LEAST:
+        if fault is not None or length <= chunks.FIXED_BYTES:
             return False
-        self.work -= chunks.LEAST
+        self.work -= chunks.FIXED_BYTES
         sound = self._open(position, length)
         return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
 

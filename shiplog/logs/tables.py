@@ -15,13 +15,13 @@ from .decoders import decoder
 from .fields import is_text, locate, parsed, stamp_leaves, stamps, value
 from .messages import Decoder, Undecodable
 
-# Rows go with the file's size, not with what is said in it: three million empty messages fit into
+# Rows go with the file's size, not with its messages: three million empty messages fit into
 # 13 kB. Messages of instruments take 5 bytes and more, however well they are packed.
 LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
 
 log = logging.getLogger(__name__)
 
-TIMES = ("log_time", "publish_time", "stamp")
+TIME_COLUMNS = ("log_time", "publish_time", "stamp")
 
 
 @dataclass(slots=True)
@@ -132,15 +132,17 @@ class Tables:
             return
         nothing = pl.Series("stamp", [None] * len(logged), pl.Int64)
         stamp = stamps(frame, stamp_leaves(frame.schema)) if frame.width else nothing
-        columns = [s.rename(n) for n, s in zip(TIMES, (logged, published, stamp), strict=True)]
+        columns = [
+            s.rename(n) for n, s in zip(TIME_COLUMNS, (logged, published, stamp), strict=True)
+        ]
         if self.wanted is None:
-            columns += [s for s in frame.get_columns() if s.name not in TIMES]
+            columns += [s for s in frame.get_columns() if s.name not in TIME_COLUMNS]
             table.parts.append(pl.DataFrame(columns))
             return
         expressions = []
         for path in self.wanted[topic]:
             at = locate(path, frame.schema)
-            if at is not None and path not in TIMES:
+            if at is not None and path not in TIME_COLUMNS:
                 expressions.append(value(*at, frame.schema[at[0]]).alias(path))
                 if is_text(*at, frame.schema):
                     table.texts.add(path)

@@ -27,10 +27,10 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog import files
 from shiplog.exceptions import ShiplogError, listed, nearest
+from shiplog.units import SECOND_NS
 
-CONTRACT = "1"
+LOG_CONTRACT = "1"
 CHUNK_BYTES = 1024 * 1024  # bytes before compression
-SECOND = 1_000_000_000
 
 LOCATION_FIX = "foxglove.LocationFix"
 COVARIANCE = "position_covariance"
@@ -91,7 +91,7 @@ def write_log(
     """
     path = Path(path)
     _refuse_twins(series)
-    voyage = {"ship": ship, "contract": CONTRACT}
+    voyage = {"ship": ship, "contract": LOG_CONTRACT}
     if datum is not None:
         voyage["datum"] = f"{float(datum[0])!r},{float(datum[1])!r}"
     for key, value in (notes or {}).items():
@@ -103,6 +103,15 @@ def write_log(
         ), series, voyage)  # fmt: skip
         stream.flush()
         os.fsync(stream.fileno())
+
+
+def refuse_existing(path: Path) -> None:
+    """Raises ShiplogError for a log that is there already, which may be the only one of its
+    kind."""
+    if path.exists():
+        raise ShiplogError(
+            f"{path} exists already.", hint="choose another --out, or remove that log."
+        )
 
 
 def _refuse_twins(series: Sequence[Series]) -> None:
@@ -328,7 +337,7 @@ def _double(number: int, values: np.ndarray) -> _Field:
 
 def _timestamp(number: int, time: np.ndarray) -> _Field:
     """google.protobuf.Timestamp; present even when empty, at the epoch itself."""
-    seconds, nanos = np.divmod(time, SECOND)
+    seconds, nanos = np.divmod(time, SECOND_NS)
     inner = _Field(len(time)).constant(_tag(1, _ENUM)).varint(seconds).only(seconds > 0)
     second = _Field(len(time)).constant(_tag(2, _ENUM)).varint(nanos).only(nanos > 0)
     inner.append(second.bytes, second.keep)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shiplog.frames import in_earth_axes
+
 # A model, called: (state [N, 6], actuator [N, A], wind [N, 0|2]) -> ẋ = f(x, u, ω) of Eq. 2 [N, 6]
 Dynamics = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
@@ -16,12 +18,12 @@ def kinematics(state: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     Order as channels.STATE: (ẋ₀, u̇, ẏ₀, v̇_m, ψ̇, ṙ).
     """
     surge, sway, heading, yaw_rate = (state[..., i] for i in (1, 3, 4, 5))
-    c, s = np.cos(heading), np.sin(heading)
+    north, east = in_earth_axes(surge, sway, np.cos(heading), np.sin(heading))
     return np.stack(
         (
-            c * surge - s * sway,
+            north,
             acceleration[..., 0],
-            s * surge + c * sway,
+            east,
             acceleration[..., 1],
             yaw_rate,
             acceleration[..., 2],

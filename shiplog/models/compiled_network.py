@@ -19,7 +19,7 @@ from shiplog.models.feedforward import FeedForward
 from shiplog.models.mmg.wind import apparent
 
 FEATURES = 300
-WIDE = 2.0  # no voyage covers all combinations of many inputs: as wide as data of few serve best
+KERNEL_WIDTH = 2.0  # no voyage covers all combinations of many inputs: data of few serve best so
 
 
 @partial(
@@ -123,13 +123,14 @@ def compiled(model: FeedForward, seed: int = 0) -> Network:
     shape, scale = model.shape, model.scaling
     rng = np.random.default_rng([seed, 77])
     inputs = shape.inputs
+    width = KERNEL_WIDTH * math.sqrt(0.5 * inputs)
     return Network(
         weights=tuple(w.detach().numpy() for w in model.weights),
         mean=scale.input_mean.double().numpy(),
         std=scale.input_std.double().numpy(),
         out_mean=scale.output_mean.double().numpy(),
         out_std=scale.output_std.double().numpy(),
-        frequency=rng.standard_normal((inputs, FEATURES)) / (WIDE * math.sqrt(0.5 * inputs)),
+        frequency=rng.standard_normal((inputs, FEATURES)) / width,
         phase=rng.uniform(0.0, 2.0 * math.pi, FEATURES),
         wind=shape.wind,
         components=shape.wind_input == "components",

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog.frames import in_body_axes
 from shiplog.models.causes.base import Cause
 from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG, named, total
@@ -91,7 +92,7 @@ class Extended:
             if water is not None:
                 north, east = north + water[0], east + water[1]
         cos, sin = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
-        ahead, starboard = cos * north + sin * east, cos * east - sin * north
+        ahead, starboard = in_body_axes(north, east, cos, sin)
         x0, u, y0, v, heading, r = (state[..., i] for i in range(6))
         wet = jnp.stack((x0, u - ahead, y0, v - starboard, heading, r), -1)
         wind = true_wind + jnp.stack((north, east), -1)

@@ -16,7 +16,7 @@ TRACKS = {
     "model": pl.String, "voyage": pl.String, "window": pl.Int64, "time": pl.Float64,
     **{channel.name: pl.Float64 for channel in STATE},
 }  # fmt: skip
-ERRORS = {
+ERROR_COLUMNS = {
     "voyage": pl.String, "window": pl.Int64, "time": pl.Float64, "seconds": pl.Float64,
     BEFORE: pl.Float64, AFTER: pl.Float64,
 }  # fmt: skip

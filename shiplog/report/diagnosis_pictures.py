@@ -21,7 +21,7 @@ from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import listed
 from shiplog.report import page, viewer
 from shiplog.report.answer import DiagnosedTrial
-from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.report.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
 
@@ -144,7 +144,7 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
     """Tracks and errors of every window; after, by numbers that were fitted without its voyage."""
     held, decision = done.held, done.decision
     if held is None or decision is None:
-        return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERRORS)
+        return pl.DataFrame(schema=TRACKS), pl.DataFrame(schema=ERROR_COLUMNS)
     cut = held.cut
     states = {BEFORE: held.states_before}
     if done.after is not None:
@@ -160,7 +160,7 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
     if AFTER not in states:
         errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
     tracks = [_tracks(name, simulated, numbered, cut) for name, simulated in states.items()]
-    return pl.concat(tracks), errors.select(ERRORS.keys())
+    return pl.concat(tracks), errors.select(ERROR_COLUMNS.keys())
 
 
 def _tracks(model: str, states: np.ndarray, numbered: pl.DataFrame, cut: Windows) -> pl.DataFrame:

@@ -95,7 +95,7 @@ def judge(
 ) -> Judgement:  # fmt: skip
     """Of errors with one row a window and seed.
 
-    errors      seed, voyage, window and `evaluate.ERRORS`, windows in the baselines' order
+    errors      seed, voyage, window and `scoring.ERRORS`, windows in the baselines' order
     baselines   name → L of every window [N]
     length      of the ship [m]
     """

@@ -121,7 +121,7 @@ def estimated(profile: Profile) -> list[str]:
 def summary(errors: pl.DataFrame) -> dict:
     """The figures of one model: L per seed and their mean, RMSE, end errors.
 
-    errors: one row per window and seed, with seed, voyage, window and `evaluate.ERRORS`. RMSE is
+    errors: one row per window and seed, with seed, voyage, window and `scoring.ERRORS`. RMSE is
     over all windows of a seed, then the mean over seeds; end errors are means over both.
     """
     per_seed = (

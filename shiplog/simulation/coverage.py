@@ -1,7 +1,7 @@
 """Where the training data never went: the paper's histograms (Figs. 3 and 4) made into numbers.
 
 A network interpolates. For each test window this says which share of its seconds lies inside the
-data it learned from, and on which channel it leaves them, so that "it fails here because it never
+data it was trained on, and on which channel it leaves them, so that "it fails here because it never
 saw this wind" can be read off a table.
 """
 

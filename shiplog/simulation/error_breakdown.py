@@ -14,17 +14,17 @@ import polars as pl
 from shiplog import channels
 from shiplog.profile import Profile
 from shiplog.simulation.scoring import loss_shares
-from shiplog.simulation.sensitivities import VELOCITY, WindowSeries, apparent_wind
+from shiplog.simulation.sensitivities import VELOCITY_COLUMNS, WindowSeries, apparent_wind
 from shiplog.voyages.windows import seconds_since
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
 MINUTE = 60.0  # s
 RARE_SHARE = 0.03  # of the time: what is rarer is an incident, not a regime
 STANDS_OUT = 0.05  # nats of `_score`: 20 % of the error in 15 % of the time
-FINER = 1.2  # how much more a second or third condition must say
+CONDITION_GAIN = 1.2  # how much more a second or third condition must say
 CONDITIONS = 3
 RECENT = 2.0  # s, over which a change of the controls counts as moving
-SIDES = ("ahead", "starboard", "astern", "port")
+WIND_SIDES = ("ahead", "starboard", "astern", "port")
 COMPASS = ("north", "east", "south", "west")
 THIRDS = ("first", "middle", "last")
 WIDTHS = (0.5, 1.0, 2.0, 5.0)  # m/s, of a bin of wind speed
@@ -103,7 +103,7 @@ def timeline(error: np.ndarray, data: WindowSeries, windows: pl.DataFrame) -> pl
     }
     with np.errstate(over="ignore", invalid="ignore"):
         loss = loss_shares(error, data.dt).sum(-1).ravel()
-    each = dict(zip(CHANNELS, error[..., VELOCITY].reshape(-1, 3).T, strict=True))
+    each = dict(zip(CHANNELS, error[..., VELOCITY_COLUMNS].reshape(-1, 3).T, strict=True))
     return pl.DataFrame(columns | each | {"loss": loss})
 
 
@@ -140,7 +140,7 @@ def _where(cost: np.ndarray, steps: np.ndarray, regimes: list[Regime]) -> tuple[
     """In words, and what share of the error [N, I] lies in what share of the time."""
     chosen: list[tuple[str, str]] = []
     inside = np.ones(cost.shape, dtype=bool)
-    best = STANDS_OUT / FINER
+    best = STANDS_OUT / CONDITION_GAIN
     for _ in range(CONDITIONS):
         kinds = {kind for kind, _ in chosen}
         rated = [
@@ -149,7 +149,7 @@ def _where(cost: np.ndarray, steps: np.ndarray, regimes: list[Regime]) -> tuple[
             if kind not in kinds
         ]
         score, kind, words, mask = max(rated, key=lambda r: r[0])
-        if score < FINER * best:
+        if score < CONDITION_GAIN * best:
             break
         best, inside = score, inside & mask
         chosen.append((kind, words))
@@ -233,7 +233,7 @@ def _wind(data: WindowSeries) -> Iterator[Regime]:
     """The apparent wind, which the force comes from."""
     apparent = apparent_wind(data.measured, data.wind)
     speed, side = apparent[..., 0], _quarter(apparent[..., 1])
-    for i, name in enumerate(SIDES):
+    for i, name in enumerate(WIND_SIDES):
         yield "wind side", f"wind from {name}", side == i
     strong = float(np.quantile(speed, 0.95))
     width = next((w for w in WIDTHS if strong / w <= 6.0), WIDTHS[-1])

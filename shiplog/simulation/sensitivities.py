@@ -17,11 +17,12 @@ import numpy as np
 from jax import Array
 
 from shiplog.channels import VELOCITY_IN_STATE, VELOCITY_WEIGHTS
+from shiplog.frames import in_body_axes, in_earth_axes
 from shiplog.jit_cache import traced
 from shiplog.simulation.scoring import trapezoid, window_loss
 from shiplog.voyages.windows import Windows
 
-VELOCITY = np.array(VELOCITY_IN_STATE)
+VELOCITY_COLUMNS = np.array(VELOCITY_IN_STATE)
 WINDOWS_AT_A_TIME = 128  # their sensitivities to 60 parameters are 45 MB
 
 
@@ -97,14 +98,14 @@ def true_wind(state: np.ndarray, wind: np.ndarray) -> np.ndarray:
     ahead = wind[..., 0] * np.cos(wind[..., 1]) - state[..., 1]
     starboard = wind[..., 0] * np.sin(wind[..., 1]) - state[..., 3]
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
-    return np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+    return np.stack(in_earth_axes(ahead, starboard, c, s), -1)
 
 
 def apparent_wind(state: np.ndarray, true: np.ndarray) -> np.ndarray:
     """The inverse of `true_wind`: speed and angle in (-π, π] [..., 2]."""
     c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
-    ahead = c * true[..., 0] + s * true[..., 1] + state[..., 1]
-    starboard = c * true[..., 1] - s * true[..., 0] + state[..., 3]
+    ahead, starboard = in_body_axes(true[..., 0], true[..., 1], c, s)
+    ahead, starboard = ahead + state[..., 1], starboard + state[..., 3]
     return np.stack((np.hypot(ahead, starboard), np.arctan2(starboard, ahead)), -1)
 
 
@@ -112,12 +113,12 @@ def rate(model: Physical, theta: Array, state: Array, actuator: Array, wind: Arr
     """ẋ [..., 6] of Eq. 2."""
     acceleration = model.acceleration(theta, state, actuator, wind)
     c, s = jnp.cos(state[..., 4]), jnp.sin(state[..., 4])
-    u, v = state[..., 1], state[..., 3]
+    north, east = in_earth_axes(state[..., 1], state[..., 3], c, s)
     return jnp.stack(
         (
-            c * u - s * v,
+            north,
             acceleration[..., 0],
-            s * u + c * v,
+            east,
             acceleration[..., 1],
             state[..., 5],
             acceleration[..., 2],
@@ -202,14 +203,15 @@ def _linearised(model, theta, start, actuator, wind, dt, *, free=None):
     def step(sensitivity, along):
         state, a, b, length = along
         c, s = jnp.cos(state[:, 4, None]), jnp.sin(state[:, 4, None])
-        u, v = state[:, 1, None], state[:, 3, None]
+        north, east = in_earth_axes(state[:, 1, None], state[:, 3, None], c, s)
         du, dv, dpsi, dr = (sensitivity[:, i] for i in (1, 3, 4, 5))
+        of_north, of_east = in_earth_axes(du, dv, c, s)
         motion = a @ sensitivity + b
         change = jnp.stack(
             (
-                c * du - s * dv - (s * u + c * v) * dpsi,
+                of_north - east * dpsi,
                 motion[:, 0],
-                s * du + c * dv + (c * u - s * v) * dpsi,
+                of_east + north * dpsi,
                 motion[:, 1],
                 dr,
                 motion[:, 2],
@@ -247,8 +249,8 @@ def linearised(
 def _normal(model, theta, measured, actuator, wind, dt, steps, weight, *, free=None):
     states, slopes = _linearised(model, theta, measured[:, 0], actuator, wind, dt, free=free)
     scale = jnp.sqrt(steps)[..., None] * jnp.array(VELOCITY_WEIGHTS)
-    error = (states[..., VELOCITY] - measured[..., VELOCITY]) * scale
-    slope = slopes[:, :, VELOCITY] * scale[..., None]
+    error = (states[..., VELOCITY_COLUMNS] - measured[..., VELOCITY_COLUMNS]) * scale
+    slope = slopes[:, :, VELOCITY_COLUMNS] * scale[..., None]
     pull = jnp.einsum("nki,nkip->np", error, slope)
     loss = (error**2).sum((1, 2))
     # A window of weight 0 may have diverged, and 0 · inf is not 0.

@@ -1,6 +1,6 @@
 """Causes that a diagnosis put into a run, as its folder keeps them.
 
-<run>/extension.json  extension.safetensors   the causes, their numbers, the base's beside them
+<run>/extension.json  extension.safetensors   the causes, their numbers, and the base's
 <run>/extension-<k>.py    where some are a user's own: their code, to be read. It is never run
                           from here: a run may be anybody's
 """

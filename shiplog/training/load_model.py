@@ -139,7 +139,7 @@ class Run(RunFolder, ABC):
 
 @dataclass(frozen=True)
 class NetworkRun(Run):
-    """A network has no coefficients. The ship's MMG is asked about causes in its stead, and they
+    """A network has no coefficients. Causes are tested on the ship's MMG in its stead, and
     are added to it."""
 
     @property
@@ -208,7 +208,7 @@ class NetworkRun(Run):
 
 @dataclass(frozen=True)
 class PhysicalRun(Run):
-    """A model of named coefficients, which are asked about causes themselves."""
+    """A model of named coefficients, on which causes are tested directly."""
 
     @property
     def lacks(self) -> str:

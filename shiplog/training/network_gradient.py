@@ -18,7 +18,7 @@ from shiplog.models.feedforward import Scaling, Shape, driven_by
 from shiplog.training import kernel
 from shiplog.voyages.windows import Windows
 
-FIRST, SECOND, LEAST = 0.9, 0.999, 1e-8  # β₁, β₂ and ε of Adam, its authors' and torch's
+BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # β₁, β₂ and ε of Adam, its authors' and torch's
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def adam(
         return
     for w, mean, square, g in zip(weights, means, squares, gradients, strict=True):
         g = g.add(w, alpha=decay)
-        mean.lerp_(g, 1.0 - FIRST)
-        square.mul_(SECOND).addcmul_(g, g, value=1.0 - SECOND)
-        root = (square / (1.0 - SECOND**step)).sqrt_().add_(LEAST)
-        w.addcdiv_(mean, root, value=-rate / (1.0 - FIRST**step))
+        mean.lerp_(g, 1.0 - BETA_1)
+        square.mul_(BETA_2).addcmul_(g, g, value=1.0 - BETA_2)
+        root = (square / (1.0 - BETA_2**step)).sqrt_().add_(EPSILON)
+        w.addcdiv_(mean, root, value=-rate / (1.0 - BETA_1**step))

@@ -15,7 +15,7 @@ from shiplog.voyages.split_settings import Split
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class TrainOptions:
-    """What is asked of a training. An option that is left as it is says nothing.
+    """The settings of a training. An option that keeps its default is not reported as given.
 
     model        which dynamic model, a name in MODELS
     data         the paper's window set: ref, sli2, ..., d-ref

@@ -18,9 +18,9 @@ from shiplog.exceptions import ModelError, listed
 from shiplog.simulation.sensitivities import Physical, WindowSeries, losses, normal
 
 CORRELATION = 30.0  # s over which rollout errors are one observation, not many
-TINY = 1e-12  # noise of data that a model fits exactly
+LEAST_VARIANCE = 1e-12  # noise of data that a model fits exactly
 REWEIGHTINGS = 3  # of weighing the ridge by the noise that the fit before it left
-TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit rests
+TOLERANCE = 1e-4  # relative fall of the sum of squares at which a fit has converged
 MOST_EVALUATIONS = 60
 
 
@@ -116,7 +116,7 @@ def identify(
 def _noise(loss: np.ndarray, data: WindowSeries) -> float:
     """Weighted variance of one independent observation of the error, of L of each window [N]."""
     samples = 3.0 * float((data.weight * data.dt.sum(1)).sum())
-    return max(CORRELATION * float(data.weight @ loss) / samples, TINY)
+    return max(CORRELATION * float(data.weight @ loss) / samples, LEAST_VARIANCE)
 
 
 def _from_short_windows(

@@ -21,7 +21,7 @@ from typing import Any
 from shiplog.exceptions import ShiplogError
 from shiplog.unexpected import unexpected
 
-SILENT_S = 0.5  # between two reports of a worker
+REPORT_INTERVAL_S = 0.5  # between two reports of a worker
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Report = Callable[[float], None]
@@ -151,7 +151,7 @@ def _serve(pipe: Connection) -> None:
 
         def report(share: float, latest: list[float] = latest) -> None:
             now = time.monotonic()
-            if now - latest[0] > SILENT_S:
+            if now - latest[0] > REPORT_INTERVAL_S:
                 latest[0] = now
                 pipe.send(("share", share))
 

@@ -71,7 +71,7 @@ class RunFolder:
         return not self.config.physics.fit
 
     @property
-    def made_on(self) -> tuple[str, ...]:
+    def trained_on(self) -> tuple[str, ...]:
         """The voyages it was fitted to, or stopped by."""
         return (*self.config.split.training, *self.config.split.validation)
 

@@ -23,7 +23,7 @@ from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
-CLOCKS = {  # of a source: its column, and the one that it is held against
+CLOCK_COLUMNS = {  # of a source: its column, and the one that it is held against
     "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
     "publish": ("publish_time", "log_time"),
 }  # fmt: skip
@@ -171,8 +171,8 @@ def _require(reading: Reading, profile: Profile) -> None:
 def _clock(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
     """The column that says when a source measured, and the one to hold it against."""
     if source.clock == "message" and frame["stamp"].null_count() == frame.height:
-        return CLOCKS["log"]  # the message carries no time: the recorder's is all there is
-    return CLOCKS[source.clock]
+        return CLOCK_COLUMNS["log"]  # the message carries no time: the recorder's is all there is
+    return CLOCK_COLUMNS[source.clock]
 
 
 def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:

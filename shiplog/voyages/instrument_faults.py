@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shiplog.frames import in_body_axes, in_earth_axes
 from shiplog.voyages.recording import Record
 
 
@@ -18,8 +19,7 @@ def without_heading_offset(record: Record, angle: float, turned: bool = False) -
     readings = record.sighted.turned(-angle)
     if turned:
         c, s = np.cos(angle), np.sin(angle)
-        ahead, starboard = readings.velocity[:, 0], readings.velocity[:, 1]
-        was = np.stack((c * ahead - s * starboard, s * ahead + c * starboard), -1)
+        was = np.stack(in_earth_axes(readings.velocity[:, 0], readings.velocity[:, 1], c, s), -1)
         readings = replace(readings, velocity=was)
     return record.measured_as(readings)
 
@@ -65,8 +65,7 @@ def without_antenna_offset(record: Record, ahead: float, starboard: float) -> Re
 def without_wind_direction_offset(record: Record, angle: float) -> Record:
     """A vane whose zero is `angle` [rad] off the bow."""
     c, s = np.cos(angle), np.sin(angle)
-    ahead, starboard = record.wind[:, 0], record.wind[:, 1]
-    turned = np.stack((c * ahead + s * starboard, c * starboard - s * ahead), -1)
+    turned = np.stack(in_body_axes(record.wind[:, 0], record.wind[:, 1], c, s), -1)
     return replace(record, wind=turned)
 
 

@@ -63,7 +63,7 @@ class Record:
     wind: np.ndarray
     step: float = STEP_S
     timescale: Timescale = THREE_METRES
-    _ends: _Ends | None = field(default=None, repr=False)  # of `starts`, once they were asked for
+    _ends: _Ends | None = field(default=None, repr=False)  # of `starts`, computed at first use
 
     def __len__(self) -> int:
         return len(self.time)
@@ -130,9 +130,9 @@ class Record:
         """What the instruments measured."""
         return instruments.sighted(self.state, self.axes, self.profile.sensors)
 
-    def measured_as(self, seen: Sighted, moved: tuple[float, float] = (0.0, 0.0)) -> Record:
+    def measured_as(self, readings: Sighted, moved: tuple[float, float] = (0.0, 0.0)) -> Record:
         """The record of these sights. `moved`: the antenna, from where the profile has it [m]."""
-        state = instruments.at_midship(seen, self.profile.sensors, moved)
+        state = instruments.at_midship(readings, self.profile.sensors, moved)
         return replace(self, state=state)
 
     def pick(self, voyages: Sequence[str]) -> Record:

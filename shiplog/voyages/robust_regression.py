@@ -26,7 +26,7 @@ SPARE_BLOCKS = 2  # at least, beyond one for each parameter: their scatter is to
 HUBER = 2.0  # standard deviations
 TURNS, TURNS_ROUGH = 24, 20
 RENEWED = (2, 5, 9)  # turns at which the rough fit looks at the memory of its residual
-SMOOTH = (0.36, 0.24, 0.08)  # weights of a bin and its neighbours on either side
+BIN_WEIGHTS = (0.36, 0.24, 0.08)  # weights of a bin and its neighbours on either side
 LEAST_KNOWN = 0.15
 STRIDE = 0.5  # priors in one turn
 NINETY_QUANTILE = 0.95  # quantile of either end of a 90 % interval
@@ -303,9 +303,9 @@ def _long_run(scores: np.ndarray) -> np.ndarray:
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
-    """[B, c, k] over SMOOTH bins, alike to both sides: a slope with less of its own noise."""
-    out = SMOOTH[0] * values
-    for lag, share in enumerate(SMOOTH[1:], start=1):
+    """[B, c, k] over BIN_WEIGHTS bins, alike to both sides: a slope with less of its own noise."""
+    out = BIN_WEIGHTS[0] * values
+    for lag, share in enumerate(BIN_WEIGHTS[1:], start=1):
         out[lag:] += share * values[:-lag]
         out[:-lag] += share * values[lag:]
     return out

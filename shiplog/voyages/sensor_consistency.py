@@ -183,8 +183,7 @@ def _integral(rate: np.ndarray) -> np.ndarray:
 def _turned(heading: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """R(ψ) times body vectors [n, 2] or one [2]."""
     c, s = np.cos(heading), np.sin(heading)
-    ahead, aside = vector[..., 0], vector[..., 1]
-    return np.stack((c * ahead - s * aside, s * ahead + c * aside), axis=-1)
+    return np.stack(frames.in_earth_axes(vector[..., 0], vector[..., 1], c, s), axis=-1)
 
 
 def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
@@ -248,8 +247,8 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
             return travel - p[[DRIFT_X, DRIFT_Y]], logged(p[TAU_V], p[OFFSET])
 
         def model(p: np.ndarray) -> np.ndarray:
-            travel, said = sides(p)
-            return travel - said / (1.0 + p[SPEED_SCALE])
+            travel, logged_change = sides(p)
+            return travel - logged_change / (1.0 + p[SPEED_SCALE])
 
         def other_side(p: np.ndarray) -> dict[int, np.ndarray]:
             return {SPEED_SCALE: sides(p)[0] / (1.0 + p[SPEED_SCALE])}

@@ -23,9 +23,9 @@ from shiplog.voyages.ingest import Voyage
 from shiplog.voyages.recording import Record
 from shiplog.voyages.sensor_consistency import Estimate
 
-STATE = [c.name for c in channels.STATE]
-MEASURED = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE
-HEADING = 4
+STATE_NAMES = [c.name for c in channels.STATE]
+SENSOR_COLUMNS = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE_NAMES
+HEADING_COLUMN = 4
 DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # of a channel that the mark does not name
 
 Remedy = Callable[[Record, float], Record]
@@ -37,7 +37,7 @@ def _antenna(ahead: float, starboard: float) -> Remedy:
     def without(record: Record, size: float) -> Record:
         moved = faults.without_antenna_offset(record, size * ahead, size * starboard)
         state = record.state.copy()
-        state[:, MEASURED["position"]] = moved.state[:, MEASURED["position"]]
+        state[:, SENSOR_COLUMNS["position"]] = moved.state[:, SENSOR_COLUMNS["position"]]
         return replace(record, state=state)
 
     return without
@@ -90,10 +90,10 @@ def put_right(
     before = _state(table)
     state = np.full_like(before, np.nan)
     state[rows[rows >= 0]] = record.state[rows >= 0]
-    state[:, HEADING] = frames.wrap(state[:, HEADING])
+    state[:, HEADING_COLUMN] = frames.wrap(state[:, HEADING_COLUMN])
     good = (mark & int(channels.UNUSABLE)) == 0
     whole, gaps = good.copy(), []
-    for name, columns in MEASURED.items():  # a velocity needs its yaw rate: a row is reported once
+    for name, columns in SENSOR_COLUMNS.items():  # the yaw rate first: a row is reported once
         lost = whole & ~np.isfinite(state[:, columns]).all(axis=1)
         whole &= ~lost
         spans = [fault_detection.seconds(stretch) for stretch in fault_detection.stretches(lost)]
@@ -102,14 +102,14 @@ def put_right(
         )
     mark[good & ~whole] |= int(Quality.GAP)
     state = np.where(good[:, None], state, before)
-    put = [pl.Series(name, column) for name, column in zip(STATE, state.T, strict=True)]
+    put = [pl.Series(name, column) for name, column in zip(STATE_NAMES, state.T, strict=True)]
     table = table.with_columns(*put, pl.Series("quality", mark))
-    return table.with_columns(pl.col(STATE).fill_nan(None)), gaps
+    return table.with_columns(pl.col(STATE_NAMES).fill_nan(None)), gaps
 
 
 def _state(table: pl.DataFrame) -> np.ndarray:
     """[n, 6], NaN where there is no value."""
-    return table.select(pl.col(STATE).fill_null(np.nan)).to_numpy()
+    return table.select(pl.col(STATE_NAMES).fill_null(np.nan)).to_numpy()
 
 
 def _record(table: pl.DataFrame, profile: Profile) -> tuple[Record, np.ndarray]:

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
 HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
-SHORTER = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed instead
+SHORTER_WINDOWS = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed instead
 
 
 def choose_split(
@@ -167,7 +167,7 @@ def proposed(rows: pl.DataFrame, size: int) -> str:
     longest = rows.group_by("voyage", "segment").len().group_by("voyage").agg(pl.col("len").max())
     lengths = longest["len"].to_numpy()
     now = int((lengths >= size).sum())
-    shorter = [w for w in SHORTER if w < size and (lengths >= w).sum() > now]
+    shorter = [w for w in SHORTER_WINDOWS if w < size and (lengths >= w).sum() > now]
     if not shorter:
         return ""
     best = max(shorter, key=lambda w: (int((lengths >= w).sum()), w))

@@ -45,7 +45,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
 INGEST_VERSION = 4  # raised when the same log would become another table or report
-SILENT_S = 2.0  # how long one waits for another process without a word
+SILENT_WAIT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)
 
@@ -252,7 +252,7 @@ class Store:
         """
         lock = FileLock(self.path / ".lock")
         try:
-            lock.acquire(timeout=SILENT_S if wait else 0.0)
+            lock.acquire(timeout=SILENT_WAIT_S if wait else 0.0)
         except Timeout:
             if not wait:
                 raise

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shiplog import channels
+from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
@@ -116,8 +116,7 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     known = np.isfinite(grid.columns["heading"])
     heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
     c, s = np.cos(heading), np.sin(heading)
-    u, v = columns["surge"], columns["sway"]
-    over_ground = np.stack((c * u - s * v, s * u + c * v), 1)
+    over_ground = np.stack(frames.in_earth_axes(columns["surge"], columns["sway"], c, s), 1)
     position = np.stack((columns["x0"], columns["y0"]), 1)
 
     found = []

@@ -393,7 +393,7 @@ def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monke
     judge(["voyages", "--store", desk.store], 1, [f"/somewhere: {os.strerror(code)}"], capsys)
 
 
-def test_ctrl_c_is_said_and_has_its_code(desk, capsys, monkeypatch):
+def test_ctrl_c_is_reported_and_has_its_code(desk, capsys, monkeypatch):
     from shiplog.voyages import catalogue
 
     def interrupted(_store):

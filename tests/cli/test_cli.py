@@ -40,14 +40,14 @@ def store(logs, tmp_path_factory):
 @pytest.fixture(scope="module")
 def run(store):
     out = store.parent / "run"
-    code, said, _ = call("train", "--store", store, "--out", out, "--seeds", 2, *FAST)
-    assert code == 0 and "Split by" in said
+    code, reported, _ = call("train", "--store", store, "--out", out, "--seeds", 2, *FAST)
+    assert code == 0 and "Split by" in reported
     return out
 
 
 def test_ingest_answers_as_the_contract_says_and_is_idempotent(logs, store, tmp_path):
     answer = tmp_path / "a.json"
-    code, said, _ = call("ingest", logs, "--store", store, "--json", answer)
+    code, reported, _ = call("ingest", logs, "--store", store, "--json", answer)
     assert code == 0
     content = json.loads(answer.read_text())
     assert content["contract"] == 1
@@ -56,23 +56,23 @@ def test_ingest_answers_as_the_contract_says_and_is_idempotent(logs, store, tmp_
     assert set(voyage) > {"name", "messages", "rows", "seconds", "findings"}
     assert voyage["messages"]["lost"] == 0 and voyage["rows"] == pytest.approx(1500, abs=5)
     assert voyage["usable_s"] == pytest.approx(150, abs=1) and voyage["windows"] == 1
-    assert "trip_1" in said
+    assert "trip_1" in reported
 
 
 def test_voyages_lists_the_store(store):
-    code, said, _ = call("voyages", "--store", store)
+    code, reported, _ = call("voyages", "--store", store)
     assert code == 0
-    assert said.count("trip_") == 3 and "known ship" in said
+    assert reported.count("trip_") == 3 and "known ship" in reported
 
 
 def test_json_to_stdout_is_json_alone(store):
-    code, said, _ = call("voyages", "--store", store, "--json", "-")
-    assert code == 0 and len(json.loads(said)["voyages"]) == 3
+    code, reported, _ = call("voyages", "--store", store, "--json", "-")
+    assert code == 0 and len(json.loads(reported)["voyages"]) == 3
 
 
 def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     answer = tmp_path / "e.json"
-    code, said, _ = call("evaluate", run, "--store", store, "--json", answer)
+    code, reported, _ = call("evaluate", run, "--store", store, "--json", answer)
     assert code == 0
     content = json.loads(answer.read_text())
     assert set(content) == {"contract", "loss", "windows", "seeds", "rmse", "end_position_m",
@@ -83,7 +83,7 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     assert set(content["floors"]) == {"hold", "least_squares"}
     (voyage,) = content["voyages"].values()
     assert set(voyage) == {"loss", "windows", "coverage"}
-    assert "baseline: hold the velocity" in said
+    assert "baseline: hold the velocity" in reported
 
 
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
@@ -119,13 +119,13 @@ def test_compare_saves_a_recording_of_both_sides(run, store, tmp_path):
     path = tmp_path / "c.rrd"
     code, _, _ = call("compare", run, "--store", store, "--save", path)
     assert code == 0
-    said = str(RrdReader(str(path)).store().summary())
-    assert all(word in said for word in ("measured", "simulated", "hist", "error"))
+    reported = str(RrdReader(str(path)).store().summary())
+    assert all(word in reported for word in ("measured", "simulated", "hist", "error"))
 
 
 def test_a_finished_run_is_not_trained_over(run, store):
-    code, _, said = call("train", "--store", store, "--out", run, *FAST)
-    assert code == 1 and "exists already" in said
+    code, _, reported = call("train", "--store", store, "--out", run, *FAST)
+    assert code == 1 and "exists already" in reported
 
 
 @pytest.mark.parametrize(
@@ -141,8 +141,8 @@ def test_a_finished_run_is_not_trained_over(run, store):
     ],
 )  # fmt: skip
 def test_a_wrong_choice_names_the_right_ones(store, tmp_path, expected_code, arguments, expected):
-    code, _, said = call("train", "--store", store, "--out", tmp_path / "r", *arguments)
-    assert code == expected_code and expected in said
+    code, _, reported = call("train", "--store", store, "--out", tmp_path / "r", *arguments)
+    assert code == expected_code and expected in reported
     assert not list(tmp_path.iterdir())
 
 
@@ -154,18 +154,18 @@ def test_usage_errors_exit_with_2():
 @pytest.mark.parametrize("command", ["demo", "check", "ingest", "convert", "profile", "voyages",
                                      "train", "evaluate", "compare"])  # fmt: skip
 def test_every_command_has_help_with_an_example(command):
-    code, said, _ = call(command, "--help")
-    assert code == 0 and f"Example: shiplog {command}" in " ".join(said.split())
+    code, reported, _ = call(command, "--help")
+    assert code == 0 and f"Example: shiplog {command}" in " ".join(reported.split())
 
 
 def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"not an mcap file at all")
     store = tmp_path / "store"
-    code, _, said = call("ingest", bad, logs / "trip_1.mcap", "--store", store)
-    assert code == 3 and "bad.mcap" in said
+    code, _, reported = call("ingest", bad, logs / "trip_1.mcap", "--store", store)
+    assert code == 3 and "bad.mcap" in reported
     assert call("voyages", "--store", store)[1].count("trip_1") == 1
-    code, _, said = call("ingest", bad, "--store", tmp_path / "other")
+    code, _, reported = call("ingest", bad, "--store", tmp_path / "other")
     assert code == 1 and not (tmp_path / "other").exists()
 
 
@@ -181,11 +181,11 @@ def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path,
     ingest = prepare.ingest
     monkeypatch.setattr(prepare, "ingest", broken)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    code, _, said = call("ingest", logs, "--store", tmp_path / "store")
-    assert code == 3 and "trip_1.mcap refused" in said and "ZeroDivisionError" in said
-    assert "Traceback" not in said
+    code, _, reported = call("ingest", logs, "--store", tmp_path / "store")
+    assert code == 3 and "trip_1.mcap refused" in reported and "ZeroDivisionError" in reported
+    assert "Traceback" not in reported
     (trace,) = (tmp_path / "cache").rglob("*.txt")
-    assert str(trace) in said and "in broken" in trace.read_text()
+    assert str(trace) in reported and "in broken" in trace.read_text()
     names = [v["name"] for v in json.loads(call("voyages", "--store", tmp_path / "store",
                                                 "--json", "-")[1])["voyages"]]  # fmt: skip
     assert names == ["trip_2", "trip_3"]
@@ -194,14 +194,14 @@ def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path,
 def test_the_same_name_with_other_content_is_refused_by_name(logs, store, tmp_path):
     clash = tmp_path / "trip_1.mcap"
     clash.write_bytes((logs / "trip_2.mcap").read_bytes())
-    code, _, said = call("ingest", clash, "--store", store)
-    assert code == 1 and "another log as the voyage 'trip_1'" in said
+    code, _, reported = call("ingest", clash, "--store", store)
+    assert code == 1 and "another log as the voyage 'trip_1'" in reported
 
 
 def test_an_unknown_log_without_a_profile_says_how_to_draft_one(tmp_path):
     path = sailing.write(tmp_path / "turn.mcap")
-    code, _, said = call("ingest", path, "--store", tmp_path / "store")
-    assert code == 1 and "shiplog profile" in said and "/gyro" in said
+    code, _, reported = call("ingest", path, "--store", tmp_path / "store")
+    assert code == 1 and "shiplog profile" in reported and "/gyro" in reported
     draft = tmp_path / "draft.toml"
     assert call("profile", path, "--out", draft)[0] == 0
     text = draft.read_text()
@@ -217,8 +217,8 @@ def test_a_truncated_log_is_ingested_as_far_as_it_goes_and_exits_with_3(tmp_path
     assert code == 3
     assert 300.0 < voyage["seconds"] < 800.0
     assert "truncated" in [f["kind"] for f in voyage["findings"]]
-    code, said, _ = call("check", cut)
-    assert code == 3 and "truncated" in said
+    code, reported, _ = call("check", cut)
+    assert code == 3 and "truncated" in reported
 
 
 def test_check_says_why_sensors_were_not_held_against_each_other(logs, tmp_path, caplog):
@@ -230,8 +230,8 @@ def test_check_says_why_sensors_were_not_held_against_each_other(logs, tmp_path,
         (("check", logs / "trip_1.mcap", "--profile", "blueboat"), "trip_1.mcap has no topic"),
     ):
         caplog.clear()
-        code, said, _ = call(*arguments)
-        assert code == 0 and "messages read, 0 lost" in said
+        code, reported, _ = call(*arguments)
+        assert code == 0 and "messages read, 0 lost" in reported
         (line,) = [r.getMessage() for r in caplog.records]
         assert "sensors not held against each other" in line and why in line
 
@@ -243,8 +243,8 @@ def test_check_takes_a_profile_and_says_where_there_is_none(logs, tmp_path, capl
     mine.write_text(sailing.PROFILE)
     code, _, _ = call("check", path, "--profile", mine)
     assert code == 0 and not caplog.records
-    code, _, said = call("check", path, "--profile", "esso-vectwn")
-    assert code == 1 and "did you mean 'esso-vectwin'" in said
+    code, _, reported = call("check", path, "--profile", "esso-vectwn")
+    assert code == 1 and "did you mean 'esso-vectwin'" in reported
 
 
 def test_tables_become_logs_and_come_back_as_they_were(tmp_path):
@@ -294,13 +294,15 @@ def test_servo_pulses_become_commands_about_their_neutral(tmp_path):
 def test_a_table_without_a_column_names_it(tmp_path):
     with (tmp_path / "t.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["t_s", "x0_m"], [0.0, 1.0]])
-    code, _, said = call("convert", tmp_path / "t.csv", "--profile", "kvlcc2", "--out", tmp_path)
-    assert code == 1 and "no column for" in said and "heading" in said
+    code, _, reported = call(
+        "convert", tmp_path / "t.csv", "--profile", "kvlcc2", "--out", tmp_path
+    )
+    assert code == 1 and "no column for" in reported and "heading" in reported
     assert not list(tmp_path.glob("*.mcap"))
 
 
 def test_the_demo_needs_its_logs(tmp_path, monkeypatch):
     empty = tmp_path / "empty"
     empty.mkdir()
-    code, _, said = call("demo", "--no-view", "--logs", empty, "--out", tmp_path / "demo")
-    assert code == 1 and "No log in" in said
+    code, _, reported = call("demo", "--no-view", "--logs", empty, "--out", tmp_path / "demo")
+    assert code == 1 and "No log in" in reported

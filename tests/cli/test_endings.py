@@ -48,11 +48,11 @@ def test_a_training_ends_with_its_command(store, tmp_path, name):
             time.sleep(0.1)
             started = me.children(recursive=True)
         command.send_signal(number)
-        _, said = command.communicate()
+        _, reported = command.communicate()
     assert len(started) >= 2
     _, alive = psutil.wait_procs(started, timeout=30)
     assert alive == []
     if number == signal.SIGTERM:
         assert command.returncode == 128 + number
-        assert said.rstrip().endswith("stopped; what was finished is kept")
-        assert "Traceback" not in said
+        assert reported.rstrip().endswith("stopped; what was finished is kept")
+        assert "Traceback" not in reported

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shiplog.diagnosis.campaign_prior import SHARES, learn, prior
+from shiplog.diagnosis.campaign_prior import INFORMATION_SHARES, learn, prior
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 
 EACH = np.arange(12)  # parts that are voyages of their own
@@ -58,7 +58,7 @@ def test_a_right_noise_model_counts_whole_and_one_too_quiet_does_not():
     )
     assert sum(share == 1.0 for share in right) >= 9
     assert min(right) >= 0.5 >= max(wrong)
-    assert set(right + wrong) <= set(SHARES)
+    assert set(right + wrong) <= set(INFORMATION_SHARES)
 
 
 def test_one_voyage_cannot_say_how_far_campaigns_are_apart():

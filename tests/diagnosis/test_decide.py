@@ -58,7 +58,7 @@ def test_neither_of_two_is_named(trial):
     assert found.fit.included == ()
 
 
-def test_a_name_that_is_sure_beside_one_that_is_not(trial):
+def test_a_name_that_is_sure_with_one_that_is_not(trial):
     found = verdict(trial, {(DRAG, NOMINAL): 0.5, (("drag", "load"), NOMINAL): 0.5})
     assert named(found) == ["drag"]
 
@@ -71,7 +71,7 @@ def test_nothing(trial):
     assert found.verdict == "undecided"
 
 
-def test_a_trace_is_shown_and_is_no_name(trial):
+def test_a_trace_is_reported_and_is_no_name(trial):
     """There for sure, and too small to matter."""
     found = verdict(trial, {(DRAG, NOMINAL): 0.97, ((), NOMINAL): 0.03}, sizes={"drag": 0.05})
     assert (found.verdict, named(found)) == ("none", [])
@@ -94,7 +94,7 @@ def test_a_kind_of_remainder_is_unknown_and_says_its_family(trial, kind, family)
     assert found.fit.remainder == found.nothing.remainder == Remainder(kind, 3.0)
 
 
-def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
+def test_a_name_has_to_explain_more_than_the_remainder_with_it(trial):
     """Of 80 nats together it must have the share MOST by itself: with less, unknown."""
     least = 80.0 * thresholds.MOST
     sure = {(DRAG, "time"): 0.96, (DRAG, NOMINAL): 0.02, ((), NOMINAL): 0.02}
@@ -107,9 +107,7 @@ def test_a_name_has_to_explain_more_than_the_remainder_beside_it(trial):
 
 
 @pytest.mark.parametrize(("share", "word"), [(0.3, "named"), (0.7, "unknown")])
-def test_a_cause_that_the_remainder_imitates_is_not_named_beside_it(
-    trial, monkeypatch, share, word
-):
+def test_a_cause_that_the_remainder_imitates_is_not_named_with_it(trial, monkeypatch, share, word):
     """What acts through the same inputs may be a part of the unknown force: then that is
     reported."""
     asked = []
@@ -126,7 +124,7 @@ def test_a_cause_that_the_remainder_imitates_is_not_named_beside_it(
     assert word == "named" or found.structure.family == "time"
 
 
-def test_a_name_of_two_kinds_is_shown_in_the_likelier(trial):
+def test_a_name_of_two_kinds_is_reported_in_the_likelier(trial):
     """A verdict that names a clock says which."""
     found = verdict(trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32})
     assert (found.verdict, named(found)) == ("named", ["clock:gnss"])

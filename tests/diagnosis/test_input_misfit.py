@@ -60,7 +60,7 @@ def bent(cut: Cut, hidden: np.ndarray, looks_like: np.ndarray, seed: int = 1) ->
 
 
 def nats(linear: Linear, own: input_misfit.Misfit | None) -> float:
-    """Of the column, above nothing; of usual process noise."""
+    """Of the column, above nothing; of nominal process noise."""
     modes = likelihood.modes(likelihood.weighed(linear, PROCESS_NOISE), PROCESS_NOISE)
     if own is not None:
         modes = modes.joined(own.accelerations(linear.cut, GRID))
@@ -100,7 +100,8 @@ def test_what_it_bends_the_network_by_is_what_it_pushes():
 
 def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():
     """Hidden: a force of the speed. A column that goes with the rudder and a little with that
-    speed gets hundreds of nats from it, of a process noise of seconds; beside the misfit a few."""
+    speed gets hundreds of nats from it, of a process noise of seconds; conditional on
+    the misfit a few."""
     cut = segments(150)
     hidden = pushes(cut, lambda s, d: np.sin(s[..., 1]))
     column = pushes(cut, lambda s, d: d[..., 0] + 0.5 * s[..., 1])
@@ -109,7 +110,7 @@ def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():
     assert nats(given, learned(given)) < 20.0
 
 
-def test_what_the_network_cannot_see_is_still_named_beside_it():
+def test_what_the_network_cannot_see_is_still_named_with_it():
     """Hidden: the force of the speed, and one of the place."""
     cut = segments(150)
     place = pushes(cut, lambda s, d: np.tanh(s[..., 0]))

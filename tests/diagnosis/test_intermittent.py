@@ -83,8 +83,8 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
 
 
-def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
-    """Bursts at one place: a force at that place unless they are usual there."""
+def test_what_nominally_pushes_at_one_place_is_no_force_of_the_trial(reference):
+    """Bursts at one place: a force at that place unless they are nominal there."""
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
     found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
@@ -94,7 +94,7 @@ def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
     )
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
-    # beside a place of its own it is as much a force as before
+    # together with a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
     other = unrecorded_thruster.estimate_side_force(
         linear, none, reference, PROCESS_NOISE, weight, elsewhere
@@ -102,14 +102,14 @@ def test_what_usually_pushes_at_one_place_is_no_force_of_the_trial(reference):
     assert other.gain > 20.0
 
 
-# --- what is usual of it
+# --- what is nominal of it
 
 UNIT = np.array([0.0, 0.01, 0.004])
 
 
 @pytest.fixture
 def asked(monkeypatch):
-    """What is left of the nominal campaign when the force is asked for, and the weights."""
+    """Residuals of the nominal campaign when the force is tested, and the weights."""
     output = {}
 
     def estimate_side_force(linear, d, reference, process_noise, weight):
@@ -122,7 +122,7 @@ def asked(monkeypatch):
     return output
 
 
-def test_what_usually_pushes_at_one_place_is_asked_of_the_nominal_campaign(asked):
+def test_what_nominally_pushes_at_one_place_is_tested_on_the_nominal_campaign(asked):
     record, columns = straight.sailed(12), straight.columns_of(CAUSES)
     made = straight.campaign(record, straight.passed(record, columns), columns)
     grid = segments.grid(record)
@@ -133,7 +133,7 @@ def test_what_usually_pushes_at_one_place_is_asked_of_the_nominal_campaign(asked
     assert intermittent.nominal_side_force(made, grid) is None
 
 
-def test_what_is_usual_of_a_cause_is_no_intermittent_force(asked):
+def test_what_is_nominal_of_a_cause_is_no_intermittent_force(asked):
     """Ten realistic sizes of a cause in all parts: nothing of it is left."""
     columns = straight.columns_of(CAUSES)
     record = straight.sailed(12)

@@ -128,7 +128,7 @@ def test_a_square_of_errors_alone_is_that_of_their_gram(process_noise):
         assert volume == pytest.approx(wanted.logdet, rel=1e-9)
 
 
-def test_evidence_of_a_size_of_unrest_is_that_of_the_dense_gaussian():
+def test_evidence_of_a_size_of_process_noise_is_that_of_the_dense_gaussian():
     """With a start that is nearly known, log N(e; Jd, C) itself: more noise against less."""
     given, d = linear(3), np.array([0.3, -0.7])
     sure = replace(PROCESS_NOISE, start=np.full(6, 1e-4))
@@ -153,7 +153,7 @@ def test_units_scale_columns_and_not_the_error():
     assert found.scaled(unit).logdet == found.logdet
 
 
-def test_columns_beside_bend_the_observations_as_their_acceleration_does():
+def test_further_columns_bend_the_observations_as_their_acceleration_does():
     given = linear(3)
     accelerations = np.random.default_rng(9).standard_normal((3, 9, 4))
     found = (
@@ -197,7 +197,7 @@ def test_the_total_is_the_weighted_sum():
     assert whole == pytest.approx(np.einsum("s,sij->ij", weight, each), rel=1e-9)
 
 
-def test_one_pass_serves_every_size_of_unrest():
+def test_one_pass_serves_every_size_of_process_noise():
     given = linear(3)
     weighed, weight = likelihood.weighed(given, PROCESS_NOISE), np.array([1.0, 0.0, 0.4])
     modes = likelihood.modes(weighed, PROCESS_NOISE)

@@ -125,7 +125,7 @@ def test_a_bin_is_the_mean_of_what_was_measured():
     assert cut.used.all() and cut.step == pytest.approx(0.2)
 
 
-def test_bins_that_were_hardly_seen_do_not_count():
+def test_bins_that_were_hardly_measured_do_not_count():
     viewed = np.ones(len(SEEN), dtype=bool)
     viewed[302:320] = False  # most of the first bin of the second segment
     viewed[325:330] = False  # a quarter of the next

@@ -1,4 +1,4 @@
-"""A network that learned from the very voyages that are diagnosed, the whole way."""
+"""A network that was trained on the very voyages that are diagnosed, the whole way."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -64,7 +64,7 @@ def afloat(tmp_path_factory):
     )  # fmt: skip
 
 
-def test_what_only_renames_its_inputs_is_not_testable_beside_a_network(afloat):
+def test_what_only_renames_its_inputs_is_not_testable_with_a_network(afloat):
     """Nor what any fit absorbs; what it cannot see is."""
     why = {
         "rudder_offset": "a network fitted to these voyages absorbs it",
@@ -88,7 +88,7 @@ def test_the_whole_current_is_found_though_the_network_learned_in_it(afloat):
         assert displayed.low <= truth["value"] <= displayed.high
 
 
-def test_a_function_of_the_networks_inputs_stands_beside_every_hypothesis(afloat):
+def test_a_function_of_the_networks_inputs_is_in_every_hypothesis(afloat):
     """The level's last numbers are its, and what they push is what is taken off."""
     trial, ref = afloat.trial, afloat.trial.reference
     assert ref.learned and ref.columns.base == len(ref.theta) > 0
@@ -209,7 +209,7 @@ def test_a_bent_network_is_kept_as_it_was_fitted_again(afloat):
     assert further.model.base.bent == pytest.approx(bent + 1e-3)
 
 
-def test_a_network_that_an_earlier_program_bent_is_told_of(afloat):
+def test_a_network_that_an_earlier_program_bent_is_reported(afloat):
     plain = afloat.run.extended(afloat.run.config.seeds[0], afloat.recorded)
     path = extension_file.extend(afloat.run, afloat.work / "earlier", plain)
     assert load_model.load(path).extension is not None

@@ -90,7 +90,7 @@ def test_weights_of_segments_by_hand():
     assert campaign_parts.robust_weights(square, np.zeros(5, dtype=bool)).tolist() == [0.0] * 5
 
 
-# --- a campaign learned from a pass that is exactly linear
+# --- a campaign identified from a pass that is exactly linear
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def learned(model):
     return found, made
 
 
-def test_a_campaign_knows_what_is_usual_of_a_cause(learned):
+def test_a_campaign_knows_what_is_nominal_of_a_cause(learned):
     """The cause that all voyages have is expected in a trial, to within its spread."""
     _, made = learned
     at = made.reference.columns.of["drag"][0]
@@ -140,7 +140,7 @@ def test_characteristics_say_every_group_once(learned):
     assert set(found.deviation) == {"hull", "rudder", "two", "drag", "motion", "controls", "wind"}
     assert set(found.size) == set(discrepancy.SEEN)
     assert all(0.0 < value < 1.0 for value in found.deviation.values())
-    assert found.share in campaign_prior.SHARES
+    assert found.share in campaign_prior.INFORMATION_SHARES
     # what a trial is given is by these names, column by column
     columns = made.reference.columns
     for label in ("two", "drag"):

@@ -110,7 +110,7 @@ def test_exchanged_between_voyages_it_vanishes(variable, columns):
     assert found.r2[0] < 0.05
 
 
-def test_one_voyage_is_left_out_by_halves_and_that_is_said():
+def test_one_voyage_is_left_out_by_halves_and_that_is_reported():
     knots = campaign(voyages=1)
     found = asked(planted(knots, effect(knots, "heading"), "sway"))
     assert found["heading"].folds == "halves"

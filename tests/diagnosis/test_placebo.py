@@ -9,7 +9,7 @@ from straight import CAUSES
 
 from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.placebo import placebos
-from shiplog.diagnosis.remainder import SIZES
+from shiplog.diagnosis.remainder import CHANGE_SIZES
 
 SHARE = 0.5
 
@@ -47,10 +47,12 @@ def test_it_is_the_same_in_whichever_part_it_is():
     assert max(values) < 3.0 * min(values)
 
 
-@pytest.mark.parametrize(("name", "sizes"), (("drag", (1.0,)), ("motion", SIZES), ("time", SIZES)))
+@pytest.mark.parametrize(
+    ("name", "sizes"), (("drag", (1.0,)), ("motion", CHANGE_SIZES), ("time", CHANGE_SIZES))
+)
 def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
     """Of each part against the prior of the others: with the cause's own number beside what is
-    usual of it, and without; the most of all parts, and of all sizes."""
+    nominal of it, and without; the most of all parts, and of all sizes."""
     made = campaign(1.5)
     columns = made.reference.columns
     count = len(made.reference.pull)

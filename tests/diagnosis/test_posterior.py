@@ -57,7 +57,7 @@ def test_a_factor_of_all_scores_changes_nothing(trial):
 
 
 def test_what_is_below_practical_size_is_no_change(trial):
-    """`drag` at 0.09 of 0.1; beside `load`, which is large, only that is there."""
+    """`drag` at 0.09 of 0.1; together with `load`, which is large, only that is there."""
     made = weighed.search(trial, MIXED, sizes={"drag": 0.09})
     found = posterior(made)
     assert found.names == pytest.approx({"load": 0.25, "clock": 0.18})
@@ -110,7 +110,7 @@ def test_the_likeliest_hypothesis_with_some_names(trial):
     assert best_with(found, ("clock", "load")) is found.hypotheses[0]  # none has both
 
 
-def test_a_stated_name_is_shown_in_its_likeliest_kind(trial):
+def test_a_stated_name_is_reported_in_its_likeliest_kind(trial):
     """The wind's clock has the likeliest hypothesis, GNSS's the larger sum."""
     found = posterior(weighed.search(
         trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32}

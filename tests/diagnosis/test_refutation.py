@@ -65,7 +65,7 @@ def test_what_is_not_surely_worse_stays(trial, interval):
 
 
 @pytest.mark.parametrize("interval", (UNSURE, HARDLY))
-def test_beside_a_remainder_an_unsure_gain_names_nothing(trial, interval):
+def test_with_a_remainder_an_unsure_gain_names_nothing(trial, interval):
     """The verdict is the remainder's; the cause keeps its probability, and the reason is told."""
     made = weighed.search(trial, {(DRAG, RAISED): 1.0})
     decision, found, gained, refuted = judged(made, HeldOut({DRAG: interval}))
@@ -87,7 +87,7 @@ def test_a_remainder_that_adds_little_is_an_error_of_the_equations(trial, adds, 
     assert decision.verdict == verdict
 
 
-def test_beside_a_remainder_a_sure_gain_names_the_cause(trial):
+def test_with_a_remainder_a_sure_gain_names_the_cause(trial):
     held = HeldOut({DRAG: BETTER})
     decision, _, gained, _ = judged(weighed.search(trial, {(DRAG, RAISED): 1.0}), held)
     assert (decision.verdict, gained.low) == ("named", BETTER[0])

@@ -170,7 +170,7 @@ def test_what_is_banned_is_not_in_any_hypothesis():
     assert "drag" not in found.table.priors.each
 
 
-def test_what_a_model_has_already_stays_beside_what_is_found():
+def test_what_a_model_has_already_stays_with_what_is_found():
     """An extended model: its own cause stands at its numbers in every hypothesis."""
     found = searched({"drag": [1.2], "load": [1.0]}, fixed={"drag": [1.2]})
     best = found.table.ranked()[0]
@@ -192,7 +192,7 @@ def pushes() -> np.ndarray:
     return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
 
 
-def test_an_intermittent_force_is_asked_for_beside_no_family(monkeypatch):
+def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
     """Where the process noise is raised, whatever was tried before it."""
     asked, real = [], fits.changed
 
@@ -232,10 +232,10 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
 
 
 @pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
-def test_beside_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
+def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
     gain, noisy, monkeypatch
 ):
-    """What gains a little beside noise that explains much is fitted to that noise."""
+    """What gains a little together with noise that explains much is fitted to that noise."""
     trial, point = trial_with({}, accelerations=pushes())
     trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
     monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
@@ -274,7 +274,7 @@ def test_a_force_of_the_place_is_unknown_and_depends_on_position():
 
 def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch):
     """One contender at a time, and two causes hidden, one of them with half the columns of a third:
-    without the strongest the third is weighed, which was not worth a look beside it."""
+    without the strongest the third is weighed, which was not worth a look together with it."""
     monkeypatch.setattr(searching, "CONTENDERS", 1)
     found = searched({"drag": [1.2]}, alike=("drag", "load", 0.7))
     assert found.table.ranked()[0].causes == ("drag",)

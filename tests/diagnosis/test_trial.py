@@ -177,9 +177,9 @@ def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, fami
     point = trial.at({})
     base = level(trial, point, 1.4, included)
     gained, size = fits.changed(trial, point, base, included, family, Remainder())
-    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.SIZES]
+    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
     assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
-    assert size == remainder.SIZES[int(np.argmax(each))]
+    assert size == remainder.CHANGE_SIZES[int(np.argmax(each))]
     with_it = nats(trial, point, 1.4, included, (family,), size)
     assert gained == pytest.approx(with_it - nats(trial, point, 1.4, included), abs=1e-3)
 
@@ -359,7 +359,7 @@ def test_a_few_segments_do_not_decide(made):
 
 
 def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
-    """What is left of each segment in units of its covariance: weights are by its median."""
+    """The residual of each segment in units of its covariance: weights are by its median."""
     nominal, record, given = made
     trial = straight.trial(nominal, record, given)
     point = trial.at({})
@@ -377,7 +377,7 @@ def test_the_distance_of_a_segment_is_the_dense_one(made, monkeypatch):
 
 
 def test_products_of_a_point_that_is_gone_are_not_taken_for_anothers(trial):
-    """Points come and go while a fit settles, and one may stand where another stood in memory."""
+    """Points come and go while a fit converges, and one may stand where another stood in memory."""
     first, there, last = (trial.at({"drag": np.array([size])}) for size in (0.1, 0.5, 0.7))
     here = trial.at({"drag": np.array([0.0])})
     products = straight.trial(trial.campaign, trial.record, trial.given).products

@@ -133,8 +133,8 @@ def test_learning_leaves_what_it_is_given():
 
 
 def test_a_small_deviation_of_what_repeats_well_is_found():
-    """0.1 % of a plausible size. With the derivatives 1000 times as large it is told from noise;
-    36 numbers say it to 12 %. A lower limit above it, as 2 % of the size, would hide it."""
+    """0.1 % of a plausible size. With the derivatives 1000 times as large it is distinguished from
+    noise; 36 numbers say it to 12 %. A lower limit above it, as 2 % of the size, would hide it."""
     rng, each, true = np.random.default_rng(7), [], 0.001
     for _ in range(12):
         j = 1000.0 * rng.standard_normal((60, 3))

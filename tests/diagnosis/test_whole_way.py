@@ -1,7 +1,7 @@
 """From logs to a verdict on the known ship, with seeds that nobody looked at before.
 
 One campaign of the ship as it is and one with a current go the whole way through MCAP, the store
-and the pipelines; what is usual for it is learnt there once. Other trials are judged against it.
+and the pipelines; what is nominal for it is learnt there once. Other trials are judged against it.
 """
 
 import json
@@ -87,7 +87,7 @@ def log(case: cases.Case, leg: cases.Leg, folder):
 
 @pytest.fixture(scope="module")
 def sea(tmp_path_factory):
-    """The whole way, once: run, store, what is usual, the diagnosis of a trial with a current."""
+    """The whole way, once: run, store, posterior, the diagnosis of a trial with a current."""
     work = tmp_path_factory.mktemp("sea")
     (work / "logs").mkdir()
     case = hidden("current", size=2.3)  # 0.14 m/s
@@ -238,7 +238,7 @@ def test_the_answer_has_the_shape_of_the_contract(sea):
     assert "steady current" in report and "Gain" in report
 
 
-def test_too_little_is_said_and_nothing_named(sea):
+def test_too_little_is_reported_and_nothing_named(sea):
     done = pipeline.diagnose_run(sea.run.path, sea.store, ["short"], sea.work / "short")
     content = json.loads((sea.work / "short" / "verdict.json").read_text("utf-8"))
     shaped(content)
@@ -556,7 +556,7 @@ def test_half_the_data_has_the_same_name(sea):
     assert np.linalg.det(half.covariance) > 1.2 * np.linalg.det(whole.covariance)
 
 
-def test_beside_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
+def test_with_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     """An antenna's columns come from what is measured: 1.4 s apart they are other ones, and the
     position and the velocity would seem to disagree."""
     trial = Trial.of(sea.campaign, sea.done.trial.record)

@@ -537,7 +537,7 @@ def test_a_ship_is_trained_once_where_that_is_asked_for(tmp_path, stubs):
     assert (out / "cases" / "5-1" / "logs" / "trial_1.mcap").exists()
 
 
-def test_what_has_not_run_is_pending_and_what_could_not_be_made_is_told(tmp_path, stubs):
+def test_what_has_not_run_is_pending_and_what_could_not_be_made_is_reported(tmp_path, stubs):
     out = tmp_path / "out"
     plan.save(out, suites.plan("nightly", 5, 2))
     assert len(score.read(out).pending) == 2

@@ -251,7 +251,7 @@ def test_process_noise_is_no_ornstein_uhlenbeck_process(kind):
     lagged = [float(np.mean(one[:-lag] * one[lag:])) for lag in range(10, 120, 5)]
     assert min(lagged) < -0.08
     periods = {cases.FAMILIES[f](s).noise.period for f in OWN for s in range(20)}
-    assert nominal_reference.UNREST_TIME not in periods
+    assert nominal_reference.PROCESS_NOISE_TIME_S not in periods
     assert max(periods) > 10.0 * min(periods)
 
 

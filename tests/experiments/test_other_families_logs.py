@@ -166,7 +166,7 @@ def test_what_a_ship_has_not_cannot_be_hidden_in_it(tmp_path, capsys):
     assert "It offers: none, current" in capsys.readouterr().err
 
 
-def test_one_unit_s_loss_is_told_with_its_name():
+def test_one_unit_s_loss_is_reported_with_its_name():
     case = cases.draw(5, family="azimuth_ferry", cause="thrust_loss:unit", size=1.0)
     (cause,) = case.causes
     assert cause.name == "thrust_loss"
@@ -183,7 +183,7 @@ def test_a_large_ship_has_a_longer_campaign():
     assert (large.trial[0].start - large.nominal[0].start).days == 30
 
 
-def test_shipmmg_missing_is_said(monkeypatch):
+def test_shipmmg_missing_is_reported(monkeypatch):
     import builtins
 
     real = builtins.__import__

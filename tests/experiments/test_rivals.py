@@ -197,7 +197,7 @@ def test_numbers_that_change_nothing_bring_nothing():
     assert found["twice"] == pytest.approx(found["once"])
 
 
-def test_noise_and_coefficients_of_the_usual_voyages_are_learnt():
+def test_noise_and_coefficients_of_the_nominal_voyages_are_learnt():
     true = np.array([0.8, -0.6, 0.0, 0.0, 0.0])
     given = rolled(150, true)
     columns = Columns(2, (), np.array([1.0, 0.5, 1.0, 1.0, 1.0]))

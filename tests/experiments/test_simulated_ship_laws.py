@@ -31,7 +31,7 @@ from pipelines.experiments.simulated_ship.laws import (
 )
 from pipelines.experiments.simulated_ship.noise import oscillator, process_noise
 from shiplog import profile_file as profiles
-from shiplog.diagnosis.nominal_reference import UNREST_TIME
+from shiplog.diagnosis.nominal_reference import PROCESS_NOISE_TIME_S
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.causes.environment import Bank as CatalogueBank
 from shiplog.models.causes.environment import ShallowWater
@@ -349,9 +349,9 @@ def constants() -> dict[str, tuple[float, Callable[[Laws], float]]]:
         "bank speed of lead": (
             0.01 * math.sqrt(1 / share**2 - 1), lambda laws: laws.bank.lead_speed,
         ),
-        "process noise, time": (UNREST_TIME, lambda laws: laws.noise.time[0]),
-        "process noise, time in sway": (UNREST_TIME, lambda laws: laws.noise.time[1]),
-        "process noise, time in yaw": (UNREST_TIME, lambda laws: laws.noise.time[2]),
+        "process noise, time": (PROCESS_NOISE_TIME_S, lambda laws: laws.noise.time[0]),
+        "process noise, time in sway": (PROCESS_NOISE_TIME_S, lambda laws: laws.noise.time[1]),
+        "process noise, time in yaw": (PROCESS_NOISE_TIME_S, lambda laws: laws.noise.time[2]),
     }  # fmt: skip
     for name in TERMS:
         found[f"shallow {name}"] = (

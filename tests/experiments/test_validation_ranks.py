@@ -13,7 +13,7 @@ from pipelines.experiments.hidden_effects.parameters import compare
 # --- reliability ----------------------------------------------------------------------------------
 
 
-def test_bins_hold_what_was_said_and_the_picture_shows_each():
+def test_bins_hold_what_was_reported_and_the_picture_shows_each():
     beliefs = [(0.95, True), (1.0, True), (0.91, False), (0.55, False), (0.0, False)]
     low, middle, high = reliability.bins(beliefs)
     assert (high.low, high.high, len(high.hits)) == (0.9, 1.0, 3)

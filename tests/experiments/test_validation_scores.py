@@ -256,7 +256,7 @@ def test_the_log_score_by_hand_and_at_its_floor():
 # --- the other methods ---------------------------------------------------------------------------
 
 
-def test_scores_in_nats_become_probabilities_beside_none():
+def test_scores_in_nats_become_probabilities_over_none():
     rival = {"answer": "clock_offset:wind", "ranking": [
         {"name": "clock_offset:wind", "score": 2.0}, {"name": "clock_offset:gnss", "score": 1.0},
         {"name": "current", "score": -800.0},

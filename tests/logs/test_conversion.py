@@ -112,7 +112,7 @@ cog = { channel = "cog", unit = "deg" }
 """
 
 
-def test_a_missing_yaw_rate_is_differentiated_and_said(tmp_path, caplog):
+def test_a_missing_yaw_rate_is_differentiated_and_reported(tmp_path, caplog):
     count = 100
     turned = 350.0 + 2.0 * np.arange(count) / 10  # deg, through north
     columns = {"t": np.arange(count) / 10, "psi": turned % 360}
@@ -140,7 +140,7 @@ def test_a_channel_that_does_not_exist_is_answered_with_those_that_do():
         assert channel in str(refused.value).split("Its channels:")[1]
 
 
-def test_words_among_numbers_are_blanks_and_said(tmp_path, caplog):
+def test_words_among_numbers_are_blanks_and_reported(tmp_path, caplog):
     rows = [f"{i / 10},{i},0,1,0,{'---' if i == 3 else 5.0}" for i in range(30)]
     (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *rows]))
     profile = profiles.parse(PROFILE, "mine")
@@ -150,7 +150,7 @@ def test_words_among_numbers_are_blanks_and_said(tmp_path, caplog):
     assert not done.refused
 
 
-def test_rows_that_go_back_in_time_are_sorted_and_said(tmp_path, caplog):
+def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     rows = [f"{i / 10},{i},0,1,0,5" for i in range(30)]
     (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *reversed(rows)]))
     profile = profiles.parse(PROFILE, "mine")

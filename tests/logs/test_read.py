@@ -335,7 +335,7 @@ def test_other_ways_of_writing_give_the_same_tables(good, tmp_path, options):
         assert_frame_equal(found.frames[topic], frame)
 
 
-def test_jittered_log_times_are_sorted_and_said(tmp_path):
+def test_jittered_log_times_are_sorted_and_reported(tmp_path):
     path = protobuf_log(
         tmp_path / "jitter.mcap",
         times=lambda k: START + k * SECOND // 10 + (SECOND if k % 10 == 0 else 0),
@@ -627,7 +627,7 @@ def test_a_payload_that_ends_reruns_process_is_read_all_the_same(good, by_rerun)
 def test_rerun_is_not_waited_for_longer_than_it_may_take(tmp_path, by_rerun, monkeypatch):
     path = known_colours(tmp_path / "log.mcap")
     with monkeypatch.context() as impatient:
-        impatient.setattr(rerun_route, "PATIENCE", 0.0)
+        impatient.setattr(rerun_route, "START_TIMEOUT_S", 0.0)
         impatient.setattr(rerun_route, "PACE", 1e12)
         assert_same(path)
         assert by_rerun == []

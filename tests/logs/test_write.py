@@ -208,7 +208,7 @@ GOOD = {"angle_deg": np.zeros(3)}
         (Series("/r", "my.Raw", stamps(3), {"timestamp": np.zeros(3)}), "own"),
     ],
 )
-def test_what_cannot_be_written_is_said_and_leaves_nothing(tmp_path, series, says):
+def test_what_cannot_be_written_is_reported_and_leaves_nothing(tmp_path, series, says):
     (tmp_path / "a.mcap").write_bytes(b"the log that was here before")
     with pytest.raises(ShiplogError, match=says):
         write_log(tmp_path / "a.mcap", [several()[0], series], ship="a ship")

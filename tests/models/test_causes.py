@@ -574,7 +574,7 @@ def test_around_a_network_a_cause_adds_what_it_changes_in_the_mmg():
 
 
 @EVERY
-def test_told_holds_its_value_and_ninety_percent(cause):
+def test_displayed_holds_its_value_and_ninety_percent(cause):
     cause = cause.on(setting())
     numbers = sized(cause)
     spread = 0.1 * cause.sizes(setting())
@@ -644,7 +644,7 @@ def test_small_is_no_matter(label, number):
 
 
 def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
-    """T y' = x - y: what it lacks is T times how fast it moves."""
+    """T y' = x - y: the residual is T times how fast it moves."""
     rows, units = 300, len(FERRY.actuators)
     rng = np.random.default_rng(0)
     read = Record(
@@ -929,7 +929,7 @@ def test_sizes_follow_the_ship():
 
 
 def test_two_of_three_clocks_say_it_all():
-    """`gnss` is position and velocity together; no cause stands beside itself."""
+    """`gnss` is position and velocity together; no cause goes together with itself."""
     by = {cause.label: cause for cause in CATALOGUE}
     both = by["clock_offset:gnss"]
     for channel in ("position", "velocity"):

@@ -122,7 +122,7 @@ def estimated(profile: Profile, without=()) -> Ship:
 @pytest.fixture(scope="module")
 def esso() -> Ship:
     g, _, _ = geometry_of(profiles.load("esso-osaka"))
-    return Ship(MMG(g), parameters.load(parameters.beside("esso-osaka"), g))
+    return Ship(MMG(g), parameters.load(parameters.published_file("esso-osaka"), g))
 
 
 @pytest.fixture(scope="module")
@@ -535,7 +535,7 @@ def test_a_braking_screw_holds_the_flow_back_and_may_turn_it_round(esso, u, n):
 def test_the_flow_past_the_stern_comes_in_at_the_straightened_angle(esso):
     """Rudder amidships without a screw; γ_P where v + x_R r ≥ 0, else γ_N. f₃ steepens it."""
     g, _, _ = geometry_of(profiles.load("esso-osaka"), without=["propeller"])
-    published = parameters.load(parameters.beside("esso-osaka"), g, without=["propeller"])
+    published = parameters.load(parameters.published_file("esso-osaka"), g, without=["propeller"])
     bare = Ship(MMG(g), published).changed(rudder__f_3=0.5)
     u, r = 0.4, 0.03
     for v, gamma in ((0.1, 0.3506), (0.02, 0.4406)):
@@ -849,7 +849,7 @@ def test_names_follow_the_parts_and_a_thrusters_are_its_own(esso):
 
 
 def edited(tmp_path, old, new):
-    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    text = parameters.published_file("esso-osaka").read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "edited.mmg.toml"
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -881,7 +881,7 @@ def test_a_file_that_cannot_be_is_refused_with_its_name(esso, tmp_path, old, new
 
 
 def test_a_number_where_a_section_belongs_is_refused(esso, tmp_path):
-    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    text = parameters.published_file("esso-osaka").read_text(encoding="utf-8")
     path = tmp_path / "scalar.mmg.toml"
     path.write_text("wind = 0.3\n" + text[: text.index("[wind]")], encoding="utf-8")
     with pytest.raises(ProfileError, match=r"scalar\.mmg\.toml: wind is 0\.3, not") as error:
@@ -902,7 +902,7 @@ def test_a_missing_hull_is_not_advised_to_be_left_out(esso, tmp_path):
         with pytest.raises(ProfileError, match="lacks") as error:
             parameters.load(edited(tmp_path, old, ""), esso.model.geometry)
         assert error.value.hint == "add them."
-    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    text = parameters.published_file("esso-osaka").read_text(encoding="utf-8")
     both = text.replace("y_v = -0.3728", "").replace("a_h = 0.393", "")
     path = tmp_path / "both.mmg.toml"
     path.write_text(both, encoding="utf-8")
@@ -925,7 +925,7 @@ def test_a_thruster_that_the_ship_lacks_is_refused(tmp_path):
 
 
 def test_a_whole_part_that_is_missing_is_named_and_can_be_left_out(tmp_path):
-    text = parameters.beside("esso-osaka").read_text(encoding="utf-8")
+    text = parameters.published_file("esso-osaka").read_text(encoding="utf-8")
     path = tmp_path / "calm.mmg.toml"
     path.write_text(text[: text.index("[wind]")], encoding="utf-8")
     ship = profiles.load("esso-osaka")
@@ -939,7 +939,7 @@ def test_a_whole_part_that_is_missing_is_named_and_can_be_left_out(tmp_path):
 
 
 def test_a_section_of_a_force_that_the_ship_lacks_is_refused_unless_it_was_left_out():
-    path = parameters.beside("esso-osaka")
+    path = parameters.published_file("esso-osaka")
     calm = geometry_of(profiles.load("esso-osaka"), without=["wind"])[0]
     with pytest.raises(ProfileError, match="has a wind force") as error:
         parameters.load(path, calm)
@@ -947,13 +947,15 @@ def test_a_section_of_a_force_that_the_ship_lacks_is_refused_unless_it_was_left_
     assert not any("wind" in name for name in parameters.load(path, calm, without=["wind"]).names)
 
 
-def test_published_values_lie_beside_their_profile(tmp_path):
-    assert parameters.beside("esso-osaka").name == "esso-osaka.mmg.toml"
-    assert parameters.beside("esso-vectwin") is None and parameters.beside("") is None
+def test_published_values_lie_next_to_their_profile(tmp_path):
+    assert parameters.published_file("esso-osaka").name == "esso-osaka.mmg.toml"
+    assert (
+        parameters.published_file("esso-vectwin") is None and parameters.published_file("") is None
+    )
     own = tmp_path / "own.toml"
-    assert parameters.beside(str(own)) is None
+    assert parameters.published_file(str(own)) is None
     (tmp_path / "own.mmg.toml").write_text("", encoding="utf-8")
-    assert parameters.beside(str(own)) == tmp_path / "own.mmg.toml"
+    assert parameters.published_file(str(own)) == tmp_path / "own.mmg.toml"
 
 
 def test_a_model_is_hashable_so_that_it_is_compiled_once():

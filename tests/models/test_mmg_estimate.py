@@ -179,10 +179,10 @@ def test_a_complete_profile_needs_no_estimate():
 
 
 def test_a_bare_profile_says_every_estimate():
-    found, said = estimate.particulars(named(length_m=30.0))
+    found, reported = estimate.particulars(named(length_m=30.0))
     words = "breadth 5, density 1025, draught 2, block 0.7, mass, centre, frontal, lateral"
-    assert len(said) == len(words.split(", "))
-    for sentence, wanted in zip(said, words.split(", "), strict=True):
+    assert len(reported) == len(words.split(", "))
+    for sentence, wanted in zip(reported, words.split(", "), strict=True):
         assert all(word in sentence for word in wanted.split())
     assert (found.breadth, found.draught, found.block) == pytest.approx((5.0, 2.0, 0.7))
     assert found.mass == pytest.approx(1025.0 * 30.0 * 5.0 * 2.0 * 0.7)
@@ -194,25 +194,25 @@ def test_small_boats_float_in_fresh_water(length, density):
 
 
 def test_a_known_mass_floats_the_ship():
-    found, said = estimate.particulars(named(length_m=5.0, breadth_m=2.8, mass_kg=1800.0))
+    found, reported = estimate.particulars(named(length_m=5.0, breadth_m=2.8, mass_kg=1800.0))
     assert found.draught == pytest.approx(1800.0 / (998.0 * 5.0 * 2.8 * 0.7))
     assert found.block == pytest.approx(0.7)
-    assert any("mass afloat" in sentence for sentence in said)
+    assert any("mass afloat" in sentence for sentence in reported)
 
 
 def test_mass_and_draught_give_the_block_within_its_limits():
     ship = dict(length_m=5.0, breadth_m=2.0, draught_m=0.5)
     found, _ = estimate.particulars(named(**ship, mass_kg=0.6 * 998.0 * 5.0))
     assert found.block == pytest.approx(0.6)
-    light, said = estimate.particulars(named(**ship, mass_kg=0.1 * 998.0 * 5.0))
+    light, reported = estimate.particulars(named(**ship, mass_kg=0.1 * 998.0 * 5.0))
     assert light.block == 0.35
-    assert any("limited from 0.1" in sentence for sentence in said)
+    assert any("limited from 0.1" in sentence for sentence in reported)
 
 
 def test_a_catamarans_draught_has_a_floor():
-    found, said = estimate.particulars(named(length_m=1.2, breadth_m=0.93, mass_kg=15.0))
+    found, reported = estimate.particulars(named(length_m=1.2, breadth_m=0.93, mass_kg=15.0))
     assert found.draught == pytest.approx(0.0465)
-    assert any("twentieth" in sentence for sentence in said)
+    assert any("twentieth" in sentence for sentence in reported)
 
 
 def test_masses_of_a_catamaran_are_within_their_spreads():
@@ -245,11 +245,11 @@ def test_spreads_of_the_masses_grow_with_the_breadth():
 
 def test_an_outline_gives_breadth_and_areas():
     outline = ((5.0, 0.0), (3.0, 1.5), (-5.0, 1.5), (-5.0, -1.5), (3.0, -1.5))
-    found, said = estimate.particulars(named(length_m=9.0, outline=outline))
+    found, reported = estimate.particulars(named(length_m=9.0, outline=outline))
     assert found.breadth == pytest.approx(3.0)
     assert found.frontal_area == pytest.approx(0.57 * 9.0)
     assert found.lateral_area == pytest.approx(0.355 * 10.0 * 3.0)
-    assert "outline" in said[0]
+    assert "outline" in reported[0]
 
 
 def test_kijimas_formula_is_held_where_its_ships_end():
@@ -262,11 +262,11 @@ def test_a_rudder_without_sizes_is_a_rudder_of_the_rules():
     """DNV by hand: 3.0 · 0.20114/100 · (1 + 25 · (0.48925/3)²) = 0.010046 m², shared by two."""
     two, bare = profiles.load("esso-vectwin"), {"area_m2": None, "span_m": None}
     lacking = tuple(a.model_copy(update=bare) if a.kind == "rudder" else a for a in two.actuators)
-    found, _, said = geometry_of(two.model_copy(update={"actuators": lacking}))
+    found, _, reported = geometry_of(two.model_copy(update={"actuators": lacking}))
     area = 3.0 * 0.201 / 100.0 * (1.0 + 25.0 * (0.489 / 3.0) ** 2)
     assert [r.area for r in found.rudders] == pytest.approx([area / 2.0] * 2)
     assert [r.span for r in found.rudders] == pytest.approx([(1.5 * area / 2.0) ** 0.5] * 2)
-    assert sum("rudder_port: area" in sentence for sentence in said) == 1
+    assert sum("rudder_port: area" in sentence for sentence in reported) == 1
     single = profiles.load("esso-osaka")  # whose own rudder is 0.0106 m²
     lacking = tuple(
         a.model_copy(update=bare) if a.kind == "rudder" else a for a in single.actuators
@@ -277,7 +277,7 @@ def test_a_rudder_without_sizes_is_a_rudder_of_the_rules():
     assert rudder.span == pytest.approx(own.span_m, rel=0.25)
 
 
-def test_a_rudder_of_known_span_has_the_usual_chord():
+def test_a_rudder_of_known_span_has_the_common_chord():
     ship = profiles.load("esso-osaka")
     lacking = tuple(
         a.model_copy(update={"area_m2": None, "span_m": 0.15}) if a.kind == "rudder" else a

@@ -84,20 +84,20 @@ def test_it_is_trained_evaluated_compared_and_diagnosed(kt, tmp_path):
     store, run = tmp_path / "store", tmp_path / "run"
     assert call("ingest", tmp_path / "logs", "--store", store)[0] == 0
     both = ("--voyages", "trip_1", "--voyages", "trip_2")
-    code, said, _ = call("train", "--model", "kt", "--store", store, "--out", run, *both,
+    code, reported, _ = call("train", "--model", "kt", "--store", store, "--out", run, *both,
                          "--window", 25, "--folds", 2)  # fmt: skip
-    assert code == 0 and "kt identified on ref" in said and "turning ability" in said
-    code, _, said = call("train", "--model", "kt", "--store", store, "--out", tmp_path / "w",
+    assert code == 0 and "kt identified on ref" in reported and "turning ability" in reported
+    code, _, reported = call("train", "--model", "kt", "--store", store, "--out", tmp_path / "w",
                          "--width", 8)  # fmt: skip
-    assert code == 2 and "says nothing to a physical model" in said
+    assert code == 2 and "says nothing to a physical model" in reported
     opened = load_model.load(run)
     assert opened.identified()["name"].to_list() == list(opened.simulator(0).model.names)
     test = ("--store", store, "--voyages", "trip_3")
-    code, said, _ = call("compare", run, *test, "--save", tmp_path / "kt.rrd")
-    assert code == 0 and "kt identified on ref" in said and (tmp_path / "kt.rrd").is_file()
+    code, reported, _ = call("compare", run, *test, "--save", tmp_path / "kt.rrd")
+    assert code == 0 and "kt identified on ref" in reported and (tmp_path / "kt.rrd").is_file()
     to = tmp_path / "d.json"
-    code, said, _ = call("diagnose", run, *test, "--out", tmp_path / "d", "--json", to)
-    assert code == 0 and "causes that change forces cannot be told" in said
+    code, reported, _ = call("diagnose", run, *test, "--out", tmp_path / "d", "--json", to)
+    assert code == 0 and "causes that change forces cannot be told" in reported
     answer = json.loads(to.read_text(encoding="utf-8"))
     forces = {c["name"] for c in answer["unavailable"] if c["reason"].startswith("a K-T model")}
     assert {"fouling", "current"} <= forces and "heading_offset" not in forces

@@ -1,4 +1,4 @@
-"""Causes from a user's own file: taken in, or refused with what to mend."""
+"""Causes from a user's own file: accepted, or refused with what to mend."""
 
 import dataclasses
 

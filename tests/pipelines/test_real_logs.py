@@ -21,11 +21,11 @@ def trials(shared_data, tmp_path_factory):
     work = tmp_path_factory.mktemp("frt")
     source = shared_data / "frt-ds-esso"
     tables = sorted(source.glob("*/*.parquet"))
-    code, _, said = call("convert", *tables, "--profile", "esso-osaka", "--out", work / "logs")
-    assert code == 0, said
-    code, _, said = call("ingest", work / "logs", "--store", work / "store", "--json",
+    code, _, reported = call("convert", *tables, "--profile", "esso-osaka", "--out", work / "logs")
+    assert code == 0, reported
+    code, _, reported = call("ingest", work / "logs", "--store", work / "store", "--json",
                          work / "ingest.json")  # fmt: skip
-    assert code == 0, said
+    assert code == 0, reported
     return SimpleNamespace(
         store=Store(work / "store"), path=work, source=source,
         runs=pl.read_csv(source / "runs.csv"),
@@ -64,7 +64,7 @@ def test_the_trials_give_the_119_windows_and_one_pair_of_twins(trials):
     ]
 
 
-def test_held_samples_and_lost_seconds_are_found_and_said(trials):
+def test_held_samples_and_lost_seconds_are_found_and_reported(trials):
     held = [f for f in trials.report["turn_14-Oct-2020_14_08_51"]["findings"]
             if f["kind"] == "held" and f["unit"] == "s"]  # fmt: skip
     assert max(f["value"] for f in held) == pytest.approx(2.5, abs=0.3)  # 25 equal positions
@@ -80,13 +80,15 @@ def test_a_quick_training_beats_a_quadratic_regression_on_the_published_split(tr
     names = [n for n in train["run_id"] if n != held]
     store = ("--store", trials.store.path)
     chosen = [a for n in names for a in ("--voyages", n)]
-    code, _, said = call("train", *store, *chosen, "--validation", held, "--out", tmp_path / "run",
-                         "--width", 32, "--epochs", 40)  # fmt: skip
-    assert code == 0, said
+    code, _, reported = call("train", *store, *chosen, "--validation", held, "--out",
+                             tmp_path / "run", "--width", 32, "--epochs", 40)  # fmt: skip
+    assert code == 0, reported
     test = trials.runs.filter(pl.col("wakita2022_test"))["run_id"]
     chosen = [a for n in test for a in ("--voyages", n)]
-    code, _, said = call("evaluate", tmp_path / "run", *store, *chosen, "--json", tmp_path / "e")
-    assert code == 0, said
+    code, _, reported = call(
+        "evaluate", tmp_path / "run", *store, *chosen, "--json", tmp_path / "e"
+    )
+    assert code == 0, reported
     answer = json.loads((tmp_path / "e").read_text())
     assert answer["windows"] == 15
     assert answer["loss"] < 3188
@@ -98,15 +100,15 @@ def test_a_quick_training_beats_a_quadratic_regression_on_the_published_split(tr
 def other_ship(data, profile, tables, tmp_path, window):
     """Any ship through convert, ingest, train and evaluate."""
     store = ("--store", tmp_path / "store")
-    code, _, said = call("convert", *tables, "--profile", profile, "--out", tmp_path / "logs")
-    assert code == 0, said
-    code, _, said = call("ingest", tmp_path / "logs", "--profile", profile, *store)
-    assert code == 0, said
-    code, _, said = call("train", *store, "--out", tmp_path / "run", "--window", window, "--width",
-                         32, "--epochs", 60)  # fmt: skip
-    assert code == 0, said
-    code, _, said = call("evaluate", tmp_path / "run", *store, "--json", tmp_path / "e")
-    assert code == 0, said
+    code, _, reported = call("convert", *tables, "--profile", profile, "--out", tmp_path / "logs")
+    assert code == 0, reported
+    code, _, reported = call("ingest", tmp_path / "logs", "--profile", profile, *store)
+    assert code == 0, reported
+    code, _, reported = call("train", *store, "--out", tmp_path / "run", "--window", window,
+                             "--width", 32, "--epochs", 60)  # fmt: skip
+    assert code == 0, reported
+    code, _, reported = call("evaluate", tmp_path / "run", *store, "--json", tmp_path / "e")
+    assert code == 0, reported
     return json.loads((tmp_path / "e").read_text())
 
 
@@ -129,10 +131,12 @@ def test_a_tanker_in_a_tank_whose_rudder_counts_the_other_way(shared_data, tmp_p
 
 def test_four_azimuth_thrusters_dumped_topic_by_topic(shared_data, tmp_path):
     source = shared_data / "milliampere1_physical" / "qp1"
-    code, _, said = call("convert", source, "--profile", "milliampere", "--out", tmp_path / "logs")
-    assert code == 0, said
-    code, _, said = call("ingest", tmp_path / "logs", "--store", tmp_path / "store")
-    assert code == 0, said
+    code, _, reported = call(
+        "convert", source, "--profile", "milliampere", "--out", tmp_path / "logs"
+    )
+    assert code == 0, reported
+    code, _, reported = call("ingest", tmp_path / "logs", "--store", tmp_path / "store")
+    assert code == 0, reported
     store = Store(tmp_path / "store")
     rows = store.tables(["qp1"])[0].collect().drop_nulls()
     assert rows.height > 3000

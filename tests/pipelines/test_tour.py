@@ -11,7 +11,7 @@ import shiplog
 from shiplog.exceptions import ShiplogError
 
 ROOT = Path(__file__).parents[2]
-# Name in the notebook → sample log. A diagnosis takes as long as what is usual is long: 500 s of
+# Name in the notebook → sample log. A diagnosis takes as long as its nominal campaign is: 500 s of
 # the same season stand for the 1800 s of voyage_2.
 LOGS = {
     "voyage_1": "voyage_1", "voyage_2": "voyage_3", "voyage_6": "voyage_6",
@@ -77,7 +77,7 @@ def test_what_was_made_opens_again(tour):
         assert shiplog.load(folder / "tour" / "mmg2").name == "mmg2"
 
 
-def test_what_is_not_there_is_said(tmp_path):
+def test_what_is_not_there_is_reported(tmp_path):
     with pytest.raises(ShiplogError, match="no voyage in the store"):
         shiplog.open_store(tmp_path / "none")
     with pytest.raises(AttributeError, match="has no attribute 'fit'"):

@@ -82,27 +82,29 @@ def scored(run, store, to) -> dict:
 def published(store):
     """Nothing fitted: run folder and what was reported of it."""
     out = store.parent / "published"
-    code, said, _ = train(store, out, "--model", "mmg", "--no-fit", *BOTH, *HULL)
+    code, reported, _ = train(store, out, "--model", "mmg", "--no-fit", *BOTH, *HULL)
     assert code == 0
-    return out, said
+    return out, reported
 
 
 @pytest.fixture(scope="module")
 def fitted(store):
     """All of hull and wind identified, three seeds asked for: run folder, text and JSON."""
     out, to = store.parent / "fitted", store.parent / "fitted.json"
-    code, said, _ = train(store, out, "--model", "mmg", *BOTH, *HULL, "--seeds", 3, "--json", to)
+    code, reported, _ = train(
+        store, out, "--model", "mmg", *BOTH, *HULL, "--seeds", 3, "--json", to
+    )
     assert code == 0
-    return out, said, answer(to)
+    return out, reported, answer(to)
 
 
 # ---------------------------------------------------------------- as published
 
 
 def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_path):
-    run, said = published
-    assert "mmg as given, without propeller, rudder" in said
-    assert "over the 6 windows named, with nothing fitted" in said
+    run, reported = published
+    assert "mmg as given, without propeller, rudder" in reported
+    assert "over the 6 windows named, with nothing fitted" in reported
     content = scored(run, store, tmp_path / "e.json")
     assert math.isfinite(content["loss"]) and content["loss"] > 0.0
     assert len(content["seeds"]) == 1 and content["windows"] == 3
@@ -124,17 +126,17 @@ def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
     assert load_model.load(kept, causes).label == "mmg with tide_gate"
     was = ran.read_text()
     for command in ("evaluate", "compare"):
-        code, _, said = call(command, kept, "--store", store, "--voyages", "trip_3")
-        assert code == 1 and "'tide_gate'" not in said and "tide_gate" in said
-        assert f"--cause FILE; a copy to look over first: {kept / 'extension-0.py'}" in said
+        code, _, reported = call(command, kept, "--store", store, "--voyages", "trip_3")
+        assert code == 1 and "'tide_gate'" not in reported and "tide_gate" in reported
+        assert f"--cause FILE; a copy to look over first: {kept / 'extension-0.py'}" in reported
     assert ran.read_text() == was
     with pytest.raises(RunError, match="--cause"):
         load_model.load(kept).models()
     again = load_model.load(kept, user.load([mine])).models()[0]
     assert again.theta == pytest.approx(after.theta)
-    code, said, _ = call("evaluate", kept, "--store", store, "--voyages", "trip_3",
+    code, reported, _ = call("evaluate", kept, "--store", store, "--voyages", "trip_3",
                          "--cause", mine)  # fmt: skip
-    assert code == 0 and "mmg with tide_gate" in said
+    assert code == 0 and "mmg with tide_gate" in reported
     assert ran.read_text() == was + "xx"
 
 
@@ -182,11 +184,11 @@ def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
     assert run.config.physics.parameters == "empirical formulas from the particulars"
 
 
-def test_a_force_left_out_is_said_and_gone(store, tmp_path):
-    code, said, _ = train(
+def test_a_force_left_out_is_reported_and_gone(store, tmp_path):
+    code, reported, _ = train(
         store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
     )
-    assert code == 0 and "mmg as given, without propeller, rudder, wind in" in said
+    assert code == 0 and "mmg as given, without propeller, rudder, wind in" in reported
     names = load_model.load(tmp_path / "r").identified()["name"]
     assert {name.split(".")[0] for name in names} == {"body", "hull"}
 
@@ -195,7 +197,7 @@ def test_a_force_left_out_is_said_and_gone(store, tmp_path):
 
 
 def test_the_answer_says_what_was_found(fitted):
-    run, said, content = fitted
+    run, reported, content = fitted
     assert set(content) == {"contract", "run", "label", "windows", "notes", "parameters", "split"}
     assert content["contract"] == 1 and content["windows"] == 6
     assert content["label"] == "mmg identified on ref, without propeller, rudder"
@@ -206,7 +208,7 @@ def test_the_answer_says_what_was_found(fitted):
     assert first["name"] == "body.m_x" and first["symbol"] == "m'_x"
     assert content["split"]["training"] == ["trip_1", "trip_2"]
     assert any("held-out voyages" in s for s in content["notes"])
-    assert f"Next: shiplog evaluate {run}" in said and "| hull.y_v" in said
+    assert f"Next: shiplog evaluate {run}" in reported and "| hull.y_v" in reported
 
 
 def test_the_training_windows_fit_better_than_at_the_start(fitted):
@@ -288,11 +290,11 @@ def test_only_the_free_parameters_move(store, tmp_path):
 
 def test_one_voyage_leaves_the_gain_untested(store, tmp_path):
     run = tmp_path / "one"
-    code, said, _ = train(
+    code, reported, _ = train(
         store, run, "--model", "mmg", "--voyages", "trip_1", "--free", "wind.*", *HULL
     )
-    assert code == 0 and "One voyage only: nothing was held out" in said
-    assert "held-out" not in said
+    assert code == 0 and "One voyage only: nothing was held out" in reported
+    assert "held-out" not in reported
     assert not (run / "cross_validation.parquet").exists()
     assert load_model.load(run).band() is None
     content = scored(run, store, tmp_path / "e.json")
@@ -315,17 +317,17 @@ def test_a_validation_voyage_is_where_the_band_comes_from(store, tmp_path):
 
 @pytest.fixture(scope="module")
 def validated(store):
-    """Learned from one voyage, validated on another: run folder and text."""
+    """Identified from one voyage, validated on another: run folder and text."""
     out = store.parent / "validated"
-    code, said, _ = train(store, out, "--model", "mmg", "--voyages", "trip_1", "--validation",
+    code, reported, _ = train(store, out, "--model", "mmg", "--voyages", "trip_1", "--validation",
                           "trip_2", "--free", "hull.*", *HULL)  # fmt: skip
     assert code == 0
-    return out, said
+    return out, reported
 
 
 def test_validation_voyages_choose_the_ridge_and_it_is_kept(validated):
-    run, said = validated
-    (line,) = [s for s in said.splitlines() if s.startswith("Ridge of ")]
+    run, reported = validated
+    (line,) = [s for s in reported.splitlines() if s.startswith("Ridge of ")]
     assert "3 validation windows" in line
     chosen = answer(run / "provenance.json")["chosen"]["ridge"]
     assert list(chosen["held_out_loss"]) == ["0.25", "0.5", "1", "2", "4", "8"]
@@ -334,11 +336,11 @@ def test_validation_voyages_choose_the_ridge_and_it_is_kept(validated):
 
 
 def test_without_validation_voyages_the_ridge_is_the_plausible_one(fitted):
-    run, said, content = fitted
+    run, reported, content = fitted
     assert answer(run / "provenance.json")["chosen"] == {
         "ridge": {"value": 1.0, "held_out_loss": {}}
     }
-    assert "Ridge of" not in said and not any("Ridge" in s for s in content["notes"])
+    assert "Ridge of" not in reported and not any("Ridge" in s for s in content["notes"])
 
 
 def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
@@ -354,9 +356,9 @@ def test_the_run_holds_what_was_chosen(store, validated, tmp_path, monkeypatch):
 
     monkeypatch.setattr(identification, "identify", heard)
     run = tmp_path / "firm"
-    code, said, _ = train(store, run, "--model", "mmg", *BOTH, "--validation", "trip_3",
+    code, reported, _ = train(store, run, "--model", "mmg", *BOTH, "--validation", "trip_3",
                           "--free", "hull.*", *HULL)  # fmt: skip
-    assert code == 0 and "Ridge of 0.25 times the plausible spreads, chosen on 3" in said
+    assert code == 0 and "Ridge of 0.25 times the plausible spreads, chosen on 3" in reported
     assert answer(run / "provenance.json")["chosen"]["ridge"]["value"] == 0.25
     assert [factor for factor, _ in asked[:6]] == [1.0, 2.0, 4.0, 8.0, 0.5, 0.25]
     assert asked[6:] == [(0.25, True)] * 2  # a fold begins at the start: it knows nothing of all
@@ -373,9 +375,9 @@ def test_a_validation_voyage_without_a_window_is_refused(logs, tmp_path):
     simulated_ship.write_voyage(tmp_path / "logs" / "short.mcap", short, seed=9, start=begun)
     shutil.copy(logs / "trip_1.mcap", tmp_path / "logs")
     assert call("ingest", tmp_path / "logs", "--store", tmp_path / "store")[0] == 0
-    code, _, said = train(tmp_path / "store", tmp_path / "r", "--model", "mmg", "--voyages",
+    code, _, reported = train(tmp_path / "store", tmp_path / "r", "--model", "mmg", "--voyages",
                           "trip_1", "--validation", "short", *HULL)  # fmt: skip
-    assert code == 1 and "No window of 25 s in short" in said and "--window" in said
+    assert code == 1 and "No window of 25 s in short" in reported and "--window" in reported
 
 
 # ---------------------------------------------------------------- what is refused
@@ -393,41 +395,41 @@ def test_a_validation_voyage_without_a_window_is_refused(logs, tmp_path):
     ],
 )
 def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, words):
-    code, _, said = train(store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, *arguments)
+    code, _, reported = train(store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, *arguments)
     assert code == 1
     for word in words:
-        assert word in said
+        assert word in reported
     assert not list(tmp_path.iterdir())
 
 
 def test_a_window_longer_than_every_voyage_is_refused(store, tmp_path):
-    code, _, said = call("train", "--store", store, "--out", tmp_path / "r", "--model", "mmg",
+    code, _, reported = call("train", "--store", store, "--out", tmp_path / "r", "--model", "mmg",
                          "--window", 400, *BOTH, *HULL)  # fmt: skip
-    assert code == 1 and "longer than every" in said
+    assert code == 1 and "longer than every" in reported
     assert not list(tmp_path.iterdir())
 
 
 def test_a_hybrid_has_to_be_fitted(store, tmp_path):
-    code, _, said = train(store, tmp_path / "r", "--model", "hybrid", "--no-fit", *BOTH)
-    assert code == 2 and "has to be fitted" in said and "--model mmg" in said
+    code, _, reported = train(store, tmp_path / "r", "--model", "hybrid", "--no-fit", *BOTH)
+    assert code == 2 and "has to be fitted" in reported and "--model mmg" in reported
     assert not list(tmp_path.iterdir())
 
 
 def test_a_hybrid_needs_a_second_voyage(store, tmp_path):
-    code, _, said = train(store, tmp_path / "r", "--model", "hybrid", "--voyages", "trip_1",
+    code, _, reported = train(store, tmp_path / "r", "--model", "hybrid", "--voyages", "trip_1",
                           "--free", "wind.*", *HULL)  # fmt: skip
-    assert code == 1 and "needs a voyage to hold out" in said and "--validation" in said
+    assert code == 1 and "needs a voyage to hold out" in reported and "--validation" in reported
     assert not (tmp_path / "r").exists()
 
 
 def test_wind_coefficients_need_a_wind_sensor(fitted, calm, tmp_path):
     toml = fitted[0] / "seed0" / "parameters.toml"
     given = ("--model", "mmg", "--no-fit", "--parameters", toml, *BOTH, *HULL)
-    code, _, said = train(calm, tmp_path / "r", *given)
-    assert code == 1 and "has a wind force" in said and "--without wind" in said
+    code, _, reported = train(calm, tmp_path / "r", *given)
+    assert code == 1 and "has a wind force" in reported and "--without wind" in reported
     assert not list(tmp_path.iterdir())
-    code, said, _ = train(calm, tmp_path / "r", *given, "--without", "wind")
-    assert code == 0 and "without propeller, rudder, wind" in said
+    code, reported, _ = train(calm, tmp_path / "r", *given, "--without", "wind")
+    assert code == 0 and "without propeller, rudder, wind" in reported
 
 
 # ---------------------------------------------------------------- the hybrid
@@ -448,9 +450,9 @@ def hybrid(store):
 
 
 def test_a_hybrid_is_judged_on_held_out_voyages_and_says_so(hybrid):
-    run, said = hybrid
+    run, reported = hybrid
     assert run.label == "hybrid identified on ref, without propeller, rudder, wind"
-    (sentence,) = [s for s in said if s.startswith("Seed 0")]
+    (sentence,) = [s for s in reported if s.startswith("Seed 0")]
     assert "adds nothing that survives" in sentence or "on 6 held-out windows" in sentence
     assert run.band() is not None
 

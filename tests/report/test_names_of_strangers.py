@@ -48,7 +48,7 @@ def test_a_name_stays_in_its_cell():
 
 
 @pytest.mark.parametrize("name", [HTML, PICTURE, LINK, f"a {HTML} b"])
-def test_markdown_of_a_name_is_shown_and_not_done(name):
+def test_markdown_of_a_name_is_displayed_and_not_done(name):
     assert harmless(inert(name))
     assert (
         inert("L 12 of season2_1 (90 % band), *d* > 3") == "L 12 of season2_1 (90 % band), *d* > 3"
@@ -102,9 +102,9 @@ def test_the_viewers_pages(monkeypatch, tmp_path):
 def test_a_log_whose_name_breaks_a_line_is_refused(tmp_path, name):
     taken = ingest(sailing.write(tmp_path / "one.mcap"), sailing.profile())
     store = Store(tmp_path / "store")
-    with pytest.raises(StoreError) as told:
+    with pytest.raises(StoreError) as raised:
         store.add(replace(taken, name=name))
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"The name {name!r} of the log holds a line end or a control character.\n"
         "  rename the log file."
     )

@@ -34,7 +34,7 @@ def test_the_ratio_is_of_pairs_and_its_interval_students():
     assert row["finding"] == statements.UNCLEAR  # it may well be 1
 
 
-def test_a_statement_holds_fails_or_is_not_shown():
+def test_a_statement_holds_fails_or_is_unclear():
     ref = [100.0, 101.0, 99.0, 100.0, 102.0]
     frame = losses(
         ref=ref, sli2=[0.5 * r for r in ref[:-1]] + [52.0],  # half of it, every time

@@ -426,7 +426,7 @@ def test_an_axis_carries_two_labels():
     assert timeline.with_two_labels(-3.0, 3.6) == (-3.0, 3.6)  # ten would flatten it
 
 
-def test_without_wind_nothing_of_wind_is_shown(compared, tmp_path):
+def test_without_wind_nothing_of_wind_is_displayed(compared, tmp_path):
     winds = ("wind_speed", "wind_angle")
     calm = replace(
         compared,
@@ -460,7 +460,7 @@ def test_what_cannot_be_written_whole_is_not_there(compared, tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_disk_that_is_full_is_said_and_leaves_no_half_a_recording(compared, tmp_path):
+def test_a_disk_that_is_full_is_reported_and_leaves_no_half_a_recording(compared, tmp_path):
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
@@ -487,7 +487,7 @@ def test_a_recording_that_is_not_there_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["window", "web"])
-def test_every_program_is_told_to_listen_on_this_machine_only(saved, monkeypatch, how):
+def test_every_program_is_made_to_listen_on_this_machine_only(saved, monkeypatch, how):
     started = []
 
     class Program:

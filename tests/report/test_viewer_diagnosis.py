@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 from shiplog.channels import STATE
 from shiplog.report import viewer
-from shiplog.report.diagnosis_data import AFTER, BEFORE, ERRORS, TRACKS, Exhibit
+from shiplog.report.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.report.viewer import diagnosis
 
 BLUE, ORANGE, BLACK = 0x0072B2FF, 0xD55E00FF, 0x191919FF
@@ -67,7 +67,7 @@ def exhibit():
         tracks=pl.concat(
             [tracks(v, model, u) for model, u in ((BEFORE, 0.8), (AFTER, 0.6)) for v in both]
         ),
-        errors=pl.DataFrame(rows, schema=ERRORS, orient="row"),
+        errors=pl.DataFrame(rows, schema=ERROR_COLUMNS, orient="row"),
         report="# Diagnosis\n\n    RᵀV of 0.1 m/s\n",
     )
 
@@ -114,7 +114,7 @@ def views(containers):
             yield from views(part.contents)
 
 
-def test_the_window_that_improved_most_is_told_first(exhibit):
+def test_the_window_that_improved_most_comes_first(exhibit):
     assert exhibit.telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]
     unnamed = exhibit.errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
     telling = replace(exhibit, errors=unnamed).telling
@@ -125,7 +125,7 @@ def test_the_window_that_improved_most_is_told_first(exhibit):
     ("axis", "lacks", "sd", "named"),
     [("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw", 0.5, 0.1, 0.25)],
 )
-def test_what_the_model_lacks_is_beside_the_named_force(saved, axis, lacks, sd, named):
+def test_the_missing_force_is_drawn_with_the_named_force(saved, axis, lacks, sd, named):
     path = f"/unexplained/home/{axis}"
     values = scalars(saved, f"{path}/lacks")
     assert len(values) == 89 + 1 and np.isnan(values[10])  # the gap is not bridged
@@ -165,7 +165,7 @@ def test_a_hull_lies_nowhere_before_its_window(saved):
     assert hull["sim_time"].dt.total_seconds().to_list() == [100]
 
 
-def test_each_voyage_has_its_tab_with_units_and_colours_said(exhibit):
+def test_each_voyage_has_its_tab_with_units_and_colours_reported(exhibit):
     tabs = diagnosis.blueprint(diagnosis.pictured(exhibit))
     assert [tab.name for tab in tabs] == ["out", "home"]
     assert [name for name, _ in views(tabs[:1])] == [
@@ -197,7 +197,10 @@ def test_a_verdict_that_names_nothing_shows_what_is_left(exhibit, tmp_path):
 
 def test_too_short_for_a_window_no_panel_is_empty(exhibit, tmp_path):
     short = replace(
-        exhibit, tracks=pl.DataFrame(schema=TRACKS), errors=pl.DataFrame(schema=ERRORS), extended=()
+        exhibit,
+        tracks=pl.DataFrame(schema=TRACKS),
+        errors=pl.DataFrame(schema=ERROR_COLUMNS),
+        extended=(),
     )
     viewer.save_diagnosis(short, tmp_path / "short.rrd")
     names = [name for name, _ in views(diagnosis.blueprint(diagnosis.pictured(short)))]

@@ -90,7 +90,7 @@ def wind_from_starboard(data: WindowSeries, windows: pl.DataFrame) -> np.ndarray
     [(astern, ["astern"]), (in_the_north_east, ["in the north-east of its waters"]),
      (late, ["in the last third of the campaign"]), (wind_from_starboard, ["wind from starboard"])],
 )  # fmt: skip
-def test_where_it_is_wrong_is_said(driven, regime, words):
+def test_where_it_is_wrong_is_reported(driven, regime, words):
     data, windows = driven
     error, inside = little(data), regime(data, windows)
     error[..., 5] = np.where(inside, np.radians(0.5), error[..., 5])
@@ -106,7 +106,7 @@ def test_where_it_is_wrong_is_said(driven, regime, words):
     assert others == {"surge": "everywhere alike", "sway": "everywhere alike"}
 
 
-def test_two_conditions_are_said_where_both_are_needed(driven):
+def test_two_conditions_are_reported_where_both_are_needed(driven):
     data, windows = driven
     error = little(data)
     both = astern(data, windows) & late(data, windows)

@@ -285,7 +285,7 @@ def test_derivatives_of_the_mmg_are_the_central_differences():
     """Ahead, astern and backing, so that every coefficient has something to say; and from rest,
     in a calm, where roots and angles have no slope of their own."""
     g, _, _ = geometry_of(profiles.load("esso-osaka"))
-    published = parameters.load(parameters.beside("esso-osaka"), g)
+    published = parameters.load(parameters.published_file("esso-osaka"), g)
     data = sailed(8, 12, 5, (0.3, 9.0))
     for window, ahead, n in ((1, 0.5, -1), (2, 1, -0.5), (3, -1, 1), (4, -1, -1)):
         data.measured[window, :, 1] *= ahead

@@ -331,7 +331,7 @@ def test_the_forces_of_a_ship_without_wind_sensor_are_those_of_a_calm(data):
 
 @pytest.fixture(scope="module")
 def pulled(physics, theta, data) -> WindowSeries:
-    """The MMG and a known small force beside it, as if the thruster were slightly askew."""
+    """The MMG and a known small force in addition, as if the thruster were slightly askew."""
     state = data.measured[:, 0].copy()
     path = [state]
     for i in range(SIZE - 1):

@@ -205,7 +205,7 @@ def test_the_strongest_trades_are_named_and_the_rest_counted():
     assert len(output) == 7 and output[-1] == "4 more pairs correlate above 0.75."
 
 
-def test_bounds_are_respected_and_said(exact):
+def test_bounds_are_respected_and_reported(exact):
     low, high = np.array([0.1, -1.0, 0.0]), np.array([1.0, 1.0, 1.0])  # the true drag is 0.05
     spread = np.full(3, 0.5)
     stopped = identify(Boat(), START, spread, exact, bounds=(low, high))
@@ -295,7 +295,7 @@ def test_a_step_too_far_is_drawn_back(growing):
 
 
 @pytest.mark.parametrize("most", [1, 2])
-def test_where_the_evaluations_run_out_the_best_is_kept_and_said(blurred, most):
+def test_where_the_evaluations_run_out_the_best_is_kept_and_reported(blurred, most):
     tired = identify(Boat(), START, WIDE, blurred, most=most, rounds=1)
     assert not tired.converged
     assert f"after {most} evaluations" in tired.message
@@ -415,7 +415,7 @@ def test_one_voyage_leaves_nothing_to_hold_out(exact):
     assert cross_validate(lambda part: pytest.fail("fitted"), exact, ["a"] * COUNT) is None
 
 
-def test_each_of_two_voyages_is_rolled_out_with_what_the_other_said():
+def test_each_of_two_voyages_is_rolled_out_with_what_the_other_reported():
     """Boat a with one drag, boat b with another, windows in turns: each gets the other's."""
     groups = ["a", "b"] * (COUNT // 2)
     first, second = np.array([0.05, 0.02, 0.7]), np.array([0.15, 0.04, 0.7])

@@ -114,9 +114,9 @@ def test_a_folder_that_no_training_began_is_not_removed(begun, tmp_path):
     (tmp_path / "other.partial").mkdir()
     diary = tmp_path / "other.partial" / "diary.txt"
     diary.write_text("at sea")
-    with pytest.raises(RunError) as told:
+    with pytest.raises(RunError) as raised:
         run_folder.create(tmp_path / "other", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"{diary.parent} is there, and is no run that was begun: there is no config.toml in it.\n"
         f"  choose another --out, or move {diary.parent} away."
     )
@@ -138,9 +138,9 @@ def test_nothing_of_a_run_appears_before_all_of_it(begun, tmp_path, monkeypatch)
         return write(frame, path, *args, **kwargs)
 
     monkeypatch.setattr(pl.DataFrame, "write_parquet", fills_up)
-    with pytest.raises(OSError, match="No space left on device") as told:
+    with pytest.raises(OSError, match="No space left on device") as raised:
         run_folder.create(tmp_path / "other", CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
-    assert told.value.filename == str(tmp_path / "other.partial")
+    assert raised.value.filename == str(tmp_path / "other.partial")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.partial"]
 
 

@@ -203,7 +203,7 @@ def slow(parts):
     return changed(parts, "/gyro", heading_deg=heading)
 
 
-def test_a_slow_coarse_log_is_said_to_be_one_and_is_not_full_of_faults(voyage):
+def test_a_slow_coarse_log_is_reported_to_be_one_and_is_not_full_of_faults(voyage):
     done = voyage(slow(sailing.series(300.0)))
     assert kinds(done.report) == []
     assert (done.table["quality"] == 0).mean() > 0.99
@@ -308,7 +308,7 @@ def restamped(parts, topic, rows, by):
     ids=["ten days late", "ten days early", "1970", "week rollover", "an hour", "two minutes",
          "starts in 1970"],
 )  # fmt: skip
-def test_a_stamp_that_cannot_belong_is_left_out_and_said(voyage, topic, rows, by):
+def test_a_stamp_that_cannot_belong_is_left_out_and_reported(voyage, topic, rows, by):
     parts = sailing.series()
     clean = voyage(parts)
     done = voyage(restamped(parts, topic, rows, by))

@@ -91,7 +91,7 @@ def test_a_value_that_is_missing_is_a_gap():
     assert found.state[50, 2] == pytest.approx(5.0)
 
 
-def test_a_jump_starts_a_stretch_and_is_seen():
+def test_a_jump_starts_a_stretch_and_is_found():
     found = read(table(100, quality=faulty(100, (30, 31), mark=Quality.JUMP)))
     assert np.flatnonzero(found.starts).tolist() == [0, 30]
     assert found.measured.all()

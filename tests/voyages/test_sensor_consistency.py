@@ -99,7 +99,7 @@ def test_a_fresh_clean_voyage_has_nothing_to_say(logged, seed):
     assert logged(seed, 600.0) == {}
 
 
-def test_a_late_yaw_rate_is_told_from_its_bias_and_its_scale(logged):
+def test_a_late_yaw_rate_is_distinguished_from_its_bias_and_its_scale(logged):
     faults = logged(
         41, clock_offset={"yaw_rate": 0.6}, yaw_rate_bias=0.2 * DEGREE, yaw_rate_scale=0.04
     )

@@ -95,7 +95,7 @@ def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_pa
     assert "1 of 4 voyages are shorter than 40 s; `--window 30` uses all" in caplog.text
 
 
-def test_no_voyage_long_enough_is_said_with_what_would_do(tmp_path):
+def test_no_voyage_long_enough_is_reported_with_what_would_do(tmp_path):
     store = sailing.store_of(tmp_path, ["a", "b"], seconds=35.0)
     with pytest.raises(StoreError, match="No voyage has a window of 100 s") as caught:
         choose_split(store, (), (), "ref", 100)

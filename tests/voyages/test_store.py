@@ -76,9 +76,9 @@ def test_a_failed_write_leaves_no_voyage(tmp_path, voyage, monkeypatch, full):
 
     taken = voyage("two")
     monkeypatch.setattr(pl.DataFrame, "write_parquet", refuse)
-    with pytest.raises(StoreError) as told:
+    with pytest.raises(StoreError) as raised:
         store.add(taken)
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"The voyage 'two' cannot be written into the store {store.path}: No space left on device."
         "\n  give a --store on a disk with room that you may write to; what is in the store is as "
         "it was."
@@ -269,14 +269,14 @@ def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, second):
         "two" if second == "another log" else "one",
         40.0 if second == "another log of that name" else 30.0,
     )
-    told = []
+    logged = []
 
     class Release(logging.Handler):
         def emit(self, record):
-            told.append(record.getMessage())
+            logged.append(record.getMessage())
             go.touch()
 
-    monkeypatch.setattr(stores, "SILENT_S", 0.05)
+    monkeypatch.setattr(stores, "SILENT_WAIT_S", 0.05)
     monkeypatch.setattr(stores.log, "handlers", [Release()])
     monkeypatch.setattr(stores.log, "level", logging.INFO)
     first.start()
@@ -294,7 +294,7 @@ def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, second):
         go.touch()
         first.join()
     assert first.exitcode == 0
-    assert told == [f"waiting for another process that writes into the store {store.path}"]
+    assert logged == [f"waiting for another process that writes into the store {store.path}"]
     names = ["one", "two"] if second == "another log" else ["one"]
     assert [e.name for e in store.entries()] == names
     assert store.tables(["one"])[0].collect().height == store.report("one").rows

@@ -26,7 +26,7 @@ from shiplog import jit_cache, profile_file
 from shiplog.diagnosis import linearisation
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.models.mmg.parameters import beside, load
+from shiplog.models.mmg.parameters import load, published_file
 from shiplog.training.queue import cores
 
 SEGMENTS, NODES = 64, 151  # of one call, as a diagnosis makes them
@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     rounds = parser.parse_args().rounds
     model = MMG(geometry_of(profile_file.load(SHIP))[0])
-    path = beside(SHIP)
+    path = published_file(SHIP)
     assert path is not None, f"{SHIP} has no parameter file"
     theta = jnp.asarray(load(path, model.geometry).values)
     rng = np.random.default_rng(0)

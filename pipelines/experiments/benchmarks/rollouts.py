@@ -24,7 +24,7 @@ from shiplog import profile_file
 from shiplog.channels import VELOCITY_IN_STATE
 from shiplog.models.mmg.geometry import geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.models.mmg.parameters import Parameters, beside, load
+from shiplog.models.mmg.parameters import Parameters, load, published_file
 from shiplog.simulation.sensitivities import WindowSeries, linearised, normal, padded, rollout
 from shiplog.training.output_error import Identified, identify
 from shiplog.training.queue import cores
@@ -203,7 +203,7 @@ def main() -> None:
     options = parser.parse_args()
 
     model = MMG(geometry_of(profile_file.load(SHIP))[0])
-    path = beside(SHIP)
+    path = published_file(SHIP)
     assert path is not None, f"{SHIP} has no parameter file"
     known = load(path, model.geometry)
     theta = known.values

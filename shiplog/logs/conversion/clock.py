@@ -7,18 +7,18 @@ import polars as pl
 
 from shiplog import units
 from shiplog.exceptions import ProfileError
+from shiplog.units import SECOND_NS
 
-NANOS = 1_000_000_000
-DAY_NS = 86_400 * NANOS
+DAY_NS = 86_400 * SECOND_NS
 # A number without a unit is Unix time if it then lies between 2000 and 2100; these ranges do not
 # overlap. Anything else is seconds from a start of its own.
 UNIX = (("s", 1), ("ms", 1_000), ("us", 1_000_000), ("ns", 1_000_000_000))
 YEAR_2000, YEAR_2100 = 946_684_800, 4_102_444_800  # s
 LONGEST_STEP_S = 60.0  # no ship's motion is recorded more slowly: the numbers are not seconds
 # A date must come whole: "3/4/2024" is two days, and only the other rows can say which.
-DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
+DATE_FORMATS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
 SLASHED = ("%d/%m/%Y", "%m/%d/%Y")
-TIMES = ("%H:%M:%S%.f", "%H:%M")
+CLOCK_FORMATS = ("%H:%M:%S%.f", "%H:%M")
 
 
 def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
@@ -59,7 +59,7 @@ def dates(values: pl.Series, form: str | None = None) -> pl.Series:
         return values.cast(pl.Date).cast(pl.Datetime("ns")).to_physical()
     if values.dtype.is_numeric():
         values = values.cast(pl.Int64).cast(pl.String).str.zfill(6)
-    return _best(values, (form,) if form else (*DATES, *SLASHED), pl.Date)
+    return _best(values, (form,) if form else (*DATE_FORMATS, *SLASHED), pl.Date)
 
 
 def past_midnight(of_day: pl.Series) -> pl.Series:
@@ -122,11 +122,11 @@ def _written(values: pl.Series, form: str | None) -> pl.Series:
     texts = values.str.strip_chars().str.replace(r"^(\S+) UTC$", "${1}Z")
     clock = texts.drop_nulls().head(50)
     if len(clock) and clock.str.contains(r"^\d{1,2}:\d\d(:\d\d)?").all():
-        return _of_day(texts, TIMES)
+        return _of_day(texts, CLOCK_FORMATS)
     texts = texts.str.replace(r"^(\S+)[T ](\d{1,2}:)", "${1}T$2").str.replace(r" ?UTC$", "Z")
     zoned = texts.drop_nulls().head(50).str.contains(r"T.*(Z|[+-]\d\d:?\d\d)$").all()
     tail = "T%H:%M:%S%.f" + ("%#z" if zoned else "")
-    return _best(texts, [day + tail for day in (*DATES[:3], *SLASHED)], pl.Datetime)
+    return _best(texts, [day + tail for day in (*DATE_FORMATS[:3], *SLASHED)], pl.Datetime)
 
 
 def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:

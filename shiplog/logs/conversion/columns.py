@@ -15,23 +15,34 @@ from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.write import SCHEMAS, Series
-from shiplog.profile import LABELS, TABLE_CHANNELS, Column, Profile, Source
+from shiplog.profile import TABLE_CHANNELS, TABLE_LABELS, Column, Profile, Source
 
 log = logging.getLogger(__name__)
 
-TOPICS = {  # the contract's topic to its schema
+TOPIC_SCHEMAS = {  # the contract's topic to its schema
     "/ship/state": "shiplog.ShipState", "/wind/apparent": "shiplog.Wind", "/gyro": "shiplog.Gyro",
     "/gnss/velocity": "shiplog.GnssVelocity", "/gnss/fix": "foxglove.LocationFix",
 }  # fmt: skip
-FAMILIES = {
+FAMILY_SCHEMAS = {
     "rudder": "shiplog.Rudder",
     "propeller": "shiplog.Propeller",
     "azimuth": "shiplog.Azimuth",
     "thruster": "shiplog.Thruster",
 }
 # A topic filled in fewer rows than this is slower than its table; in more, what is empty is lost.
-SLOWER = 0.5
-NAMED = 8  # vessels that a message names
+SLOW_SHARE = 0.5
+MOST_VESSELS = 8  # vessels that a message names
+
+
+def required(profile: Profile | None, path: Path) -> Profile:
+    """The profile that a table is read by. Raises ProfileError where none was given."""
+    if profile is None:
+        raise ProfileError(
+            f"{path.name} is a table, and only a profile says what its columns are.",
+            hint=f"draft one with `shiplog profile {path} --out my-ship.toml`, look it over, "
+            "and give it with --profile.",
+        )
+    return profile
 
 
 def voyages(
@@ -55,7 +66,7 @@ def voyages(
     time = _time(frame, present)
     columns = [time.rename("time")]
     for name, column in present.items():
-        if column.channel not in LABELS:
+        if column.channel not in TABLE_LABELS:
             columns.append(_si(frame[name], column, path))
         elif column.channel == "voyage":
             columns.append(text_of(frame[name]).rename("voyage"))
@@ -108,7 +119,7 @@ def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
 
 def schema_of(topic: str, fields: Iterable[str]) -> str:
     """The contract's schema of a topic that holds no other fields, else one of its own."""
-    contract = TOPICS.get(topic) or FAMILIES.get(topic.strip("/").split("/")[0], "")
+    contract = TOPIC_SCHEMAS.get(topic) or FAMILY_SCHEMAS.get(topic.strip("/").split("/")[0], "")
     if set(fields) <= set(SCHEMAS.get(contract, ())):
         return contract
     return "shiplog.table." + plain(topic.strip("/"))
@@ -124,7 +135,7 @@ def _topic(
     topic: str, time: np.ndarray, columns: dict[str, np.ndarray], noted: dict[str, str]
 ) -> Series:
     filled = np.any([np.isfinite(values) for values in columns.values()], axis=0)
-    if filled.any() and filled.mean() < SLOWER:
+    if filled.any() and filled.mean() < SLOW_SHARE:
         time, columns = time[filled], {n: values[filled] for n, values in columns.items()}
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     rate = {"nominal_hz": f"{1e9 / step:.3g}"} if step > 0 else {}
@@ -216,7 +227,7 @@ def _of_one_vessel(
 def busiest(vessels: pl.Series) -> str:
     """The vessels with most rows, for a message."""
     counts = vessels.drop_nulls().value_counts(sort=True, name="rows")
-    named = [f"{name} ({rows} rows)" for name, rows in counts.head(NAMED).iter_rows()]
+    named = [f"{name} ({rows} rows)" for name, rows in counts.head(MOST_VESSELS).iter_rows()]
     rest = counts.height - len(named)
     return ", ".join(named) + (f", and {rest} more" if rest > 0 else "")
 

@@ -18,16 +18,17 @@ import numpy as np
 import pynmea2
 
 from shiplog.exceptions import ChannelMissing, listed
-from shiplog.logs.conversion.clock import DAY_NS, NANOS, UNIX, YEAR_2000, YEAR_2100
+from shiplog.logs.conversion.clock import DAY_NS, UNIX, YEAR_2000, YEAR_2100
 from shiplog.logs.conversion.nmea_sentences import (
     INSTEAD,
+    SENTENCE_TOPICS,
     SENTENCES,
-    TOPICS,
     NotValid,
     facts,
     family,
 )
 from shiplog.logs.write import Series
+from shiplog.units import SECOND_NS
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +46,7 @@ EPOCH = date(1970, 1, 1)
 class Rows:
     """The sentences of one topic and talker; times in ns, -1 where there is none."""
 
-    kind: str  # of nmea_sentences.TOPICS
+    kind: str  # of nmea_sentences.SENTENCE_TOPICS
     own: list[int] = field(default_factory=list)  # UTC in the sentence
     received: list[int] = field(default_factory=list)
     place: list[int] = field(default_factory=list)  # which sentence of the file it was
@@ -134,7 +135,7 @@ class _Reader:
         time = getattr(message, "timestamp", None)
         if not time or isinstance(time, str):
             return -1
-        of_day = ((time.hour * 60 + time.minute) * 60 + time.second) * NANOS
+        of_day = ((time.hour * 60 + time.minute) * 60 + time.second) * SECOND_NS
         of_day += time.microsecond * 1000
         utc = of_day + (self._day_before(of_day) * DAY_NS)
         day = None
@@ -164,15 +165,15 @@ class _Reader:
         if iso := ISO.search(around):
             zone = (iso[4] or "Z").replace("Z", "+00:00")
             whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
-            return int(whole.timestamp()) * NANOS + _fraction(iso[3])
+            return int(whole.timestamp()) * SECOND_NS + _fraction(iso[3])
         if number := NUMBER.search(around):
             for _, per in UNIX:
                 if YEAR_2000 <= int(number[1]) / per < YEAR_2100:
-                    scale = NANOS // per
+                    scale = SECOND_NS // per
                     return int(number[1]) * scale + _fraction(number[2]) // per
         if clock := OF_DAY.search(around):
             seconds = (int(clock[1]) * 60 + int(clock[2])) * 60 + int(clock[3])
-            of_day = seconds * NANOS + _fraction(clock[4])
+            of_day = seconds * SECOND_NS + _fraction(clock[4])
             day = 0
             if self.of_day is not None:  # counts on by itself: the GNSS date is added at the end
                 day, before = divmod(self.of_day, DAY_NS)
@@ -245,10 +246,10 @@ class _Clock:
         if reader.of_day is not None and late:  # stamps without a date: only the day is made good
             self.days = round(self.late / DAY_NS) * DAY_NS
             self.late -= self.days
-        if abs(self.late) > LATE_S * NANOS:
+        if abs(self.late) > LATE_S * SECOND_NS:
             log.warning(
                 "%s: its receive stamps are %+.2f s against GNSS time; sentences without a time of "
-                "their own are put back by that", name, self.late / NANOS,
+                "their own are put back by that", name, self.late / SECOND_NS,
             )  # fmt: skip
         else:
             self.late = 0
@@ -273,7 +274,7 @@ class _Clock:
             own >= 0, own, np.where(stamped, received - self.late, self._between(place))
         )
         known = time >= 0
-        schema, names = TOPICS[family(rows.kind)]
+        schema, names = SENTENCE_TOPICS[family(rows.kind)]
         values = np.array(rows.values, float).reshape(len(place), -1)[known]
         columns = dict(zip(names, values.T, strict=False))
         logged = np.where(stamped, received, time)[known]

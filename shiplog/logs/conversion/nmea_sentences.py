@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 
 from shiplog import units
 
-Fact = tuple[str, tuple[float, ...]]  # a key of TOPICS, and its values
+Fact = tuple[str, tuple[float, ...]]  # a key of SENTENCE_TOPICS, and its values
 WHERE = ("latitude", "longitude")
 
-TOPICS = {  # schema and fields; what begins with a letter stands in for a topic of the contract
+# Schema and fields; what begins with a letter stands in for a topic of the contract.
+SENTENCE_TOPICS = {
     "gga": ("foxglove.LocationFix", (*WHERE, "altitude")),
     "rmc": ("foxglove.LocationFix", WHERE),
     "gll": ("foxglove.LocationFix", WHERE),
@@ -35,8 +36,8 @@ class NotValid(Exception):
 
 
 def family(topic: str) -> str:
-    """The key of TOPICS that a topic such as /rudder/port belongs to."""
-    return topic if topic in TOPICS else "/" + topic.split("/")[1]
+    """The key of SENTENCE_TOPICS that a topic such as /rudder/port belongs to."""
+    return topic if topic in SENTENCE_TOPICS else "/" + topic.split("/")[1]
 
 
 def facts(message) -> list[Fact] | None:

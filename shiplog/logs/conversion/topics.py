@@ -20,8 +20,10 @@ log = logging.getLogger(__name__)
 
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
 # A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
-STAMPS = ("stamp_ns", "stamp", "header.stamp", "timestamp", "utc", "time_utc", "datetime", "time",
-          "t", "unix", "epoch")  # fmt: skip
+STAMP_COLUMNS = (
+    "stamp_ns", "stamp", "header.stamp", "timestamp", "utc", "time_utc", "datetime", "time", "t",
+    "unix", "epoch",
+)  # fmt: skip
 LOGGED = (
     "log_time_ns",
     "log_time",
@@ -63,7 +65,7 @@ def _one(path: Path, profile: Profile | None) -> list[Series]:
     frame = read_table(path).frame
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
     by_profile = next((n for n in named if n in frame.columns), None)
-    stamp_name = by_profile or _known(frame, STAMPS)
+    stamp_name = by_profile or _known(frame, STAMP_COLUMNS)
     logged_name = _known(frame, LOGGED)
     names = [n for n in (stamp_name, logged_name) if n]
     if not names:

@@ -14,10 +14,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from shiplog.channels import DEGREE
 from shiplog.profile import Profile
 from shiplog.voyages.recording import Record
-
-DEGREE = math.pi / 180.0
 
 
 @dataclass(frozen=True, slots=True)

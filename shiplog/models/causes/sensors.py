@@ -17,8 +17,8 @@ class HeadingOffset(Cause):
     """A misaligned compass. Body velocities may come from a sensor fixed to the hull, which needs
     no heading, or from GNSS velocity that the recorder has turned by the compass: `turned`.
 
-    Size: a gyro may settle 0.75 deg · sec(latitude) off (ISO 8728), up to 2.2 deg at 70 deg, and
-    a corrected magnetic compass keeps a deviation of up to 3 deg (ISO 25862).
+    Size: a gyro's settle point error may be 0.75 deg · sec(latitude) (ISO 8728), 2.2 deg at 70 deg,
+    and a corrected magnetic compass keeps a deviation of up to 3 deg (ISO 25862).
     """
 
     turned: bool = False

@@ -11,7 +11,7 @@ from shiplog import jit_cache  # noqa: F401  # for its effect: JAX in double pre
 from shiplog.models.coefficients import Parameters
 from shiplog.models.mmg.geometry import PARTS, Geometry, geometry_of
 from shiplog.models.mmg.model import MMG
-from shiplog.models.mmg.parameters import beside, estimated, load
+from shiplog.models.mmg.parameters import estimated, load, published_file
 from shiplog.models.physical import Beginning, PhysicalModel, Settings
 from shiplog.profile import Profile
 
@@ -22,19 +22,19 @@ __all__ = [
     "Geometry",
     "Parameters",
     "begin",
-    "beside",
     "estimated",
     "geometry_of",
     "load",
     "opened",
+    "published_file",
 ]
 
 
 def begin(profile: Profile, settings: Settings, path: Path | None = None) -> Beginning:
-    """The ship's MMG with the coefficients of a file, else those published beside the profile,
+    """The ship's MMG with the coefficients of a file, else those published next to the profile,
     else those that the particulars suggest. Raises ProfileError."""
     ship, main, estimates = geometry_of(profile, settings.without)
-    path = path or beside(profile.source)
+    path = path or published_file(profile.source)
     start = load(path, ship, settings.without) if path else estimated(ship, main)
     if path is None:
         estimates = (*estimates, f"no published coefficients for this ship: {start.source}")

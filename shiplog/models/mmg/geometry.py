@@ -12,7 +12,7 @@ from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
 from shiplog.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
-WIDE = math.radians(45.0)
+WIDE_ANGLE = math.radians(45.0)
 UNITS = ("propellers", "rudders", "thrusters")
 PARTS = ("hull", "propeller", "rudder", "thruster", "wind")  # forces that can be asked for
 
@@ -168,7 +168,7 @@ def _units(
     rudders = tuple(
         Rudder(
             column[a.name], a.name, *a.position_m, area, span,
-            _reach(a) > WIDE, _slipstream(a, propellers),
+            _reach(a) > WIDE_ANGLE, _slipstream(a, propellers),
         )
         for a, (area, span, _) in zip(blades, sizes, strict=True)
     )  # fmt: skip

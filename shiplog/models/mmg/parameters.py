@@ -1,7 +1,7 @@
 """The coefficients of the MMG model: symbol, plausible spread and physical range of each.
 
 One table; a force function looks its numbers up by these names. A file of published values is a
-TOML of the same sections and keys, beside the ship's profile: `<profile>.mmg.toml`.
+TOML of the same sections and keys, next to the ship's profile: `<profile>.mmg.toml`.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def names(geometry: Geometry) -> tuple[str, ...]:
             found += [f"thruster.{t.name}_{k}" for t in geometry.thrusters for k in TABLE[part]]
         else:
             found += [f"{part}.{key}" for key in TABLE[part]]
-    if len(geometry.rudders) < 2:  # a single blade has no other beside it
+    if len(geometry.rudders) < 2:  # a single blade has no other next to it
         found = [name for name in found if name != "rudder.inboard"]
     return tuple(found)
 
@@ -176,8 +176,8 @@ def load(path: Path | str, geometry: Geometry, without: Iterable[str] = ()) -> P
     return _from(geometry, content, source, widen=1.0, path=path)
 
 
-def beside(profile_source: str) -> Path | None:
-    """The parameter file that lies beside a profile, shipped or the user's own."""
+def published_file(profile_source: str) -> Path | None:
+    """The parameter file next to a profile, shipped or the user's own."""
     if not profile_source:
         return None
     if profile_source.endswith(".toml"):

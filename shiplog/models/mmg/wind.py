@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jax import Array
 
+from shiplog.frames import in_body_axes
 from shiplog.models.mmg.geometry import AIR, Geometry
 from shiplog.models.mmg.safe_root import root
 
@@ -19,8 +20,8 @@ def apparent(true_wind: Array, heading: Array, u: Array, v: Array) -> tuple[Arra
     U_A cos γ_A = U_T cos(γ_T - ψ) + u,  U_A sin γ_A = U_T sin(γ_T - ψ) + v
     """
     c, s = jnp.cos(heading), jnp.sin(heading)
-    north, east = true_wind[..., 0], true_wind[..., 1]
-    return c * north + s * east + u, c * east - s * north + v
+    ahead, starboard = in_body_axes(true_wind[..., 0], true_wind[..., 1], c, s)
+    return ahead + u, starboard + v
 
 
 def wind(p: Mapping[str, Array], g: Geometry, ahead: Array, starboard: Array) -> Array:

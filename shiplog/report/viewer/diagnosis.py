@@ -1,5 +1,5 @@
-"""What a diagnosis found: where it tells most on the chart, the force that no model had beside the
-force of what was named, and the error before and after."""
+"""What a diagnosis found: where it tells most on the chart, the missing force together with the
+force of the named causes, and the error before and after."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from shiplog.report.viewer import display, forces, style, timeline, trajectory
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-SIDES = 1.645  # standard deviations of a 90 % band
+BAND_DEVIATIONS = 1.645  # standard deviations of a 90 % band
 LACKS = "model lacks (black)"  # a dark dot does not show in Rerun's dark legend
-COLOUR_NAMES = ("blue", "orange")  # style.MODELS: before, and after
-NAMED = style.MODELS[1]  # the force of what the model after has
+COLOUR_NAMES = ("blue", "orange")  # style.MODEL_COLOURS: before, and after
+NAMED_COLOUR = style.MODEL_COLOURS[1]  # the force of what the model after has
 ROOM = 1.0  # sizes of the measured track that a simulated one is followed beyond it
-CHANNELS = dict(zip((c.name for c in channels.VELOCITY), forces.AXES, strict=True))
+AXIS_OF_CHANNEL = dict(zip((c.name for c in channels.VELOCITY), forces.FORCE_AXES, strict=True))
 DRAWABLE = str.maketrans({  # Rerun's fonts lack these, and its headless viewer falls over them
     "ᵀ": "'", "ᵢ": "_i", "⁻": "^-", "₊": "_+", "₋": "_-", "∇": "grad ",
 })  # fmt: skip
@@ -105,15 +105,15 @@ def _components(exhibit: Exhibit) -> pl.DataFrame:
     """A row an instant and part: what the model lacks, the ends of its band, what was named."""
     part = {
         LACKS: pl.col("force"),
-        "low": pl.col("force") - SIDES * pl.col("sd"),
-        "high": pl.col("force") + SIDES * pl.col("sd"),
+        "low": pl.col("force") - BAND_DEVIATIONS * pl.col("sd"),
+        "high": pl.col("force") + BAND_DEVIATIONS * pl.col("sd"),
         "named": pl.col("named"),
     }
     return pl.concat(
         exhibit.residual.with_columns(part=pl.lit(name), value=value)
         .pivot("channel", index=["voyage", "time", "part"], values="value")
-        .rename(CHANNELS)
-        .select("voyage", "time", "part", *forces.AXES)
+        .rename(AXIS_OF_CHANNEL)
+        .select("voyage", "time", "part", *forces.FORCE_AXES)
         .sort("time", maintain_order=True)
         for name, value in part.items()
     )
@@ -140,7 +140,7 @@ def _tab(picture: Pictured, voyage: str) -> rrb.Container:
     )
     right: list[rrb.View] = []
     if (picture.components["voyage"] == voyage).any():
-        right += [_force(picture, voyage, axis) for axis in forces.AXES]
+        right += [_force(picture, voyage, axis) for axis in forces.FORCE_AXES]
     if (picture.errors["voyage"] == voyage).any():
         right.append(_errors(picture, voyage))
     if not right:  # too short for either
@@ -174,7 +174,7 @@ def _chart(picture: Pictured, voyage: str, name: str) -> rrb.View:
 
 
 def _force(picture: Pictured, voyage: str, axis: str) -> rrb.View:
-    what, _, positive = forces.AXES[axis]
+    what, _, positive = forces.FORCE_AXES[axis]
     name, factor = forces.unit(picture.components, axis)
     return rrb.TimeSeriesView(
         origin=entity("unexplained", voyage, axis),
@@ -234,7 +234,7 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
     if not len(time):
         return
     ends, none = time[[0, -1]], np.empty(0, dtype=np.intp)
-    for axis in forces.AXES:
+    for axis in forces.FORCE_AXES:
         _, factor = forces.unit(picture.components, axis)
         band = np.column_stack([display.column(end, axis) for end in (low, high)])
         # drawn in order of names: zero, the band, what the model lacks, what was named
@@ -244,7 +244,7 @@ def _send_forces(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
             ("lacks", time, display.column(lacks, axis)[:, None], begins, [LACKS], style.MEASURED,
              1.5),
             ("named", time, display.column(named, axis)[:, None], begins,
-             [f"force of {_spoken(picture.exhibit.named)}"], NAMED, 1.5),
+             [f"force of {_spoken(picture.exhibit.named)}"], NAMED_COLOUR, 1.5),
         ):  # fmt: skip
             if np.isfinite(values).any():
                 timeline.send_lines(
@@ -258,7 +258,7 @@ def _send_errors(recording: rr.RecordingStream, picture: Pictured, voyage: str) 
     rows = picture.errors.filter(pl.col("voyage") == voyage)
     begin = display.column(rows, "time")
     time = np.column_stack((begin, begin + display.column(rows, "seconds"))).ravel()
-    for (name, model), colour in zip(picture.models.items(), style.MODELS, strict=False):
+    for (name, model), colour in zip(picture.models.items(), style.MODEL_COLOURS, strict=False):
         values = np.repeat(display.column(rows, name), 2)
         if np.isfinite(values).any():
             timeline.send_lines(

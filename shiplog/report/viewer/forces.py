@@ -12,7 +12,7 @@ from shiplog.report.viewer import display, style, timeline
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-AXES = {  # what a plot shows: its name, its unit, where positive points
+FORCE_AXES = {  # what a plot shows: its name, its unit, where positive points
     "surge": ("surge force", "N", "ahead"),
     "sway": ("sway force", "N", "to starboard"),
     "yaw": ("yaw moment", "N m", "bow to starboard"),
@@ -42,7 +42,7 @@ def send(recording: rr.RecordingStream, drawn: Drawn) -> None:
     colours = style.part_colours(rows["part"].unique(maintain_order=True).to_list())
     for voyage in rows["voyage"].unique(maintain_order=True):
         _send_zero(recording, voyage, rows.filter(pl.col("voyage") == voyage))
-    factors = {axis: unit(rows, axis)[1] for axis in AXES}
+    factors = {axis: unit(rows, axis)[1] for axis in FORCE_AXES}
     for (voyage, part), lines in rows.group_by("voyage", "part", maintain_order=True):
         whole = part == "total"  # behind, and wide: visible under a part that acts alone
         for axis, factor in factors.items():
@@ -72,7 +72,7 @@ def unit(rows: pl.DataFrame, axis: str) -> tuple[str, float]:
     """Newtons, or thousands or millions of them: one for all voyages, which then compare."""
     most = max(abs(end) for end in _reach(rows, axis))
     prefix, factor = next((name, factor) for least, name, factor in PREFIXES if most >= least)
-    return prefix + AXES[axis][1], factor
+    return prefix + FORCE_AXES[axis][1], factor
 
 
 def readable_range(rows: pl.DataFrame, axis: str, factor: float = 1.0) -> tuple[float, float]:
@@ -86,7 +86,7 @@ def readable_range(rows: pl.DataFrame, axis: str, factor: float = 1.0) -> tuple[
 def _plots(drawn: Drawn, voyage: str, all_rows: pl.DataFrame, rows: pl.DataFrame) -> rrb.Container:
     measured = drawn.measured.filter(pl.col("voyage") == voyage)
     plots = []
-    for axis, (what, _, positive) in AXES.items():
+    for axis, (what, _, positive) in FORCE_AXES.items():
         name, factor = unit(all_rows, axis)
         plots.append(
             rrb.TimeSeriesView(
@@ -104,7 +104,7 @@ def _plots(drawn: Drawn, voyage: str, all_rows: pl.DataFrame, rows: pl.DataFrame
 def _send_zero(recording: rr.RecordingStream, voyage: str, rows: pl.DataFrame) -> None:
     """A line at zero, behind all: Rerun's own grid is black, and heavier than what is drawn."""
     ends = display.column(rows, "time")[[0, -1]]
-    for axis in AXES:
+    for axis in FORCE_AXES:
         path = entity("force", voyage, axis, "nothing")
         none = np.empty(0, dtype=np.intp)
         timeline.send_lines(

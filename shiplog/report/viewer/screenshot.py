@@ -13,7 +13,7 @@ from rerun.experimental import ViewerClient, ViewerState
 from shiplog.exceptions import ShiplogError
 from shiplog.report.viewer import native, style
 
-PATIENCE = 30.0  # s
+LOAD_TIMEOUT_S = 30.0  # s
 DRAWN = 1.5  # s until a software renderer has drawn what it loaded
 
 
@@ -21,10 +21,10 @@ def screenshot(rrd: str | Path, png: str | Path, time_s: float | None = None) ->
     """Save what the viewer shows at first sight, at `time_s`, and return the viewer's state."""
     with headless() as viewer:
         viewer.open(str(native.existing(rrd)))
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + LOAD_TIMEOUT_S
         while (state := viewer.get_state()).loading or not state.views:
             if time.monotonic() > end:
-                raise ShiplogError(f"The viewer did not load {rrd} within {PATIENCE:g} s.")
+                raise ShiplogError(f"The viewer did not load {rrd} within {LOAD_TIMEOUT_S:g} s.")
             time.sleep(0.1)
         time.sleep(DRAWN)
         if time_s is not None:
@@ -43,7 +43,7 @@ def headless() -> Iterator[ViewerClient]:
     with tempfile.TemporaryFile() as output:
         process = native.start(["--headless", "--port", str(port)], output, supervised=True)
         try:
-            native.wait_for(process, (port,), PATIENCE)
+            native.wait_for(process, (port,), LOAD_TIMEOUT_S)
             yield ViewerClient(f"rerun+http://{native.HOST}:{port}/proxy")
         except (TimeoutError, ConnectionError):  # it never listened, or ended when it had to draw
             raise ShiplogError(

@@ -9,16 +9,17 @@ Colour = tuple[int, int, int, int]
 
 TIMELINE = "sim_time"
 MEASURED: Colour = (25, 25, 25, 255)
-MODELS: tuple[Colour, ...] = (  # Okabe and Ito: colour-blind readers can distinguish them
+MODEL_COLOURS: tuple[Colour, ...] = (  # Okabe and Ito: colour-blind readers can distinguish them
     (0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 255), (204, 121, 167, 255),
     (230, 159, 0, 255), (86, 180, 233, 255), (120, 80, 40, 255), (150, 150, 0, 255),
 )  # fmt: skip
-ACTUATORS = MODELS  # never in one view with a model
-PARTS: dict[str, Colour] = {  # of the force on the ship; total dark, as what is measured
-    "hull": MODELS[0], "propeller": MODELS[1], "rudder": MODELS[2], "wind": MODELS[5],
-    "thruster": MODELS[4], "network": MODELS[3], "total": MEASURED,
+ACTUATOR_COLOURS = MODEL_COLOURS  # never in one view with a model
+FORCE_COLOURS: dict[str, Colour] = {  # of the force on the ship; total dark, as what is measured
+    "hull": MODEL_COLOURS[0], "propeller": MODEL_COLOURS[1], "rudder": MODEL_COLOURS[2],
+    "wind": MODEL_COLOURS[5], "thruster": MODEL_COLOURS[4], "network": MODEL_COLOURS[3],
+    "total": MEASURED,
 }  # fmt: skip
-OTHER_PARTS = (MODELS[6], MODELS[7])
+OTHER_PARTS = (MODEL_COLOURS[6], MODEL_COLOURS[7])
 TRAINING: Colour = (150, 160, 175, 255)
 TEST: Colour = (213, 94, 0, 255)
 GRID: Colour = (222, 226, 230, 255)
@@ -30,14 +31,14 @@ PAPER: Colour = (250, 250, 250, 255)
 
 def colours(models: list[str]) -> dict[str, Colour]:
     """A fixed colour for every model, in the order they were given."""
-    return {model: MODELS[i % len(MODELS)] for i, model in enumerate(models)}
+    return {model: MODEL_COLOURS[i % len(MODEL_COLOURS)] for i, model in enumerate(models)}
 
 
 def part_colours(parts: list[str]) -> dict[str, Colour]:
     """A part's own colour wherever it is drawn; parts without one share the other colours."""
-    others = sorted(part for part in parts if part not in PARTS)
+    others = sorted(part for part in parts if part not in FORCE_COLOURS)
     spare = {part: OTHER_PARTS[i % len(OTHER_PARTS)] for i, part in enumerate(others)}
-    return {part: PARTS.get(part) or spare[part] for part in parts}
+    return {part: FORCE_COLOURS.get(part) or spare[part] for part in parts}
 
 
 def faded(colour: Colour, share: float = 0.35) -> Colour:

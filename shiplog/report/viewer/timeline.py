@@ -16,7 +16,7 @@ from shiplog.report.viewer import display, style
 from shiplog.report.viewer.display import Drawn
 from shiplog.report.viewer.style import entity
 
-AXES = {"x0": "north x₀ [m]", "y0": "east y₀ [m]"}  # x₀ alone says little
+POSITION_TITLES = {"x0": "north x₀ [m]", "y0": "east y₀ [m]"}  # x₀ alone says little
 IN_THE_FIRST_COLUMN = ("surge", "sway", "yaw_rate", "heading")  # the others are one column on
 
 
@@ -43,7 +43,7 @@ def blueprint(drawn: Drawn, voyage: str | None) -> rrb.Container | None:
 
     seeds = display.drawn_seeds(drawn)
     banded = [m for m in drawn.models if display.has_band(_bold(simulated, m, seeds[m]), "surge")]
-    titles = {c.name: AXES.get(c.name, c.label) for c in channels.STATE}
+    titles = {c.name: POSITION_TITLES.get(c.name, c.label) for c in channels.STATE}
     if banded:  # named once: a legend would hide a third of so flat a plot
         titles["surge"] += f", pale lines: 90 % band of {', '.join(banded)}"
     states = {
@@ -158,7 +158,7 @@ def _send_measured(
     for group, (_, _, names) in actuator_groups(drawn).items():
         for i, name in enumerate(names):
             path = entity("actuator", voyage, group, name)
-            colour = style.ACTUATORS[i % len(style.ACTUATORS)]
+            colour = style.ACTUATOR_COLOURS[i % len(style.ACTUATOR_COLOURS)]
             line(path, by_name[name].channel, colour, name.replace("_", " "))
     if drawn.has_wind:
         for channel in channels.WIND:

@@ -19,7 +19,8 @@ from shiplog.profile import TABLE_CHANNELS
 from shiplog.voyages.draft_profile import facts, words
 from shiplog.voyages.draft_profile.topics import NO_ACTUATOR
 
-CHANNELS = {  # channel: how its column is called (without unit), its unit, and what its unit may be
+# Channel: how its column is called (without unit), its unit, and what its unit may be.
+CHANNEL_COLUMNS = {
     "latitude": (r"(.*_)?lat(itude)?", "deg"),
     "longitude": (r"(.*_)?(lon|lng|long|longitude)", "deg"),
     "x0": (r"x0?|x_?pos(ition)?(_mid)?|x_position\w*|x_ned|x_north|north(ing)?|pos_?n(orth)?", "m"),
@@ -41,7 +42,7 @@ CHANNELS = {  # channel: how its column is called (without unit), its unit, and 
     "wind_angle": (r"awa|(app\w*_|rel\w*_)?wind_?(rel\w*_|app\w*_)?(dir\w*|angle)(_rel\w*|_app\w*"
                    r"|_mid)*", "deg"),
 }  # fmt: skip
-ACTUATORS = (  # kind, how its column is called, the unit where nothing says one
+ACTUATOR_COLUMNS = (  # kind, how its column is called, the unit where nothing says one
     ("azimuth", r"(.*_)?(azimuth|azi|pod)(_?angle)?(_?\w+)?", "deg"),
     ("rudder", r"(.*_)?(rudder|delta|steering)(_?angle)?(_?\w+)?", "deg"),
     ("propeller", r"(.*_)?(rpm|rps|n_prop|prop\w*|shaft\w*|revs?)(_\w+|\d)?|n_?\d?", "rps"),
@@ -104,7 +105,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
             rows = frame.filter(text_of(frame[label.column]) == vessel)
     taken = {f.column for f in labels}
     found: dict[str, list[FoundColumn]] = {}
-    for channel, (pattern, unit) in CHANNELS.items():
+    for channel, (pattern, unit) in CHANNEL_COLUMNS.items():
         names = _matching(frame, pattern, channel, taken)
         found[channel] = [_found(rows[n], channel, unit, table) for n in names]
     _choose_turning(found, labels, rows)
@@ -275,7 +276,7 @@ def _actuators(
     taken, names = set(taken), set()
     for ordered in (False, True):
         kinds = {kind for kind, _ in actuators}
-        for kind, pattern, unit in ACTUATORS:
+        for kind, pattern, unit in ACTUATOR_COLUMNS:
             for column in rows.columns:
                 if column in taken or (ordered and kind in kinds):
                     continue
@@ -316,7 +317,7 @@ def _pulsed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
     return replace(one, unit="pwm", check="CHECK: the neutral pulse", more="offset = 1500.0")
 
 
-SIZES = {  # of an actuator, which only physical models ask for
+DIMENSIONS = {  # of an actuator, which only physical models ask for
     "rudder": "# area_m2 = 0.0  # CHECK: estimated by train --model mmg where left out\n"
     "# span_m = 0.0  # CHECK: likewise\n",
     "propeller": "# diameter_m = 0.0  # CHECK: train --model mmg needs it\n",
@@ -330,7 +331,7 @@ def _actuator(kind: str, one: FoundColumn) -> str:
         f'[[actuators]]\nname = "{one.channel}"\nkind = "{kind}"\n'
         f'topic = "/{kind}/{one.channel}"\nfield = "{field}"\nunit = "{unit or one.unit}"\n{offset}'
         "position_m = [0.0, 0.0]  # CHECK: ahead and to starboard of midship\n"
-        f"{SIZES.get(kind, '')}"
+        f"{DIMENSIONS.get(kind, '')}"
     )
 
 

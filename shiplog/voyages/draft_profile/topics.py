@@ -30,7 +30,7 @@ class Guess:
 
 
 ENU = 'CHECK: ROS turns from east; some compasses write "quaternion_ned"'
-AXES = 'CHECK: axes of the ship; or "enu", "ned" of the earth'
+AXES_TO_CHECK = 'CHECK: axes of the ship; or "enu", "ned" of the earth'
 LINEAR = (r"(twist_)?linear[._]x$", r"(twist_)?linear[._]y$")
 GUESSES = {  # in order of trust, after that of the topics themselves
     "position": (
@@ -43,7 +43,7 @@ GUESSES = {  # in order of trust, after that of the topics themselves
         Guess("body", (r"(surge|ahead)(_\w+)?$", r"(sway|starboard)(_\w+)?$"), "m/s"),
         Guess("ned", (r"(v_?n|north)(_\w+)?$", r"(v_?e|east)(_\w+)?$"), "m/s", r"vel|gnss|gps|ned"),
         Guess("enu", LINEAR, "m/s", r"enu|gnss|gps|fix"),
-        Guess("body", LINEAR, "m/s", r"twist|vel|odom", AXES),
+        Guess("body", LINEAR, "m/s", r"twist|vel|odom", AXES_TO_CHECK),
     ),
     "heading": (
         Guess("angle", (r"(true_?)?(heading|hdg|psi|yaw)(_deg|_rad)?$",), "deg"),
@@ -59,7 +59,7 @@ GUESSES = {  # in order of trust, after that of the topics themselves
               r"wind|anemo"),
     ),
 }  # fmt: skip
-ACTUATORS = (  # kind, in the topic's name, and the field that holds the value
+ACTUATOR_TOPICS = (  # kind, in the topic's name, and the field that holds the value
     ("rudder", r"rudder|steer", r"angle(_\w+)?$|position(_\w+)?$|data$", "deg"),
     ("propeller", r"prop|shaft|engine", r"(speed|rpm|rps|revs)(_\w+)?$|data$", "rps"),
     ("azimuth", r"azimuth|azipod", r"angle(_\w+)?$|data$", "deg"),
@@ -272,7 +272,7 @@ def _actuators(
     measured = {topic: paths for topic, paths in leaves.items() if not words.is_set_point(topic)}
     kinds: set[str] = set()
     for source in (measured, leaves):
-        for kind, in_topic, in_field, fallback in ACTUATORS:
+        for kind, in_topic, in_field, fallback in ACTUATOR_TOPICS:
             if kind in kinds and source is leaves:
                 continue
             for topic, columns in sorted(source.items()):

@@ -1,0 +1,83 @@
+"""Whether held-out voyages and days bear an identification out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+
+from shiplog.exceptions import RunError
+from shiplog.models import MODELS
+from shiplog.simulation.sensitivities import losses
+from shiplog.training.cross_validation import CrossValidated
+from shiplog.training.output_error import Identified
+from shiplog.training.run_config import Config
+from shiplog.training.setup import Prepared
+
+
+def refuse_nothing_held_out(config: Config, ready: Prepared, held: pl.DataFrame) -> None:
+    """Raises RunError for a hybrid that has no voyage to be tested on.
+
+    held   seconds of the validation voyages
+    """
+    able = len(set(ready.voyages)) > 1 and config.physics.folds > 1
+    if MODELS[config.model].residual and not able and not held.height:
+        raise RunError(
+            "A hybrid needs a voyage to hold out: its network is not trusted otherwise.",
+            hint="name a second voyage with --voyages and leave --folds out, or name one with "
+            "--validation.",
+        )
+
+
+class HeldOutErrors(NamedTuple):
+    """Windows rolled out by fits that did not know their voyage, or their day.
+
+    before    [N] L of the starting values
+    by_day    None where a day is a voyage; both None where nothing can be held out
+    """
+
+    before: np.ndarray
+    by_voyage: CrossValidated | None
+    by_day: CrossValidated | None
+
+    @property
+    def parts(self) -> list[tuple[str, CrossValidated]]:
+        both = (("voyages", self.by_voyage), ("days", self.by_day))
+        return [(name, one) for name, one in both if one is not None]
+
+    def sentences(self, ready: Prepared, found: Identified, folds: int) -> list[str]:
+        """The gain on the training windows and on held-out ones."""
+        after = losses(ready.model, found.values, ready.data)
+        notes = [_sentence("training windows", self.before, after)]
+        notes += [
+            _sentence(f"windows of held-out {name}", self.before, one.loss)
+            for name, one in self.parts
+        ]
+        if self.by_voyage is None:
+            why = "One voyage only" if folds > 1 else "--folds is below two"
+            notes.append(f"{why}: nothing was held out, so the gain is not tested.")
+        return notes
+
+    def table(self) -> pl.DataFrame:
+        """A row a window: held_out (voyages or days), group, window, start, loss."""
+        return pl.concat(
+            pl.DataFrame(
+                {
+                    "held_out": [name] * len(self.before),
+                    "group": one.groups,
+                    "window": np.arange(len(self.before)),
+                    "start": self.before,
+                    "loss": one.loss,
+                }
+            )
+            for name, one in self.parts
+        )
+
+
+def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
+    share = after.mean() / before.mean()
+    return (
+        f"Mean L over {len(before)} {where}: {before.mean():.0f} at the start, "
+        f"{after.mean():.0f} identified ({share:.3f})."
+    )
