@@ -18,8 +18,8 @@ JUDGEMENTS: dict[str, str] = {
     ),
     "kvlcc2, full scale": ("Believable. All six tests are of one series."),
     "blueboat": (
-        "Believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: nothing "
-        "is known to have changed, and the data are too few to be sure of it."
+        "Believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "
+        "nothing is known to have changed, and the data are too few to be sure of it."
     ),
     "milliampere": (
         "Believable. Three runs at about 0.1 m/s: it says how much more is needed, and of "
