@@ -12,8 +12,8 @@ from pipelines.evaluate import compare_runs
 from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from pipelines.train_networks import train_run
-from shiplog.exceptions import ShiplogError, listed
-from shiplog.paths import sample_logs
+from shiplog.exceptions import listed
+from shiplog.paths import refuse_none_ingested, sample_logs
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.store import Store
@@ -43,8 +43,7 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     store = Store(out / "store")
     log.info("1/4 ingesting %s", folder)
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
-    if not done.reports:
-        raise ShiplogError(f"No log in {folder} could be ingested.", hint="see the messages above.")
+    refuse_none_ingested(done.reports, folder)
     paths = []
     for data in DATASETS:
         path = out / "runs" / data

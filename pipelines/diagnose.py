@@ -24,7 +24,6 @@ from shiplog.diagnosis import (
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.result import Decision
-from shiplog.exceptions import RunError, listed
 from shiplog.models.causes import Cause, user
 from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
@@ -34,6 +33,7 @@ from shiplog.report.text_table import inert
 from shiplog.training import extension_file, load_model
 from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
+from shiplog.training.run_checks import refuse_other_ship
 from shiplog.voyages import parts
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
@@ -69,12 +69,7 @@ def diagnose_run(
     run = load_model.load(run_path, causes)
     names = trial_voyages.voyages_of(run, store, voyages)
     profile = store.profile(names)
-    if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
-        raise RunError(
-            f"{run.name} is of {run.profile.ship.name!r} with {listed(run.profile.columns)}; the "
-            f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
-            hint="diagnose a ship with a model of its own.",
-        )
+    refuse_other_ship(run, profile)
     recorded = trial_voyages.record_of(store, names, profile)
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None

@@ -12,7 +12,7 @@ import polars as pl
 
 from pipelines.bars import reach, staged
 from shiplog.channels import STATE
-from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.exceptions import listed
 from shiplog.models.causes import user
 from shiplog.report import tables
 from shiplog.report.comparison_data import BAND, ComparisonData, DrawnActuator
@@ -21,6 +21,11 @@ from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.training import load_model
 from shiplog.training.load_model import Run
+from shiplog.training.run_checks import (
+    refuse_no_test_voyage,
+    refuse_other_columns,
+    refuse_other_window,
+)
 from shiplog.voyages import one_hertz, parts, windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -123,16 +128,11 @@ def evaluate_runs(
     opened = tuple(load_model.load(path, causes) for path in paths)
     first = opened[0]
     for other in opened[1:]:
-        if other.config.window != first.config.window:
-            raise RunError(
-                f"{first.name} has windows of {first.config.window} s, {other.name} of "
-                f"{other.config.window} s.",
-                hint="compare runs with the same window.",
-            )
-        _same_ship(first, other.profile.columns, other.name)
+        refuse_other_window(first, other)
+        refuse_other_columns(first, other.profile.columns, other.name)
     names = _test_voyages(first, store, voyages)
     profile = store.profile(names)
-    _same_ship(first, profile.columns, "the chosen voyages")
+    refuse_other_columns(first, profile.columns, "the chosen voyages")
     rows = one_hertz.with_elapsed(store.seconds(names, profile))
     size = first.config.window
     planned = plan(rows, "ref", size)
@@ -247,22 +247,8 @@ def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
     stored = store.select()
     names = store.there(run.config.split.test)
     names = names or [n for n in stored if not parts.overlapping([n], used)]
-    if not names:
-        raise StoreError(
-            f"Every voyage in {store.path} was used to train or validate {run.name}.",
-            hint="ingest voyages that it was not trained on, or name some with --voyages.",
-        )
+    refuse_no_test_voyage(names, store.path, run)
     return names
-
-
-def _same_ship(run: Run, columns: tuple[str, ...], other: str) -> None:
-    if run.profile.columns != columns:
-        mine, theirs = set(run.profile.columns), set(columns)
-        raise RunError(
-            f"{run.name} is of a ship with {listed(mine - theirs) if mine - theirs else 'the same'}"
-            f" columns and {other} with {listed(theirs - mine)} instead.",
-            hint="choose voyages and runs of one ship.",
-        )
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

@@ -13,7 +13,7 @@ from pipelines import train_networks
 from pipelines.evaluate import EvaluatedRuns, evaluate_runs
 from shiplog import files
 from shiplog.channels import VELOCITY
-from shiplog.exceptions import RunError, ShiplogError, StoreError, listed
+from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
 from shiplog.report import tables, viewer
@@ -24,10 +24,11 @@ from shiplog.training import run_folder
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
+from shiplog.training.run_checks import refuse_none_trained, refuse_other_settings
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import parts
-from shiplog.voyages.split import choose_split, say
+from shiplog.voyages.split import choose_split, refuse_no_test, say
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
@@ -103,12 +104,7 @@ def paper_command(
         for name in data
     }
     finished, failures = train_sets(configs, store, out / "runs", jobs, ray)
-    if not finished:
-        reasons = "; ".join(f"{name}: {why}" for name, why in failures.items())
-        raise RunError(
-            f"No set could be trained: {reasons}.",
-            hint="mend that and give the same command again.",
-        )
+    refuse_none_trained(finished, failures)
     results = collect(finished, failures, store)
     text = write(results, chosen, store, out)
     content = {
@@ -132,12 +128,7 @@ def choose_voyages(
     """As in the paper's Table 4 where there are six voyages; else the training voyages are halved
     in time, and the reference set has the first half. Raises StoreError without a test voyage."""
     whole = choose_split(store, voyages, validation, "d-ref", size)
-    if not whole.test:
-        raise StoreError(
-            f"There is no voyage left to test on: training {listed(whole.training)}, validation "
-            f"{listed(whole.validation)}.",
-            hint="ingest another voyage, or leave --validation out.",
-        )
+    refuse_no_test(whole)
     first = choose_split(store, voyages, validation, "ref", size)
     reference, chosen_by = first.training, whole.chosen_by
     if reference == whole.training:
@@ -180,7 +171,9 @@ def train_sets(
         path = out / name
         try:
             if path.is_dir():
-                finished[name] = _same(run_folder.open_finished(path), config)
+                done = run_folder.open_finished(path)
+                refuse_other_settings(done, config)
+                finished[name] = done
                 continue
             begun[name] = train_networks.begin(config, store, path)
         except ShiplogError as error:  # such as a folder that is of other settings
@@ -197,16 +190,6 @@ def train_sets(
         if all(one.run.finished(seed) for seed in one.run.config.seeds):
             finished[name] = train_networks.finish(one)
     return {name: finished[name] for name in configs if name in finished}, failures
-
-
-def _same(run: RunFolder, config: Config) -> RunFolder:
-    """A finished run of these very settings. Raises RunError for any other."""
-    if run.config != config:
-        raise RunError(
-            f"{run.path} is a finished run of other settings.",
-            hint="choose another --out, or remove that folder.",
-        )
-    return run
 
 
 def collect(finished: dict[str, RunFolder], failures: dict[str, str], store: Store) -> Results:

@@ -14,7 +14,7 @@ import polars as pl
 import torch
 
 from pipelines.bars import Bars
-from shiplog.exceptions import RunError, listed
+from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
 from shiplog.simulation import prediction_interval
@@ -27,6 +27,7 @@ from shiplog.training.network_training import Progress
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.queue import Report, Task, work
+from shiplog.training.run_checks import refuse_unended
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import windows
@@ -56,12 +57,7 @@ def train_network_again(old: RunFolder, out: Path) -> Run:
 def _trained(begun: Begun) -> Run:
     tasks = tasks_of(begun.run)
     failures = do(tasks)
-    if failures:
-        line = "; ".join(f"{name}: {why}" for name, why in failures.items())
-        raise RunError(
-            f"{len(failures)} of {len(tasks)} trainings did not end: {line}.",
-            hint="give the same command again: finished seeds and checkpoints are kept.",
-        )
+    refuse_unended(failures, len(tasks))
     return finish(begun)
 
 

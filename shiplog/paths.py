@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
@@ -25,6 +25,12 @@ def sample_logs(given: Path | None = None) -> Path:
         hint="run the demo from a clone of shiplog, or make the logs again with "
         "`python -m pipelines.experiments.simulated_ship sample_logs` and give them with --logs.",
     )
+
+
+def refuse_none_ingested(reports: Sized, folder: Path) -> None:
+    """Raises ShiplogError where no log of the folder became a voyage."""
+    if not reports:
+        raise ShiplogError(f"No log in {folder} could be ingested.", hint="see the messages above.")
 
 
 def refuse_taken(path: Path, option: str = "--out") -> None:

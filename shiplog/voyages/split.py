@@ -190,6 +190,16 @@ def say(split: Split) -> None:
     )
 
 
+def refuse_no_test(split: Split) -> None:
+    """Raises StoreError where every voyage trains or validates."""
+    if not split.test:
+        raise StoreError(
+            f"There is no voyage left to test on: training {listed(split.training)}, validation "
+            f"{listed(split.validation)}.",
+            hint="ingest another voyage, or leave --validation out.",
+        )
+
+
 def refuse_shared_rows(rows: pl.DataFrame, split: Split) -> None:
     """The same seconds in training and validation make the validation worthless: refuse."""
     for left, right, count in one_hertz.shared_rows(rows).iter_rows():

@@ -1,0 +1,90 @@
+"""What is refused of runs before the work: other ships, windows or settings, and none to go on
+with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Sized
+from pathlib import Path
+
+from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.profile import Profile
+from shiplog.training.run_config import Config
+from shiplog.training.run_folder import RunFolder
+
+
+def refuse_other_ship(run: RunFolder, profile: Profile) -> None:
+    """Raises RunError where the voyages to diagnose are of another ship than the run."""
+    if profile.columns != run.profile.columns or profile.ship.name != run.profile.ship.name:
+        raise RunError(
+            f"{run.name} is of {run.profile.ship.name!r} with {listed(run.profile.columns)}; the "
+            f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
+            hint="diagnose a ship with a model of its own.",
+        )
+
+
+def refuse_other_columns(run: RunFolder, columns: tuple[str, ...], other: str) -> None:
+    """Raises RunError where `other`, a run or voyages, has other actuators or sensors."""
+    if run.profile.columns != columns:
+        mine, theirs = set(run.profile.columns), set(columns)
+        raise RunError(
+            f"{run.name} is of a ship with {listed(mine - theirs) if mine - theirs else 'the same'}"
+            f" columns and {other} with {listed(theirs - mine)} instead.",
+            hint="choose voyages and runs of one ship.",
+        )
+
+
+def refuse_other_window(first: RunFolder, other: RunFolder) -> None:
+    """Raises RunError where two runs to compare have windows of different lengths."""
+    if other.config.window != first.config.window:
+        raise RunError(
+            f"{first.name} has windows of {first.config.window} s, {other.name} of "
+            f"{other.config.window} s.",
+            hint="compare runs with the same window.",
+        )
+
+
+def refuse_other_settings(run: RunFolder, config: Config) -> None:
+    """Raises RunError where a finished run has other settings than these."""
+    if run.config != config:
+        raise RunError(
+            f"{run.path} is a finished run of other settings.",
+            hint="choose another --out, or remove that folder.",
+        )
+
+
+def refuse_extended(path: Path) -> None:
+    """Raises RunError for a run folder that a diagnosis made, which no training repeats."""
+    if (path / "extension.json").is_file():
+        raise RunError(
+            f"The run {path} was extended by a diagnosis, and not trained.",
+            hint="repeat the run that it extends, and diagnose again.",
+        )
+
+
+def refuse_no_test_voyage(names: Sequence[str], store: Path, run: RunFolder) -> None:
+    """Raises StoreError where no voyage in the store is left to evaluate the run on."""
+    if not names:
+        raise StoreError(
+            f"Every voyage in {store} was used to train or validate {run.name}.",
+            hint="ingest voyages that it was not trained on, or name some with --voyages.",
+        )
+
+
+def refuse_unended(failures: Mapping[str, str], count: int) -> None:
+    """Raises RunError where some of `count` trainings failed. `failures`: name → why."""
+    if failures:
+        line = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        raise RunError(
+            f"{len(failures)} of {count} trainings did not end: {line}.",
+            hint="give the same command again: finished seeds and checkpoints are kept.",
+        )
+
+
+def refuse_none_trained(finished: Sized, failures: Mapping[str, str]) -> None:
+    """Raises RunError where no window set of the paper's experiment is finished."""
+    if not finished:
+        reasons = "; ".join(f"{name}: {why}" for name, why in failures.items())
+        raise RunError(
+            f"No set could be trained: {reasons}.",
+            hint="mend that and give the same command again.",
+        )
