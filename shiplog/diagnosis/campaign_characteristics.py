@@ -13,6 +13,7 @@ from shiplog.diagnosis import (
     discrepancy,
     likelihood,
     linearisation,
+    nominal_fit,
     nominal_reference,
     segment_nodes,
     segments,
@@ -24,7 +25,7 @@ from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.measurement_correction import read
-from shiplog.diagnosis.nominal_reference import Converged
+from shiplog.diagnosis.nominal_fit import Converged
 from shiplog.diagnosis.parameter_layout import Columns
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
@@ -78,15 +79,15 @@ def nominal_pass(
 ) -> NominalPass:  # fmt: skip
     """`numbers` of causes that the voyages have; none but on voyages that are not nominal. Whether
     the path has been `pulled` with them."""
-    columns = nominal_reference.columns_of(model, setting, start)
+    columns = nominal_fit.columns_of(model, setting, start)
     cut, moved, observed = read(model, setting, record, segments.begins(record), numbers)
     whole = np.concatenate((at.theta, columns.numbers(numbers or {})))
     g, path = segments.grid(record), at.path
-    wide = nominal_reference.wide_of(setting)
+    wide = nominal_fit.wide_of(setting)
     if not pulled:
         path = linearisation.pulled(model, whole, cut, g, wide, path)
     linear = linearisation.linear(model, whole, cut, g, path, moved, observed, wide)
-    held = nominal_reference.anchored(start, at.theta, columns)
+    held = nominal_fit.anchored(start, at.theta, columns)
     families = discrepancy.of(
         record.profile, at.process_noise.acceleration, len(columns.unit), discrepancy.SEEN,
         segment_nodes.at_knots(linear.cut, g),
@@ -119,9 +120,7 @@ def characteristics(
         # what parts disagree in is no noise, nor what a few segments are off by
         weight = _weights(modes, made, effects)
         process_noise = _noise_of_parts(made, effects, process_noise, weight >= 1.0)
-        expected = nominal_reference.discrepancy_here(
-            sum(each[1:], each[0]), effects.size**-2.0, columns
-        )
+        expected = nominal_fit.discrepancy_here(sum(each[1:], each[0]), effects.size**-2.0, columns)
         path = _path_about(model, record, at, made, expected, process_noise, numbers)
         at = replace(at, path=path)
         made = nominal_pass(model, setting, start, record, at, numbers)
@@ -149,7 +148,7 @@ def _path_about(
     what is not linear must be the same in both."""
     about = made.accelerations @ expected
     whole = np.concatenate((at.theta, made.columns.numbers(numbers or {})))
-    hold = nominal_reference.hold(process_noise, process_noise.acceleration)
+    hold = nominal_fit.hold(process_noise, process_noise.acceleration)
     return linearisation.pulled(
         model, whole, made.linear.cut, segments.grid(record), hold, at.path, about=about
     )

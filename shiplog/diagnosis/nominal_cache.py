@@ -16,11 +16,11 @@ import jax
 import numpy as np
 
 from shiplog import disk_cache, files
-from shiplog.diagnosis import campaign_characteristics, discrepancy, nominal_reference
+from shiplog.diagnosis import campaign_characteristics, discrepancy, nominal_fit
 from shiplog.diagnosis.campaign_characteristics import Characteristics
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Path
-from shiplog.diagnosis.nominal_reference import Converged
+from shiplog.diagnosis.nominal_fit import Converged
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
@@ -33,13 +33,13 @@ log = logging.getLogger(__name__)
 
 
 def converged(model: Extended, setting: Setting, start: Start, record: Record) -> Converged:
-    """`nominal_reference.converged`, computed once for a model and a campaign."""
+    """`nominal_fit.converged`, computed once for a model and a campaign."""
     kept = disk_cache.folder() / "settled" / f"{_key(model, setting, start, record)}.npz"
     known = _read(kept)
     if known is not None:
         return _converged(known)
     log.info("the nominal voyages are fitted once for a model, and kept")
-    found = nominal_reference.converged(model, setting, start, record, seen=discrepancy.SEEN)
+    found = nominal_fit.converged(model, setting, start, record, seen=discrepancy.SEEN)
     _keep(kept, {"theta": found.theta} | _of_path(found.path) | _process_noise(found.process_noise))
     return found
 

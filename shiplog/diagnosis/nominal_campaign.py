@@ -17,6 +17,7 @@ from shiplog.diagnosis import (
     campaign_prior,
     discrepancy,
     likelihood,
+    nominal_fit,
     nominal_reference,
     segment_nodes,
     segments,
@@ -31,7 +32,8 @@ from shiplog.diagnosis.campaign_characteristics import (
 from shiplog.diagnosis.campaign_parts import products
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
-from shiplog.diagnosis.nominal_reference import Converged, Reference
+from shiplog.diagnosis.nominal_fit import Converged
+from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 from shiplog.models.causes import Setting
@@ -128,14 +130,14 @@ def learn(
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
     information, pull = prior(voyages, size**-2.0, held, np.zeros(len(known)), found.share)
     reference_made = Reference(
-        model, setting, at.theta, columns, process_noise, nominal_reference.wide_of(setting),
+        model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
         information, pull, held, 1.0 / found.share, made.linear, modes,
         nominal_reference.freedom(len(made.rows)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
     )  # fmt: skip
     total = np.sum([g[:count, :count] for g in every], axis=0)
-    weights = nominal_reference.discrepancy_here(total, size**-2.0, columns)
+    weights = nominal_fit.discrepancy_here(total, size**-2.0, columns)
     reference_made = replace(reference_made, expected=weights)
     return Campaign(
         reference_made, effects, families, unseen, tuple(every), voyage, found.apart,
@@ -182,12 +184,12 @@ def assumed(
     if inputs is not None:
         return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
-    at = nominal_reference.converged(
+    at = nominal_fit.converged(
         model,
         setting,
         start,
         record,
-        0 if given else nominal_reference.LINEARISATIONS,
+        0 if given else nominal_fit.LINEARISATIONS,
         discrepancy.SEEN,
     )
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts

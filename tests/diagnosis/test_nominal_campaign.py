@@ -14,13 +14,13 @@ from shiplog.diagnosis import (
     discrepancy,
     likelihood,
     nominal_campaign,
-    nominal_reference,
+    nominal_fit,
     segments,
     voyage_effects,
 )
 from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.campaign_prior import prior
-from shiplog.diagnosis.nominal_reference import Converged
+from shiplog.diagnosis.nominal_fit import Converged
 from shiplog.models.starting_values import Start
 
 
@@ -111,7 +111,7 @@ START = Start(np.zeros(2), np.array([0.3, 2.0]), np.full(2, -9.0), np.full(2, 9.
 @pytest.fixture(scope="module")
 def learned(model):
     """Characteristics and campaign of 24 segments in two voyages, with `drag` in all of them."""
-    columns = nominal_reference.columns_of(model, SETTING, START)
+    columns = nominal_fit.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     numbers = np.zeros(len(columns.unit))
     numbers[columns.of["drag"]] = 0.5
@@ -162,7 +162,7 @@ def test_a_path_follows_the_discrepancy_with_all_other_numbers_where_they_are(le
     count = len(columns.unit)
     rows = rng.standard_normal((60, 1 + count))
     known = rng.uniform(0.5, 2.0, count)
-    found = nominal_reference.discrepancy_here(rows.T @ rows, known, columns)
+    found = nominal_fit.discrepancy_here(rows.T @ rows, known, columns)
     e, w = rows[:, 0], rows[:, -4:]
     padded = np.concatenate((w, np.diag(np.sqrt(known[-4:]))))
     wanted, *_ = np.linalg.lstsq(padded, np.concatenate((e, np.zeros(4))), rcond=None)
@@ -208,7 +208,7 @@ def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
 def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, monkeypatch):
     """A cause that only the trial can have, such as a second place's: no deviation was learned."""
     found, _ = learned
-    columns = nominal_reference.columns_of(model, SETTING, START)
+    columns = nominal_fit.columns_of(model, SETTING, START)
     record = straight.sailed(24)
     given = straight.passed(record, columns, sensitivity=0.3)
     monkeypatch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))

@@ -15,7 +15,7 @@ from pipelines.experiments.other_families.disturbance import CALM, Wind, process
 from pipelines.experiments.other_families.effects import RANGES, Effects
 from pipelines.experiments.other_families.ship import NO_WINDAGE, WATER
 from pipelines.experiments.other_families.voyage import sail
-from shiplog.diagnosis import nominal_reference
+from shiplog.diagnosis import nominal_fit
 from shiplog.models.causes import CATALOGUE, Bank, ShallowWater
 
 FOLDER = Path(other_families.__file__).parent
@@ -251,7 +251,7 @@ def test_process_noise_is_no_ornstein_uhlenbeck_process(kind):
     lagged = [float(np.mean(one[:-lag] * one[lag:])) for lag in range(10, 120, 5)]
     assert min(lagged) < -0.08
     periods = {cases.FAMILIES[f](s).noise.period for f in OWN for s in range(20)}
-    assert nominal_reference.PROCESS_NOISE_TIME_S not in periods
+    assert nominal_fit.PROCESS_NOISE_TIME_S not in periods
     assert max(periods) > 10.0 * min(periods)
 
 

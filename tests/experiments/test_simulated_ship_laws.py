@@ -31,7 +31,7 @@ from pipelines.experiments.simulated_ship.laws import (
 )
 from pipelines.experiments.simulated_ship.noise import oscillator, process_noise
 from shiplog import profile_file as profiles
-from shiplog.diagnosis.nominal_reference import PROCESS_NOISE_TIME_S
+from shiplog.diagnosis.nominal_fit import PROCESS_NOISE_TIME_S
 from shiplog.models.causes import CATALOGUE, Setting
 from shiplog.models.causes.environment import Bank as CatalogueBank
 from shiplog.models.causes.environment import ShallowWater
