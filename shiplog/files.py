@@ -34,19 +34,10 @@ def whole(path: Path) -> Iterator[Path]:
 
     Raises OSError that names `path` where the disk refuses, whichever library wrote.
     """
-    sweep(path.parent, path.name)
-    partial = path.with_name(f".{path.name}.{MACHINE}-{os.getpid()}.partial")
-    try:
+    with _partial(path) as partial:
         yield partial
         flush(partial)
         partial.replace(path)
-    except Exception as error:
-        refusal = refused(error, path, partial)
-        if refusal is error:
-            raise
-        raise refusal from error
-    finally:  # an interrupt, too, leaves nothing
-        remove(partial)
 
 
 @contextmanager
@@ -57,15 +48,22 @@ def whole_folder(path: Path) -> Iterator[Path]:
     Raises OSError as `whole` does.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    sweep(path.parent, path.name)
-    partial = path.with_name(f".{path.name}.{MACHINE}-{os.getpid()}.partial")
-    try:
+    with _partial(path) as partial:
         partial.mkdir()
         yield partial
         for file in partial.rglob("*"):
             if file.is_file():
                 flush(file)
         partial.rename(path)
+
+
+@contextmanager
+def _partial(path: Path) -> Iterator[Path]:
+    """A name to write under before `path` is there; removed at the end, an interrupt included."""
+    sweep(path.parent, path.name)
+    partial = path.with_name(f".{path.name}.{MACHINE}-{os.getpid()}.partial")
+    try:
+        yield partial
     except Exception as error:
         refusal = refused(error, path, partial)
         if refusal is error:

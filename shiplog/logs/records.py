@@ -76,7 +76,7 @@ def exact(opcode: int, body: bytes) -> bool:
     stream = _Body(BytesIO(body))
     try:
         made = RECORD_TYPES[opcode].read(stream)
-    except Exception:
+    except Exception:  # the bytes are anything: whatever the library raises, they are no record
         return False
     return stream.count == len(body) and bool(getattr(made, "topic", None) or made.id)
 

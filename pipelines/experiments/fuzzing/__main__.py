@@ -79,7 +79,7 @@ def main() -> None:
     with atheris.instrument_imports(include=["shiplog"]):
         import shiplog.logs.check
         import shiplog.profile_file
-        import shiplog.training.run_config  # noqa: F401
+        import shiplog.training.run_config  # noqa: F401  # imported to be instrumented
     corpus = asked.corpus or Path(tempfile.mkdtemp(prefix="shiplog-corpus-"))
     corpus.mkdir(parents=True, exist_ok=True)
     options = [
