@@ -83,11 +83,11 @@ def converged(
         held = anchored(start, theta, columns)
         linear = linearisation.linear(model, whole, cut, g, path, moved, observed)
         joint = _Joint(linear, accelerations, columns, held, families.families)
-        found, _ = joint.solved(process_noise, sizes)
+        found, _, _ = joint.solved(process_noise, sizes)
         process_noise = joint.noise(found, process_noise, ON_THE_WAY)
         firm = hold(process_noise, process_noise.acceleration)
-        found, gain = joint.solved(process_noise, sizes)
-        about = accelerations @ joint.weights(process_noise, sizes)
+        found, gain, weights = joint.solved(process_noise, sizes)
+        about = accelerations @ weights
         far = float(np.abs(found[:base]).max(initial=0.0))
         if last or round_ == rounds or (gain < NEAR and far < CLOSE):
             process_noise = joint.noise(found, process_noise, AT_REST)
@@ -117,13 +117,18 @@ class _Joint:
 
     def solved(
         self, process_noise: ProcessNoise, sizes: dict[str, float]
-    ) -> tuple[np.ndarray, float]:
+    ) -> tuple[np.ndarray, float, np.ndarray]:
         """[C] most probable numbers, in units; and the log Bayes factor, in nats, of moving the
-        base's there in the linear model (half a Newton decrement). `sizes`, of each family's
-        weights, are estimated on the way."""
-        base, total = self.columns.base, self._total(process_noise)
+        base's there in the linear model (half a Newton decrement); and weights [W] as
+        `discrepancy_here` gives them. `sizes`, of each family's weights, are estimated on the way.
+        """
+        base, by = self.columns.base, np.concatenate(([1.0], self.columns.unit))
+        modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
+        modes = modes.joined(self.accelerations)
+        total = modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
         for step in range(SIZE_STEPS + 1):
-            inverse = np.linalg.inv(total[1:, 1:] + np.diag(self._known(sizes)))
+            known = self._known(sizes)
+            inverse = np.linalg.inv(total[1:, 1:] + np.diag(known))
             found = inverse @ (total[1:, 0] + self.held)
             if step == SIZE_STEPS or not self.families:
                 break
@@ -132,17 +137,8 @@ class _Joint:
                 square = float((found[at] ** 2 + np.diagonal(inverse)[at]).mean())
                 sizes[family.name] = max(math.sqrt(square), LEAST_SIZE)
         moved = found[:base]
-        return found, 0.5 * float(moved @ np.linalg.solve(inverse[:base, :base], moved))
-
-    def weights(self, process_noise: ProcessNoise, sizes: Mapping[str, float]) -> np.ndarray:
-        """[W] as `discrepancy_here` gives them."""
-        return discrepancy_here(self._total(process_noise), self._known(sizes), self.columns)
-
-    def _total(self, process_noise: ProcessNoise) -> np.ndarray:
-        by = np.concatenate(([1.0], self.columns.unit))
-        modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
-        modes = modes.joined(self.accelerations)
-        return modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
+        gain = 0.5 * float(moved @ np.linalg.solve(inverse[:base, :base], moved))
+        return found, gain, discrepancy_here(total, known, self.columns)
 
     def _known(self, sizes: Mapping[str, float]) -> np.ndarray:
         known = self.columns.known.copy()
