@@ -20,7 +20,7 @@ from shiplog.models import MODELS
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
-from shiplog.training import identifiability, load_model, run_folder, seed_files
+from shiplog.training import identifiability, load_model, physics_files, run_folder
 from shiplog.training.cross_validation import CrossValidated, cross_validate
 from shiplog.training.held_out import HeldOutErrors, refuse_nothing_held_out
 from shiplog.training.load_model import Run
@@ -196,7 +196,7 @@ def save(
     )
     toml = start.with_values(values, source).to_toml()
     fixed: Mapping[str, np.ndarray] = simulator.model.fixed  # type: ignore[attr-defined]
-    seed_files.save_physics(run.seed(seed), simulator, fixed, toml, identified)
+    physics_files.save(run.seed(seed), simulator, fixed, toml, identified)
 
 
 def _apart(days: list[str], voyages: list[str]) -> bool:
