@@ -62,8 +62,8 @@ def estimated_coefficients(ship: Profile) -> np.ndarray:
     """Estimated; but 10 N of thrust, which 700 kg follow slowly."""
     g, main, _ = geometry_of(ship)
     start = estimated(g, main)
-    pushes = [n.endswith(("ahead", "astern")) for n in start.names]
-    return np.where(pushes, 10.0, start.values)
+    thrusts = [n.endswith(("ahead", "astern")) for n in start.names]
+    return np.where(thrusts, 10.0, start.values)
 
 
 PROFILE = profiles.parse(SHIP, "ship.toml")

@@ -13,12 +13,12 @@ DRAG = 1.5  # three realistic sizes, in the trial
 
 
 def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None):
-    """[N, C] columns, prior mean and covariance of them, e and its covariance, all dense: usual
+    """[N, C] columns, prior mean and covariance of them, e and its covariance, all dense: nominal
     numbers, then each part's own, then the included causes', then weights of a family's change."""
     ref = trial.reference
     columns, count = ref.columns, len(ref.pull)
-    covariance_of_usual = np.linalg.inv(ref.information)
-    mean = covariance_of_usual @ ref.pull
+    nominal_covariance = np.linalg.inv(ref.information)
+    mean = nominal_covariance @ ref.pull
     parts = trial.parts if parts is None else parts
     e, nominal, extra, change, blocks = [], [], [], [], []
     cut, linear = point.linear.cut, point.linear
@@ -47,7 +47,7 @@ def gaussian(trial, point, noise, included=(), families=(), size=1.0, parts=None
              / columns.unit[columns.of[n]] for n in included]  # fmt: skip
     before = np.concatenate([*stood, np.zeros(0)])
     return (
-        whole_e, j, x, d, covariance, mean, covariance_of_usual, before, size, count,
+        whole_e, j, x, d, covariance, mean, nominal_covariance, before, size, count,
     )  # fmt: skip
 
 
@@ -66,5 +66,5 @@ def level(trial, point, noise, included=(), kind=NOMINAL, size=1.0):
     return evidence.level(trial, point, noise, included, Remainder(kind, size))
 
 
-def of_noise(trial, noise, beside=Remainder()):  # noqa: B008
-    return remainder.noise_prior(noise, trial.nominal_spread, beside)
+def of_noise(trial, noise, remaining=Remainder()):  # noqa: B008
+    return remainder.noise_prior(noise, trial.nominal_spread, remaining)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from toy_ship import GRID, ROWS, SEEN, THETA, WIDE, Toy, nothing, path
+from toy_ship import GRID, RECORD, ROWS, THETA, WIDE, Toy, nothing, path
 
 from shiplog import profile_file as profiles
 from shiplog.diagnosis import likelihood, linearisation, segments
@@ -33,7 +33,7 @@ class Stiff:
 
 def coasting(segments_on: tuple[int, ...] = ()) -> tuple[Cut, Path, np.ndarray]:
     """Four segments that begin with 1 m/s ahead and nothing else; measured as k = 7 has it."""
-    cut = segments.cut(SEEN, ROWS)
+    cut = segments.cut(RECORD, ROWS)
     k, edges = 7.0, 2.0 * np.arange(GRID.bins + 1)
     x = lambda t: t / k - (1.0 - np.exp(-k * t)) / k**2  # noqa: E731  # ∫ of (1 - e^(-kt))/k
     y = np.zeros((4, GRID.bins, 6))
@@ -64,7 +64,7 @@ def test_what_training_holds_is_held_here():
 
 
 def test_columns_between_nodes_are_derivatives_of_what_was_simulated():
-    cut, theta = segments.cut(SEEN, ROWS), THETA
+    cut, theta = segments.cut(RECORD, ROWS), THETA
     at, model = path(), Toy(substeps=4)
     none = nothing(cut)
     found = linearisation.linear(model, theta, cut, GRID, at, *none)
@@ -145,7 +145,7 @@ def test_what_was_left_out_carries_no_information():
 
 
 def test_numbers_of_each_segment_are_taken_off_it_alone():
-    """Of columns of its own and of pushes at the knots; segments without numbers stay."""
+    """Of columns of its own and of accelerations at the nodes; segments without numbers stay."""
     cut, at, _ = coasting()
     linear = linearisation.linear(Stiff(4), np.array([7.0]), cut, GRID, at, *nothing(cut))
     rng = np.random.default_rng(3)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_ship import DAMP, GRID, ROWS, SEEN, SETTING, THETA, TURN, Coasting, Toy, path
+from toy_ship import DAMP, GRID, RECORD, ROWS, SETTING, THETA, TURN, Coasting, Toy, path
 
 from shiplog.diagnosis import linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear_segments import Path
@@ -30,8 +30,8 @@ def test_the_integration_is_of_second_order():
     assert np.abs(errors[-1]).max() < 2e-4
 
 
-def test_a_push_is_an_acceleration():
-    """Constant push of a body without forces: ½ p t², but for the first step, which is Euler's."""
+def test_an_acceleration_is_added_to_the_models():
+    """Constant, of a body without forces: ½ p t², but for the first step, which is Euler's."""
     nodes, step = 61, 0.2
     acceleration = np.tile([0.01, -0.02, 0.0], (1, nodes, 1))
     states = np.asarray(
@@ -58,7 +58,7 @@ def linearised():
     }  # fmt: skip
     with pytest.MonkeyPatch.context() as patch:  # a wider step than a derivative's averages noise
         patch.setattr(measurement_correction, "READ_STEP", 0.02)
-        cut, moved, observed = measurement_correction.read(model, SETTING, SEEN, ROWS, numbers)
+        cut, moved, observed = measurement_correction.read(model, SETTING, RECORD, ROWS, numbers)
     theta = np.concatenate((THETA, np.zeros(4)))
     at = path()
     return (
@@ -72,7 +72,7 @@ def linearised():
 
 def gap(model, theta, at: Path, numbers) -> np.ndarray:
     """Measured less simulated [S, B, 6], from the nodes: the trapezium of each two seconds."""
-    record = measurement_correction.corrected(model.causes, SEEN, numbers)
+    record = measurement_correction.corrected(model.causes, RECORD, numbers)
     cut = segments.cut(record, ROWS)
     states = np.asarray(
         linearisation.states_along(model, theta, at.start, at.at_nodes(GRID), cut.driven, cut.step)
@@ -142,7 +142,7 @@ def test_columns_of_causes_that_read(linearised, label, i, column):
 def weaving(late: float) -> Record:
     """A ship that the toy is exactly, its rudder weaving 0.3 sin(0.8 t), acting `late`:
     ṙ = b δ - c r in closed form; it lies still otherwise."""
-    t = SEEN.time
+    t = RECORD.time
     w, amplitude = 0.8, 0.3
     phase = np.arctan2(w, DAMP)
     size = TURN * amplitude / np.hypot(w, DAMP)
@@ -152,7 +152,7 @@ def weaving(late: float) -> Record:
     state[:, 4], state[:, 5] = heading, rate
     actuator = np.stack((amplitude * np.sin(w * t), np.zeros(len(t))), -1)
     wind = np.zeros((len(t), 2))
-    return replace(SEEN, state=state, actuator=actuator, wind=wind)
+    return replace(RECORD, state=state, actuator=actuator, wind=wind)
 
 
 @pytest.mark.parametrize("late", (0.0, 0.3))

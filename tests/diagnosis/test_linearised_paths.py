@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy_ship import GRID, ROWS, SEEN, SETTING, THETA, WIDE, Coasting, Toy, path
+from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, path
 
 from shiplog.diagnosis import linearisation, measurement_correction, segments
 from shiplog.diagnosis.linear_segments import Path
@@ -14,7 +14,7 @@ from shiplog.voyages.timescale import KNOT, Timescale
 
 def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
     """Segments whose measurements are the toy's own."""
-    cut = segments.cut(SEEN, ROWS)
+    cut = segments.cut(RECORD, ROWS)
     y, _ = linearisation.simulated(Toy(), theta, cut, at, GRID)
     return replace(cut, y=y)
 
@@ -52,13 +52,13 @@ def test_slopes_of_a_smooth_model_go_straight_between_seconds():
     assert same[0] == pytest.approx(same[1], abs=1e-12)
 
 
-def test_a_path_is_pulled_onto_a_known_push():
+def test_a_path_is_pulled_onto_a_known_acceleration():
     """Smooth accelerations of 0.02 m/s²: the path goes where they went, and finds them."""
     t = KNOT * np.arange(GRID.knots)
     acceleration = np.stack(
         (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
     )
-    true = Path(SEEN.state[ROWS], np.tile(acceleration, (4, 1, 1)))
+    true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
     cut = simulated(true)
     found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
     y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
@@ -75,7 +75,7 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     acceleration = np.stack(
         (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
     )
-    true = Path(SEEN.state[ROWS], np.tile(acceleration, (4, 1, 1)))
+    true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
     cut = simulated(true)
     about = true.acceleration.reshape(4, -1)
     firm = replace(WIDE, acceleration=1e-6 * WIDE.acceleration)
@@ -95,14 +95,14 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
 
 
 def test_a_path_is_pulled_on_a_longer_grid_too():
-    """Segments of 60 s with knots of 4 s: the same pushes, found through `reading` and all."""
-    viewed = replace(SEEN, timescale=Timescale(60.0, 4.0, 4.0))
+    """Segments of 60 s with nodes of 4 s: accelerations found from the record on."""
+    viewed = replace(RECORD, timescale=Timescale(60.0, 4.0, 4.0))
     g, rows = segments.grid(viewed), segments.begins(viewed)
     t = g.knot * np.arange(g.knots)
     acceleration = np.stack(
         (0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t))
     )
-    true = Path(SEEN.state[rows], np.tile(acceleration, (2, 1, 1)))
+    true = Path(RECORD.state[rows], np.tile(acceleration, (2, 1, 1)))
     cut, moved, observed = measurement_correction.read(Toy(), SETTING, viewed, rows)
     assert cut.y.shape == observed.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
     y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
@@ -126,8 +126,8 @@ def test_what_was_not_used_does_not_pull():
 
 
 def test_a_linearisation_expects_where_its_path_will_be_pulled():
-    """Nothing pushes it, but the rudder turns it by a tenth less than the model has it: pulled,
-    the path says so by a push. Once the model has it right there is none, and what is expected
+    """There is no acceleration but the rudder's, a tenth less than the model's: pulled, the path
+    has one that makes up for it. Once the model has it right there is none, and what is expected
     before that is linearised there is off by what is not linear: a tenth of the tenth."""
     true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
     cut = simulated(true)

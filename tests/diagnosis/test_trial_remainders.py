@@ -20,7 +20,7 @@ from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
 
 @pytest.mark.parametrize("family", ("motion", "position", "heading", "time"))
 @pytest.mark.parametrize("included", ((), ("drag",)))
-def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, family, included):
+def test_the_factor_of_a_change_is_the_difference_of_two_evidences(trial, family, included):
     point = trial.at({})
     base = level(trial, point, 1.4, included)
     gained, size = fits.changed(trial, point, base, included, family, Remainder())
@@ -32,7 +32,7 @@ def test_a_change_of_a_family_brings_the_difference_of_two_evidences(trial, fami
 
 
 def test_a_change_that_is_there_is_found_at_its_size(made):
-    """A push that depends on the place, three times the process noise, in the trial alone."""
+    """In the trial alone, an acceleration by place, three times the process noise."""
     nominal, record, _ = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "position")
@@ -55,7 +55,7 @@ def test_a_change_that_is_there_is_found_at_its_size(made):
     assert gained[best][1] == 9.0
 
 
-def test_a_change_acts_on_the_channels_that_it_pushes(made):
+def test_a_change_acts_on_the_channels_of_its_acceleration(made):
     nominal, record, _ = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
@@ -77,8 +77,8 @@ def test_a_change_acts_on_the_channels_that_it_pushes(made):
     ("own", "low", "high"), [(0.0, 0.98, 1.0), (0.045, 0.3, 0.7), (1.0, 0.0, 0.01)]
 )
 def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, own, low, high):
-    """A cause that pushes as a function of time does, and so much besides as nothing else does.
-    What is not pushed at the knots, where process noise pushes too, is felt far more."""
+    """A cause that acts as a function of time does, and in addition as nothing else does. What does
+    not act at the nodes, as process noise does, weighs far more."""
     nominal, record, given = made
     plain = straight.trial(*made)
     family = next(f for f in plain.unseen.families if f.name == "time")
@@ -107,11 +107,11 @@ def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
     for noise in (0.5, 1.0, 1.3, 4.0):
         at = math.log(noise)
         wanted = norm(0.0, nominal).logpdf(at) - top
-        for beside in (Remainder(), Remainder("wind", 3.0)):
-            assert of_noise(trial, noise, beside) == pytest.approx(wanted)
+        for remaining in (Remainder(), Remainder("wind", 3.0)):
+            assert of_noise(trial, noise, remaining) == pytest.approx(wanted)
         wanted = norm(0.0, remainder.RAISED_SPREAD).logpdf(at) - top
-        for beside in (Remainder(RAISED), Remainder(INTERMITTENT), Remainder("wind", 3.0, True)):
-            assert of_noise(trial, noise, beside) == pytest.approx(wanted)
+        for remaining in (Remainder(RAISED), Remainder(INTERMITTENT), Remainder("wind", 3.0, True)):
+            assert of_noise(trial, noise, remaining) == pytest.approx(wanted)
 
 
 def test_campaigns_are_never_quite_alike(made):
@@ -132,9 +132,9 @@ def test_levels_of_noise_differ_as_dense_gaussians_do(made):
     for noise in (1.0, 1.4):
         one = level(trial, point, noise)
         found.append(one.value - of_noise(trial, noise))
-        e, j, _, _, c, mean, usual_covariance, *_ = gaussian_of(trial, point, noise, sure)
+        e, j, _, _, c, mean, nominal_covariance, *_ = gaussian_of(trial, point, noise, sure)
         # of a power of the likelihood log|C| counts for its share, log|C + share·JUJᵀ| whole
-        whole = c / SHARE + j @ usual_covariance @ j.T
+        whole = c / SHARE + j @ nominal_covariance @ j.T
         power = 0.5 * (1.0 - SHARE) * np.linalg.slogdet(c)[1]
         wanted.append(multivariate_normal(j @ mean, whole).logpdf(e) + power)
     assert abs(wanted[1] - wanted[0]) > 5.0

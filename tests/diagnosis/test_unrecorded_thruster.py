@@ -17,13 +17,13 @@ from shiplog.diagnosis import (
 
 def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     """Its place [m ahead of midship] and force between those that are tried first, from products
-    drawn with it: sway and yaw rate pushed together."""
+    drawn with it: sway and yaw rate accelerated together."""
     rng = np.random.default_rng(5)
     ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
     unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
     knots, count = 16, 300
     process_noise = replace(afloat.PROCESS_NOISE, intermittent=1.7 * unit)
-    z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it seen, as well as a knot can be
+    z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it measured, as well as a node can be
     drawn = np.zeros((count, 6 + 3 * knots, 1))
     drawn[:, 6:, 0] = rng.multivariate_normal(
         np.zeros(3 * knots), process_noise.kernel(knots), count

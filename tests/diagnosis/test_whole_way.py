@@ -30,12 +30,12 @@ from shiplog.voyages.store import Store
 
 def test_a_current_is_named_and_sized(sea):
     (named,) = sea.done.decision.named
-    shown, true = named.estimates, truth(sea.case)
+    found, true = named.estimates, truth(sea.case)
     assert sea.done.verdict.verdict == "named"
     assert named.cause.label == "current"
     assert named.probability > 0.9
-    assert shown["speed"].value == pytest.approx(true["speed"], rel=0.05)
-    assert apart(shown["direction"].value, true["direction"]) < 3.0
+    assert found["speed"].value == pytest.approx(true["speed"], rel=0.05)
+    assert apart(found["direction"].value, true["direction"]) < 3.0
     gain = sea.done.verdict.gain
     assert gain.real and gain.reduction > 0.5
     assert gain.windows == len(sea.done.held.cut)
@@ -47,11 +47,11 @@ def test_the_answer_has_the_shape_of_the_contract(sea):
     assert content["causes"][0]["name"] == "current"
     assert set(content["causes"][0]["parameters"]) == {"speed", "direction"}
     assert content["base"] == {"run": "mmg", "before_effect": True}
-    said = [
-        one["probability"] for one in content["ranking"]
-    ]  # of each answer, whatever else is true
-    assert content["ranking"][0]["name"] == "current" and said[0] > 0.9
-    assert said == sorted(said, reverse=True) and min(said) >= 0.0 and max(said) <= 1.0
+    # of each answer, whatever else is true
+    reported = [one["probability"] for one in content["ranking"]]
+    assert content["ranking"][0]["name"] == "current" and reported[0] > 0.9
+    assert reported == sorted(reported, reverse=True)
+    assert min(reported) >= 0.0 and max(reported) <= 1.0
     report = (sea.work / "out" / "report.md").read_text("utf-8")
     assert "steady current" in report and "Gain" in report
 
@@ -99,25 +99,24 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
         list(held.before.model.names).index("hull.x_0f")
     ] *= -200.0  # drives it instead of braking
     wild = HeldOut(held.cut, replace(held.before, theta=theta), held.trial)
-    said = wild.lost(None)
-    assert "worse than one that keeps its velocities" in said
+    assert "worse than one that keeps its velocities" in wild.lost(None)
 
 
 @pytest.mark.parametrize(
-    "said", ("the rudder's sign turned round", "the two rudders exchanged",
+    "words", ("the rudder's sign turned round", "the two rudders exchanged",
              "the propeller's sign turned round", "the one that it blows towards"),
 )  # fmt: skip
-def test_a_sign_that_is_the_other_way_round_is_found(sea, said):
+def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     """Each is its own inverse: turned back, the model is as good as it was. Its current is in it:
     what a wrong sign does must not drown in what else is wrong."""
     cut, model = sea.done.held.cut, sea.done.after
-    (turned,) = [w for s, w in sign_conventions.other(PROFILE, cut) if said in s]
+    (turned,) = [w for s, w in sign_conventions.other(PROFILE, cut) if words in s]
     found, loss = sign_conventions.best(model, turned)
-    assert said in found
+    assert words in found
     assert loss == pytest.approx(model.losses(cut).mean(), rel=1e-4)
     why = HeldOut(turned, model, sea.done.trial).lost(None)
-    if "sign" in said:  # the others do not double the error of so short a trial
-        assert said in why and f"L is {loss:.0f}" in why
+    if "sign" in words:  # the others do not double the error of so short a trial
+        assert words in why and f"L is {loss:.0f}" in why
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
 
 
@@ -172,7 +171,7 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
 
 
 def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
-    """By as much as the process noise and it together may push, twice."""
+    """By twice the acceleration of the process noise and of it together."""
     ref, intermittent = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
     plain, pulsed = ref.held(1.5), ref.held(1.5, intermittent)
     assert pulsed.acceleration**2 == pytest.approx(
@@ -180,8 +179,8 @@ def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
     )
 
 
-def test_causes_settle_from_where_they_rested_before(compass):
-    """From far away a second time: one linearisation, and the same rest."""
+def test_causes_converge_from_where_they_converged_before(compass):
+    """From far away a second time: one linearisation, and the same numbers."""
     trial, decision = compass
     (label,) = labels(decision)
     asked = []
@@ -193,10 +192,10 @@ def test_causes_settle_from_where_they_rested_before(compass):
 
     again, point = evidence.begin(Counted.of(trial.campaign, trial.record), {})
     asked.clear()
-    rests = []
+    ends = []
     for begin in (0.5, -0.5):
         _, found = converge(again, (label,), {label: np.array([begin])}, point.path)
-        rests.append((len(asked), *found.numbers[label]))
+        ends.append((len(asked), *found.numbers[label]))
         asked.clear()
-    assert rests[0][0] > 2 and rests[1][0] == 1
-    assert rests[0][1] == pytest.approx(rests[1][1], rel=0.02)
+    assert ends[0][0] > 2 and ends[1][0] == 1
+    assert ends[0][1] == pytest.approx(ends[1][1], rel=0.02)

@@ -44,9 +44,9 @@ def test_a_cause_of_the_users_own_is_named(sea, trials):
     towards = {"tether_north": 8000.0, "tether_east": -6000.0}
     _, decision = judged(sea.campaign, trials("none", tether=1.5, **towards))
     assert labels(decision) == ["far_tether"]
-    shown = decision.named[0].estimates
-    assert shown["north"].value == pytest.approx(1.2, abs=0.12)
-    assert shown["east"].value == pytest.approx(-0.9, abs=0.12)
+    found = decision.named[0].estimates
+    assert found["north"].value == pytest.approx(1.2, abs=0.12)
+    assert found["east"].value == pytest.approx(-0.9, abs=0.12)
     assert decision.named[0].cause.user
 
 
@@ -109,11 +109,11 @@ def test_with_a_late_clock_the_other_instruments_are_read_at_its_time(sea):
     numbers = {"clock_offset:gnss": np.array([1.4])}
     late = trial.at(numbers)
     ref = sea.campaign.reference
-    cut, moved, shown = measurement_correction.read(
+    cut, moved, observed = measurement_correction.read(
         ref.model, ref.setting, trial.record, trial.rows, numbers
     )
     whole = np.concatenate((ref.theta, ref.columns.numbers(numbers)))
-    fresh = linearisation.linear(ref.model, whole, cut, trial.grid, late.path, moved, shown)
+    fresh = linearisation.linear(ref.model, whole, cut, trial.grid, late.path, moved, observed)
     columns = ref.columns.of["antenna_offset"]
     assert late.linear.j[..., columns] == pytest.approx(fresh.j[..., columns], abs=1e-5)
 
@@ -128,8 +128,8 @@ def test_what_a_clock_would_change_is_of_the_motion_and_not_of_its_noise(sea):
     noise[:, 1] = 0.01 * np.random.default_rng(5).standard_normal(len(observed))
     quiet = measurement_correction.read(ref.model, ref.setting, observed, rows)[2][..., 1, column]
     noisy = replace(observed, state=observed.state + noise)
-    loud = measurement_correction.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
-    assert (loud - quiet).std() < 0.4 * quiet.std()
+    disturbed = measurement_correction.read(ref.model, ref.setting, noisy, rows)[2][..., 1, column]
+    assert (disturbed - quiet).std() < 0.4 * quiet.std()
     change = np.diff(segments.cut(observed, rows).y[..., 1], axis=1) / timescale.BIN
     between = 0.5 * (quiet[:, 1:] + quiet[:, :-1])
     assert np.corrcoef(between.ravel(), change.ravel())[0, 1] > 0.75
@@ -189,16 +189,16 @@ def test_a_fit_that_runs_away_is_worth_nothing(still, monkeypatch):
 
 @pytest.mark.parametrize(("lowest", "holds"), [(-np.inf, True), (0.0, False)])
 def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, lowest, holds):
-    """Linearised where they stood beside it they seem to explain more than where they rest, by
-    more than a step may cost. Of one that joins, a step that costs so much went too far."""
+    """Linearised together with it they seem to explain more than where they converge, by more
+    than a step may cost. Of one that joins, a step that costs so much went too far."""
     trial, decision = still
     at, seemed = [], 1000.0
-    rests = seemed - 1.5 * relinearisation.STEP_NATS
+    converged = seemed - 1.5 * relinearisation.STEP_NATS
 
     def scanned(*_):
         high = at[-1] > 0.15
         found = {"heading_offset": np.array([0.1])}
-        return Found("nothing", seemed if high else rests, 1.0, found, np.eye(1) * 1e-4), []
+        return Found("nothing", seemed if high else converged, 1.0, found, np.eye(1) * 1e-4), []
 
     point = decision.nothing.point
     monkeypatch.setattr(Trial, "at", lambda _, n, *more: at.append(n["heading_offset"][0]) or point)
@@ -206,7 +206,7 @@ def test_the_others_may_explain_far_less_without_a_cause(still, monkeypatch, low
     monkeypatch.setattr(evidence, "fit", lambda *given: scanned(*given)[0])
     begin = {"heading_offset": np.array([0.16])}
     _, found = converge(replace(trial, converged={}), ("heading_offset",), begin, None, lowest)
-    assert found.evidence == (rests if holds else -np.inf)
+    assert found.evidence == (converged if holds else -np.inf)
 
 
 def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monkeypatch):
@@ -216,8 +216,8 @@ def test_where_the_others_run_away_without_a_cause_nothing_is_left(compass, monk
         one, cause=next(c for c in trial.reference.model.causes if c.label == "current")
     )
     both = {one.cause.label: one.numbers, other.cause.label: one.numbers}
-    shown = replace(decision.fit, found=replace(decision.fit.found, numbers=both))
-    two = replace(decision, named=(one, other), fit=shown)
+    fit = replace(decision.fit, found=replace(decision.fit.found, numbers=both))
+    two = replace(decision, named=(one, other), fit=fit)
     gone = Found("heading_offset", -np.inf, 1.0, {one.cause.label: one.numbers})
     monkeypatch.setattr(decisions, "converge", lambda *_, **__: (decision.fit.point, gone))
     left = decisions.without(trial, two, other)
@@ -247,7 +247,7 @@ def test_a_fit_that_runs_away_takes_a_shorter_step(still, monkeypatch):
     trial.converged.clear()
     _, found = converge(trial, ("heading_offset",), {"heading_offset": np.array([8.0])}, path)
     assert away == [8.0, 4.0, 2.0, 1.0] and found.evidence == -np.inf
-    # nothing at rest is so high: each step went too far
+    # nothing that converges is so high: each step went too far
     low = decision.nothing.found.evidence + 900.0
     begin = {"heading_offset": np.array([0.01])}
     _, found = converge(trial, ("heading_offset",), begin, path, low)

@@ -53,9 +53,9 @@ class Coasting:
 
 
 THETA = np.array([DRAG, TURN, DAMP, 0.02])
-SEEN = closed.record(PROFILE)
-GRID = segments.grid(SEEN)
-ROWS = segments.begins(SEEN)
+RECORD = closed.record(PROFILE)
+GRID = segments.grid(RECORD)
+ROWS = segments.begins(RECORD)
 WIDE = Wide(
     np.array([0.02, 0.01, 0.02, 0.01, 0.003, 0.002]), np.array([1.0, 0.6, 1.0, 0.6, 0.3, 0.2]),
     np.array([0.06, 0.06, 0.02]),
@@ -64,7 +64,7 @@ WIDE = Wide(
 
 def path() -> Path:
     rng = np.random.default_rng(0)
-    start = SEEN.state[ROWS]
+    start = RECORD.state[ROWS]
     return Path(start, 0.01 * rng.standard_normal((len(ROWS), 3, GRID.knots)))
 
 

@@ -125,7 +125,7 @@ import json, os, pathlib, sys
 command, first, *options = sys.argv[1:]
 given = {k: v for k, v in zip(options, options[1:])}
 assert os.environ["OMP_NUM_THREADS"] == "1"
-with open(os.environ["SAID"], "a") as reported:
+with open(os.environ["STEPS"], "a") as reported:
     print(command, "keys" in " ".join(sys.argv), file=reported)
 print("words on stderr", file=sys.stderr)
 if command == "ingest":
@@ -145,7 +145,7 @@ else:
 
 @pytest.fixture
 def stubs(tmp_path, monkeypatch):
-    monkeypatch.setenv("SAID", str(tmp_path / "said"))
+    monkeypatch.setenv("STEPS", str(tmp_path / "steps"))
     monkeypatch.setenv("BREAK", "nothing")
     for name, program in (("simulator", SIMULATOR), ("shiplog", SHIPLOG)):
         (tmp_path / f"{name}.py").write_text(program)
@@ -156,9 +156,9 @@ def stubs(tmp_path, monkeypatch):
     return lambda **more: run.Settings(**commands, **more)
 
 
-def commands_said(tmp_path):
-    lines = (tmp_path / "said").read_text().splitlines()
-    assert not any(line.endswith("True") for line in lines)  # no step of shiplog is shown the keys
+def commands_given(tmp_path):
+    lines = (tmp_path / "steps").read_text().splitlines()
+    assert not any(line.endswith("True") for line in lines)  # no step of shiplog is given the keys
     return [line.split()[0] for line in lines]
 
 
@@ -177,7 +177,7 @@ def test_a_case_goes_the_whole_way_once(tmp_path, stubs):
     assert steps[-1]["stderr"] == "words on stderr\n"
 
     run.run(out, planned, stubs())
-    assert sorted(commands_said(tmp_path)) == ["diagnose"] * 2 + ["ingest"] * 2 + ["train"] * 2
+    assert sorted(commands_given(tmp_path)) == ["diagnose"] * 2 + ["ingest"] * 2 + ["train"] * 2
     found = score.read(out)
     assert [one.right for one in found.answers] == [True, True] and not found.pending
     assert "2/2" in score_tables.text(found)
@@ -198,7 +198,7 @@ def test_a_diagnosis_that_breaks_is_a_wrong_answer_and_is_tried_again(
     assert [one.word for one in score.read(out).answers] == ["named", "failed"]
     monkeypatch.setenv("BREAK", "nothing")
     run.run(out, planned, stubs())
-    assert commands_said(tmp_path).count("diagnose") == 3
+    assert commands_given(tmp_path).count("diagnose") == 3
     assert main(["score", str(out)]) == 0
     assert main(["score", str(out), "--least", "2"]) == 0
     assert main(["score", str(out), "--least", "3"]) == 4
@@ -218,7 +218,7 @@ def test_one_wrong_name_is_too_many(tmp_path, stubs, capsys):
 def test_a_ship_is_trained_once_where_that_is_asked_for(tmp_path, stubs):
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("goals", 5, 1)), stubs(share=True, keep=True))
-    reported = commands_said(tmp_path)
+    reported = commands_given(tmp_path)
     assert (reported.count("train"), reported.count("diagnose")) == (1, 6)
     assert (out / "cases" / "5-1" / "logs" / "trial_1.mcap").exists()
 

@@ -137,7 +137,7 @@ def test_the_gain_is_set_against_the_oracles_where_there_is_one():
 
 
 def test_the_truth_in_the_catalogues_own_numbers():
-    """Told as the contract has it, the numbers show just that again."""
+    """Reported as the contract has it, the numbers show just that again."""
     profile = profiles.load("esso-vectwin")
     scale = {"speed": 0.6, "length": 3.0, "mass": 244.6, "moment": 733.8}
     setting = Setting(profile, scale, np.zeros((12, 2)), 1.0)

@@ -30,7 +30,7 @@ NOISE = np.array([0.02, 0.01, 0.03, 0.015, 0.004, 0.002])
         ({"a": 3.0, "b": 5.0}, 0.0, "b"),
         ({"a": -3.0, "b": -0.1}, 0.0, None),
         ({"a": 3.0, "b": 5.0}, 8.0, None),
-        ({"a": 3.0, "b": 5.0}, {"a": 1.0, "b": 6.0}, None),  # the first alone is asked
+        ({"a": 3.0, "b": 5.0}, {"a": 1.0, "b": 6.0}, None),  # the first alone counts
         ({}, 0.0, None),
     ],
 )
@@ -104,7 +104,7 @@ def test_the_acceleration_of_a_known_motion_is_the_models_and_what_was_added_is_
 
 
 def test_both_sides_are_averaged_alike():
-    """A rudder that jumps and pushes at once: nothing is left, though no bin shows when."""
+    """A rudder that jumps and acts at once: nothing is left, though no bin shows when."""
     accelerated = np.zeros((1, 151))
     accelerated[0, 70:] = 0.1  # at the nodes, every 0.2 s
     accelerated[0, 70] = 0.05
@@ -178,7 +178,7 @@ def test_ratios_are_those_of_least_squares_over_everything():
         assert found[label] == pytest.approx(wanted, rel=1e-6)
 
 
-def test_numbers_that_change_nothing_bring_nothing():
+def test_numbers_that_change_nothing_have_no_ratio():
     given = rolled(4, [0.3, 0.0, 0.0, 0.0, 0.0])
     given.j[..., 2] = given.j[..., 1]  # two numbers, one effect
     total = rivals.white_total(given, NOISE, START, np.ones(5))

@@ -23,7 +23,7 @@ from pipelines.experiments.simulated_ship import __main__ as command
 from pipelines.experiments.simulated_ship.sample_logs import PLANS
 from pipelines.experiments.simulated_ship.sensors import Blemishes
 
-SAID = {  # the contract's names and units
+REPORTED = {  # the contract's names and units
     "current": {"speed": "m/s", "direction": "deg"},
     "wind_force": {"surge_factor": "1", "sway_factor": "1", "yaw_factor": "1"},
     "shallow_water": {"strength": "1", "length": "m"}, "bank": {"strength": "1", "length": "m"},
@@ -75,7 +75,7 @@ def test_every_cause_can_be_forced_at_any_size_and_reaches_only_the_trial(name):
     none = cases.draw(12, cause="none")
     assert [c.name for c in full.causes] == [name] and none.causes == ()
     reported = full.causes[0].parameters
-    assert {p: reported[p]["unit"] for p in SAID.get(name, {})} == SAID.get(name, {})
+    assert {p: reported[p]["unit"] for p in REPORTED.get(name, {})} == REPORTED.get(name, {})
     assert full.verdict == ("named" if name in cases.CATALOGUE else "unknown")
     assert (full.ship, full.laws, full.nominal, full.trial, full.ordinary) == (
         half.ship, half.laws, half.nominal, half.trial, half.ordinary

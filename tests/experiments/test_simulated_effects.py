@@ -129,14 +129,14 @@ def test_a_shoal_adds_drag_and_mass_over_its_crest_and_nothing_far_away():
     assert shallow.surge[-1] < 0.98 * deep.surge[-1]
     elsewhere = sail(60.0, **kept, effects=replace(effects, shoal_east=2000.0))
     assert state(elsewhere) == pytest.approx(state(deep), abs=1e-5)
-    # more water moves with it: the same push aside, from rest, gets it under way more slowly
+    # more water moves with it: the same force aside, from rest, gets it under way more slowly
     out = np.empty((2, 11))
     at_rest = np.zeros(11)
     at_rest[[0, 2]] = 5.0, -3.0
-    push = np.array([2.0, 0.0, 0.0, 0.0])
+    force = np.array([2.0, 0.0, 0.0, 0.0])
     for row, hide in zip(out, (Effects(), effects), strict=True):
         h = physics.hidden(hide, (0.0, 1.0), 1.0)
-        physics.rates(numbers, h, at_rest, 0.0, 0.0, np.zeros(3), np.zeros(2), push, 0.0, row)
+        physics.rates(numbers, h, at_rest, 0.0, 0.0, np.zeros(3), np.zeros(2), force, 0.0, row)
     mass = ship.mass + ship.added_sway * np.array([1.0, 1.0 + 0.7 * 0.8])
     inertia = ship.inertia * np.array([1.0, 1.0 + 0.2 * 0.8])
     lever = ship.mass * ship.gravity_ahead

@@ -203,8 +203,8 @@ def test_the_test_voyage_meets_a_wind_that_the_first_two_never_did(sailed):
     assert around[4] < around[5]
     unseen = [c[count[0] + count[1] == 0].sum() / c.sum() for c in count]
     assert unseen[4] < unseen[5] and unseen[5] > 0.8
-    seen_by_four = sum(count[:4]) > 0
-    assert 0.02 < count[5][~seen_by_four].sum() / count[5].sum() < 0.3
+    met_by_four = sum(count[:4]) > 0
+    assert 0.02 < count[5][~met_by_four].sum() / count[5].sum() < 0.3
 
 
 def test_a_seed_is_a_voyage():

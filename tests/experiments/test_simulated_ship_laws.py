@@ -91,12 +91,12 @@ def test_each_term_grows_over_a_shoal_by_its_own_share_and_power():
     damping = q * ship.yaw_damping * more("yaw_damping") * 0.4 * tiny * ship.length**2
     assert (y, n) == (pytest.approx(turn, rel=1e-5), pytest.approx(damping, rel=1e-5))
 
-    # and the masses: pushed from rest at a place where (h₀/h)² = 1/4
+    # and the masses: accelerated from rest at a place where (h₀/h)² = 1/4
     h = physics.hidden(Effects(shallow_water=0.8, shoal_length=1.0), (0.0, 1.0), 1.0)
     at_rest, out = np.zeros(11), np.empty(11)
     at_rest[2] = math.sqrt(3.0)
-    push = np.array([2.0, 0.0, 0.0, 0.0])
-    physics.rates(c, h, at_rest, 0.0, 0.0, np.zeros(3), STILL, push, 0.0, out)
+    force = np.array([2.0, 0.0, 0.0, 0.0])
+    physics.rates(c, h, at_rest, 0.0, 0.0, np.zeros(3), STILL, force, 0.0, out)
     lever = ship.mass * ship.gravity_ahead
     mass = ship.mass + ship.added_sway * more("added_sway")
     inertia = ship.inertia * more("added_inertia")

@@ -112,7 +112,7 @@ unit = "rps"
 """,
 }  # fmt: skip
 DATUM = f"[site]\ndatum = [{LATITUDE}, {LONGITUDE}]\n"
-USUAL = ("position", "sog_cog", "heading", "rudder", "propeller")
+COMMON = ("position", "sog_cog", "heading", "rudder", "propeller")
 
 
 def profile_of(*parts: str, table: str = ""):

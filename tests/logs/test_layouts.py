@@ -8,7 +8,7 @@ import json
 
 import numpy as np
 import polars as pl
-from circle_layouts import RATE, SPEED, USUAL, Voyage, converted, direct, iso, profile_of, same
+from circle_layouts import COMMON, RATE, SPEED, Voyage, converted, direct, iso, profile_of, same
 
 from shiplog.logs.read import contents
 
@@ -33,7 +33,7 @@ lon = { channel = "longitude", unit = "deg" }
 "rudder [deg]" = { channel = "rudder", unit = "deg" }
 rpm = { channel = "propeller", unit = "rpm" }
 """
-    profile = profile_of(*USUAL, table=table)
+    profile = profile_of(*COMMON, table=table)
     (path,) = converted(tmp_path, tmp_path / "rover.csv", profile)
     same(path, profile, direct(tmp_path, profile, v))
 
@@ -173,7 +173,7 @@ Gyro = { channel = "heading", unit = "deg" }
 Rudder = { channel = "rudder", unit = "deg" }
 "Shaft rpm" = { channel = "propeller", unit = "rpm" }
 """
-    profile = profile_of(*USUAL, table=table)
+    profile = profile_of(*COMMON, table=table)
     (path,) = converted(tmp_path, tmp_path / "daq.txt", profile)
     same(path, profile, direct(tmp_path, profile, v))
     topics = contents(path).topics

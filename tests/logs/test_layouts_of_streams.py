@@ -8,12 +8,12 @@ import numpy as np
 import polars as pl
 import pytest
 from circle_layouts import (
+    COMMON,
     DATUM,
     RATE,
     SENSORS,
     SPEED,
     START,
-    USUAL,
     Voyage,
     converted,
     direct,
@@ -53,7 +53,7 @@ def nmea(v: Voyage, i: int) -> list[str]:
     ]
 
 
-NMEA = (*USUAL, "wind")
+NMEA = (*COMMON, "wind")
 
 
 def nmea_profile():

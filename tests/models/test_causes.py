@@ -174,10 +174,10 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
     )  # fmt: skip
     turned = [i for i, a in enumerate(FERRY.actuators) if a.kind == "azimuth"]
     others = [i for i, a in enumerate(FERRY.actuators) if a.kind != "azimuth"]
-    late, lagged, aslant = (
+    late, lagged, misaligned = (
         BY[label].on(setting(FERRY)) for label in ("rudder_delay", "rudder_lag", "rudder_offset")
     )
-    numbers = {late: [0.5], lagged: [0.5], aslant: [0.2, -0.1]}
+    numbers = {late: [0.5], lagged: [0.5], misaligned: [0.2, -0.1]}
     acting = {cause: cause.read(read, np.array(p)).actuator for cause, p in numbers.items()}
     for found in acting.values():
         assert np.array_equal(found[:, others], read.actuator[:, others])
@@ -186,7 +186,9 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
     lack = (read.actuator - acting[lagged])[:, turned]
     assert np.corrcoef(rate[5:-5].ravel(), lack[5:-5].ravel())[0, 1] > 0.9
     port = [FERRY.actuators[i].position_m[1] < 0.0 for i in turned]
-    assert (acting[aslant] - read.actuator)[0, turned] == pytest.approx(np.where(port, 0.2, -0.1))
+    assert (acting[misaligned] - read.actuator)[0, turned] == pytest.approx(
+        np.where(port, 0.2, -0.1)
+    )
     for cause, p in numbers.items():
         output = cause.sentence(cause.estimates(np.array(p), 1e-6 * np.eye(cause.count)))
         assert output.startswith("The azimuths ")
@@ -219,7 +221,7 @@ def test_sizes_follow_the_ship():
 
 
 def test_sizes_are_not_the_simulated_ships():
-    """The simulated ship draws each cause from a range, and a prior in its middle would be told the
+    """The simulated ship draws each cause from a range, and a prior in its middle would hold the
     answer. None stands there; none is so far off that its cause could not be found."""
     middles = {
         "fouling": 0.625, "cross_flow_drag": 0.325, "rudder_force": 0.2, "thrust_loss": 0.19,

@@ -140,8 +140,8 @@ def test_wind_in_a_model_without_it_is_no_coefficient_that_a_fit_takes_in():
     assert WindForce().on(setting()) == WindForce()
     for label in ("wind_direction_offset", "wind_speed_scale", "clock_offset:wind"):
         assert BY[label].missing(lacking) == "the model feels no wind"
-    shown = WindForce().on(lacking).displayed(np.array([0.9, 1.1, -0.2]))
-    assert [v for v, _ in shown.values()] == pytest.approx([0.9, 1.1, -0.2])
+    found = WindForce().on(lacking).displayed(np.array([0.9, 1.1, -0.2]))
+    assert [v for v, _ in found.values()] == pytest.approx([0.9, 1.1, -0.2])
 
 
 def test_a_bank_draws_in_and_turns_the_bow_out():

@@ -40,11 +40,11 @@ def test_bent_instruments_are_put_right(label, profile):
     bent, numbers = WRONG[label]
     if BY[label].missing(setting(profile)):
         pytest.skip("a velocity over ground is turned by nobody")
-    was, shown = closed.record(profile), closed.record(profile, **bent)
-    found = BY[label].read(shown, np.array(numbers))
+    was, wrong = closed.record(profile), closed.record(profile, **bent)
+    found = BY[label].read(wrong, np.array(numbers))
     # a clock is put right by interpolation: h²/8 times a second derivative of at most 0.06
     close = 1e-4 if label.startswith("clock") else 1e-12
-    far = max(np.abs(getattr(shown, n) - getattr(was, n))[INNER].max() for n in CHANGED)
+    far = max(np.abs(getattr(wrong, n) - getattr(was, n))[INNER].max() for n in CHANGED)
     assert far > 10.0 * close  # they were bent
     for name in CHANGED:
         right = getattr(found, name)[INNER]
@@ -69,12 +69,12 @@ def test_inverse_undoes_read(cause, profile):
 
 def test_instruments_are_put_right_one_after_another():
     """Compass, gyro and antenna wrong together: the catalogue's order takes them apart."""
-    shown = closed.record(TWIN, heading=-0.05, bias=0.004, moved=(0.3, 0.1))
+    wrong = closed.record(TWIN, heading=-0.05, bias=0.004, moved=(0.3, 0.1))
     for label, numbers in (
         ("heading_offset", [-0.05]), ("yaw_rate_bias", [0.004]), ("antenna_offset", [0.3, 0.1]),
     ):  # fmt: skip
-        shown = BY[label].read(shown, np.array(numbers))
-    assert shown.state == pytest.approx(closed.record(TWIN).state, abs=1e-12)
+        wrong = BY[label].read(wrong, np.array(numbers))
+    assert wrong.state == pytest.approx(closed.record(TWIN).state, abs=1e-12)
 
 
 # --- rudders --------------------------------------------------------------------------------------

@@ -37,7 +37,7 @@ def hybrid(physics, data) -> Hybrid:
 
 
 @pytest.fixture(scope="module")
-def loud(hybrid, theta) -> np.ndarray:
+def trained(hybrid, theta) -> np.ndarray:
     """The physics and weights of which every one says something."""
     weights = np.random.default_rng(1).normal(size=hybrid.residual.count)
     return np.concatenate((theta, weights))
@@ -66,35 +66,35 @@ def test_it_begins_as_pure_physics(hybrid, physics, theta, data):
     assert (hybrid.acceleration(whole, *at) == physics.acceleration(theta, *at)).all()
 
 
-def test_the_network_is_worked_by_hand(hybrid, loud, theta, data):
+def test_the_network_is_worked_by_hand(hybrid, trained, theta, data):
     """b tanh(W₂ tanh(W₁ z + c₁) + c₂), weights in the order of the shapes."""
-    net, w = hybrid.residual, loud[len(theta) :]
+    net, w = hybrid.residual, trained[len(theta) :]
     w1, c1 = w[: WIDTH * 7].reshape(WIDTH, 7), w[WIDTH * 7 : WIDTH * 8]
     w2, c2 = w[WIDTH * 8 : -3].reshape(3, WIDTH), w[-3:]
     z = np.asarray(hybrid.features(*flat(data)))[17]
     wanted = net.bound * np.tanh(w2 @ np.tanh(w1 @ z + c1) + c2)
-    assert np.asarray(hybrid.network(loud, z)) == pytest.approx(wanted, rel=1e-12)
+    assert np.asarray(hybrid.network(trained, z)) == pytest.approx(wanted, rel=1e-12)
     assert hybrid.names[len(theta) + WIDTH * 7 + 1] == "network.c1_1"
 
 
-def test_it_is_added_to_the_physics(hybrid, physics, loud, theta, data):
+def test_it_is_added_to_the_physics(hybrid, physics, trained, theta, data):
     at = flat(data)
-    whole, alone = hybrid.acceleration(loud, *at), physics.acceleration(theta, *at)
-    added = np.asarray(hybrid.added(loud, *at))
+    whole, alone = hybrid.acceleration(trained, *at), physics.acceleration(theta, *at)
+    added = np.asarray(hybrid.added(trained, *at))
     assert np.asarray(whole - alone) == pytest.approx(added, abs=1e-12)
-    net = hybrid.network(loud, hybrid.features(*at))
+    net = hybrid.network(trained, hybrid.features(*at))
     assert added == pytest.approx(np.asarray(net), abs=1e-12)  # 1 · among its own data
     assert np.abs(added).max() > 1e-4
 
 
 @pytest.mark.parametrize("size", [1e3, 1e9])
-def test_the_largest_weights_stay_within_the_bound(hybrid, loud, theta, data, size):
+def test_the_largest_weights_stay_within_the_bound(hybrid, trained, theta, data, size):
     """A standard deviation of the measured accelerations, each axis its own."""
     velocity = data.measured[..., [1, 3, 5]]
     std = ((velocity[:, 5:] - velocity[:, :-5]) / 5.0).reshape(-1, 3).std(0)
     assert hybrid.residual.bound == pytest.approx(std)
     for at in (flat(data), flat(away(data))):
-        huge = np.concatenate((theta, size * loud[len(theta) :]))
+        huge = np.concatenate((theta, size * trained[len(theta) :]))
         added = np.abs(np.asarray(hybrid.added(huge, *at)))
         assert (added <= hybrid.residual.bound * (1 + 1e-12)).all()
     near = np.abs(np.asarray(hybrid.added(huge, *flat(data))))
@@ -128,13 +128,13 @@ def test_the_fade_falls_smoothly_over_two_limits(hybrid):
         assert float(hybrid.fade(at)) == pytest.approx(wanted, rel=1e-9)
 
 
-def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, loud, theta, data):
+def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, trained, theta, data):
     far = away(data)
     at = flat(far)
-    assert (hybrid.acceleration(loud, *at) == physics.acceleration(theta, *at)).all()
-    rolled = sensitivities.rollout(hybrid, loud, far)
+    assert (hybrid.acceleration(trained, *at) == physics.acceleration(theta, *at)).all()
+    rolled = sensitivities.rollout(hybrid, trained, far)
     assert rolled == pytest.approx(sensitivities.rollout(physics, theta, far), abs=1e-12)
-    near = sensitivities.rollout(hybrid, loud, data)
+    near = sensitivities.rollout(hybrid, trained, data)
     assert np.abs(near - sensitivities.rollout(physics, theta, data)).max() > 0.01
 
 
@@ -213,9 +213,9 @@ def test_few_samples_are_all_of_them_anchors():
 
 
 @pytest.mark.parametrize("part", ["mmg", "hybrid"])
-def test_the_parts_of_the_force_move_the_ship(part, physics, hybrid, theta, loud, data):
+def test_the_parts_of_the_force_move_the_ship(part, physics, hybrid, theta, trained, data):
     """Their sum is what the equations of motion, written out, need for the acceleration."""
-    model, numbers = {"mmg": (physics, theta), "hybrid": (hybrid, loud)}[part]
+    model, numbers = {"mmg": (physics, theta), "hybrid": (hybrid, trained)}[part]
     seconds = table(data)[::7]
     simulator = Simulator(model, numbers, np.zeros((len(numbers),) * 2))
     found = force_breakdown.along(simulator, seconds, PROFILE)
@@ -243,7 +243,7 @@ def test_the_parts_of_the_force_move_the_ship(part, physics, hybrid, theta, loud
     n = (yaw + x_g**2 * m) * dr + x_g * m * (dv + u * r)
     assert total == pytest.approx(np.stack((x, y, n), -1), rel=1e-9, abs=1e-9)
     if part == "hybrid":
-        du, dv, dr = np.asarray(hybrid.added(loud, state, actuator, wind)).T
+        du, dv, dr = np.asarray(hybrid.added(trained, state, actuator, wind)).T
         extra = ((m + m_x) * du, (m + m_y) * dv + x_g * m * dr,
                  x_g * m * dv + (yaw + x_g**2 * m) * dr)  # fmt: skip
         assert by["network"] == pytest.approx(np.stack(extra, -1), rel=1e-9, abs=1e-9)

@@ -145,7 +145,7 @@ def test_many_states_at_once_are_each_alone(esso):
 
 
 def mirrored(ship, u, v, r, heading, wind, actuator, other):
-    """Forces of a motion, and of the motion seen in a mirror along x₀."""
+    """Forces of a motion, and of its mirror image along x₀."""
     here = ship.forces(u, v, r, heading=heading, wind=wind, actuator=actuator)
     there = ship.forces(u, -v, -r, heading=-heading, wind=(wind[0], -wind[1]), actuator=other)
     return here, there

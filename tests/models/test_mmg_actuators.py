@@ -237,8 +237,8 @@ def test_a_thruster_loses_thrust_to_the_flow_along_it():
     against = ship.forces(0.0, 0.2, 0.1, actuator=(-100.0, 0.0))["thruster"]
     assert against[1] == pytest.approx(-50.0 * (1 + 0.5 * 0.35))
     pod = ship.forces(0.3, 0.0, 0.1, actuator=(0.0, 1.0))["thruster"]
-    push = 20.0 * (1 - 0.5 * 0.26)
-    assert pod == pytest.approx((push, 0.0, -0.4 * push))
+    thrust = 20.0 * (1 - 0.5 * 0.26)
+    assert pod == pytest.approx((thrust, 0.0, -0.4 * thrust))
 
 
 def test_revolutions_without_limits_do_not_say_what_full_thrust_is():

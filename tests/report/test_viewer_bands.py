@@ -29,7 +29,7 @@ def with_band(simulated, model, **half):
 def test_a_model_that_knows_its_doubt_is_drawn_with_its_band(compared, tmp_path):
     half = {"surge": 0.1, "yaw_rate": math.radians(2.0), "x0": 3.0}
     simulated = with_band(compared.simulated, "mmg", **half)
-    # the shown seed is 0: what the other one carries must not be drawn
+    # the displayed seed is 0: what the other one carries must not be drawn
     simulated = simulated.with_columns(
         surge_high=pl.when(pl.col("seed") == 0).then(pl.col("surge_high")).otherwise(9.0)
     )

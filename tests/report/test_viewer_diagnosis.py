@@ -40,9 +40,9 @@ def forces(voyage, named=True):
     tables = [
         pl.DataFrame({"voyage": [voyage] * len(time), "time": time}).with_columns(
             channel=pl.lit(channel), force=pl.lit(force), sd=pl.lit(sd),
-            named=pl.lit(push if named else None, pl.Float64),
+            named=pl.lit(known if named else None, pl.Float64),
         )
-        for channel, force, sd, push in (
+        for channel, force, sd, known in (
             ("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw_rate", 0.5, 0.1, 0.25),
         )
     ]  # fmt: skip

@@ -16,8 +16,8 @@ from shiplog.report.viewer import (
 )
 
 
-def pushed(model, voyage, part, surge, sway=0.0, yaw=0.0):
-    """A part that pushes steadily for 100 s, except that nothing is known of 40 s to 49 s."""
+def force(model, voyage, part, surge, sway=0.0, yaw=0.0):
+    """A part whose force is steady for 100 s, except that nothing is known of 40 s to 49 s."""
     time = np.array([t for t in range(100) if not 40 <= t < 50], dtype=float)
     return pl.DataFrame({"time": time}).select(
         model=pl.lit(model), voyage=pl.lit(voyage), time="time", part=pl.lit(part),
@@ -26,20 +26,20 @@ def pushed(model, voyage, part, surge, sway=0.0, yaw=0.0):
 
 
 @pytest.fixture(scope="module")
-def pushing(compared):
+def with_forces(compared):
     rows = [
-        pushed("mmg", "open sea", "hull", -8.0, sway=1.5, yaw=-2.0),
-        pushed("mmg", "open sea", "propeller", 10.0),
-        pushed("mmg", "open sea", "total", 2.0, sway=1.5, yaw=-2.0),
-        pushed("a model of no rollouts", "open sea", "network", 77.0),
+        force("mmg", "open sea", "hull", -8.0, sway=1.5, yaw=-2.0),
+        force("mmg", "open sea", "propeller", 10.0),
+        force("mmg", "open sea", "total", 2.0, sway=1.5, yaw=-2.0),
+        force("a model of no rollouts", "open sea", "network", 77.0),
     ]
     shuffled = pl.concat(rows).sample(fraction=1.0, shuffle=True, seed=0)
     return replace(compared, forces=shuffled)
 
 
-def test_each_part_is_a_line_with_its_force(pushing, tmp_path):
+def test_each_part_is_a_line_with_its_force(with_forces, tmp_path):
     rrd = tmp_path / "forces.rrd"
-    viewer.save(pushing, rrd)
+    viewer.save(with_forces, rrd)
     for path, value in (
         ("surge/terms/hull", -8.0), ("sway/terms/hull", 1.5), ("yaw/terms/hull", -2.0),
         ("surge/terms/propeller", 10.0), ("surge/sum/total", 2.0), ("yaw/sum/total", -2.0),
@@ -54,8 +54,8 @@ def test_each_part_is_a_line_with_its_force(pushing, tmp_path):
         assert table["SeriesLines:colors"][0].to_list() == [colour]
 
 
-def test_forces_stand_on_a_tab_of_their_own(pushing):
-    displayed = views(recording.layout(display.drawn(pushing)))
+def test_forces_stand_on_a_tab_of_their_own(with_forces):
+    displayed = views(recording.layout(display.drawn(with_forces)))
     plots = [view for view in displayed if view["origin"].startswith("/force/")]
     assert [view["name"] for view in plots] == [
         "surge force [N], positive ahead", "sway force [N], positive to starboard",
@@ -73,7 +73,7 @@ def test_without_forces_there_is_no_tab_of_them(saved, compared):
     drawn = display.drawn(compared)
     assert forces.blueprint(drawn, None) is None
     assert not [v for v in views(recording.layout(drawn)) if v["origin"].startswith("/force")]
-    none = pushed("mmg", "harbour", "hull", 1.0).clear()
+    none = force("mmg", "harbour", "hull", 1.0).clear()
     assert forces.blueprint(display.drawn(replace(compared, forces=none)), None) is None
 
 
@@ -82,31 +82,31 @@ def test_more_voyages_than_tabs_fit_are_sent_but_have_no_tab(compared):
     many = replace(
         compared,
         measured=pl.concat([circle(name) for name in names]),
-        forces=pl.concat([pushed("mmg", name, "hull", 1.0) for name in names]),
+        forces=pl.concat([force("mmg", name, "hull", 1.0) for name in names]),
     )
     tabs = forces.blueprint(display.drawn(many), None)
     assert [tab.name for tab in tabs.contents] == names[: display.MOST_TABS]
 
 
 def test_a_spike_does_not_flatten_the_forces():
-    steady = pushed("mmg", "harbour", "hull", -8.0)
+    steady = force("mmg", "harbour", "hull", -8.0)
     spiked = steady.with_columns(
         surge=pl.when(pl.col("time") == 7).then(1e6).otherwise(pl.col("surge"))
     )
     low, high = forces.readable_range(spiked, "surge")
     assert (low, high) == pytest.approx((-10 - 0.8, 0 + 0.8))  # to the next label; zero is in
     # a rudder among thirty times as many rows of hull is no spike
-    kick = pl.concat([*[steady] * 30, pushed("mmg", "harbour", "rudder", 4.0)])
+    kick = pl.concat([*[steady] * 30, force("mmg", "harbour", "rudder", 4.0)])
     assert forces.readable_range(kick, "surge")[1] > 4.0
-    calm = forces.readable_range(pushed("mmg", "harbour", "hull", math.nan), "surge")
+    calm = forces.readable_range(force("mmg", "harbour", "hull", math.nan), "surge")
     assert calm[0] < 0.0 < calm[1]
 
 
 @pytest.mark.parametrize(
     ("newton", "named", "drawn"), [(9e3, "N", 9e3), (2e6, "kN", 2e3), (3e7, "MN", 30.0)]
 )
-def test_a_large_ship_is_pushed_in_kilonewtons(compared, tmp_path, newton, named, drawn):
-    rows = pushed("mmg", "harbour", "hull", newton)
+def test_the_forces_of_a_large_ship_are_in_kilonewtons(compared, tmp_path, newton, named, drawn):
+    rows = force("mmg", "harbour", "hull", newton)
     large = replace(compared, forces=rows)
     (surge, *_) = [
         view["name"]

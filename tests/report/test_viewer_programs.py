@@ -107,7 +107,7 @@ def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewe
     from shiplog.report.viewer.screenshot import screenshot
 
     try:
-        state = screenshot(saved, tmp_path / "seen.png", time_s=100.0)
+        state = screenshot(saved, tmp_path / "viewer.png", time_s=100.0)
     except ShiplogError as error:
         no_viewer(f"no headless viewer here: {error.message}")
     names = {view.name for view in state.views}
@@ -124,4 +124,4 @@ def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewe
     (recording,) = [r for r in state.recordings if r.timelines]
     (time,) = [t for t in recording.timelines if t.name == "sim_time"]
     assert (time.start, time.end) == (0, 200_000_000_000)
-    assert (tmp_path / "seen.png").stat().st_size > 50_000
+    assert (tmp_path / "viewer.png").stat().st_size > 50_000

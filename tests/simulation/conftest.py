@@ -12,19 +12,19 @@ from coupled_ships import COUPLED, sailed
 @jax.tree_util.register_static
 @dataclass(frozen=True)
 class Coupled:
-    """A ship in four numbers, everything acting on everything: drag, turn, push and wind."""
+    """A ship in four numbers, everything acting on everything: drag, turn, thrust and wind."""
 
     substeps: int = 1
-    names: ClassVar = ("drag", "turn", "push", "wind")
+    names: ClassVar = ("drag", "turn", "thrust", "wind")
 
     def acceleration(self, theta, state, actuator, true_wind):
-        drag, turn, push, wind = theta
+        drag, turn, thrust, wind = theta
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
         c, s = jnp.cos(heading), jnp.sin(heading)
         north, east = true_wind[..., 0], true_wind[..., 1]
         return jnp.stack(
             (
-                v * r - drag * u * jnp.abs(u) + push * actuator[..., 0] ** 2,
+                v * r - drag * u * jnp.abs(u) + thrust * actuator[..., 0] ** 2,
                 -drag * v - turn * u * r - wind * (c * east - s * north),
                 turn * (actuator[..., 1] * u - r) + 0.1 * v,
             ),

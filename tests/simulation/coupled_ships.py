@@ -32,8 +32,8 @@ def sailed(count: int, size: int, seed: int, actuators: tuple[float, ...]) -> Wi
     wave = np.sin(2.0 * (t + rng.random((count, 1, 6))[..., None, 0]))
     level = rng.normal(size=(count, 1, 6)) * (5.0, 0.06, 5.0, 0.03, 2.0, 0.02)
     state = level + (0.0, 0.25, 0.0, 0.0, 0.0, 0.0) + wave.transpose(0, 2, 1) * 0.01
-    push = rng.normal(size=(count, 1, len(actuators))) * 0.2 + 1.0
-    driven = (push + 0.2 * np.sin(6.0 * t)[None, :, None]) * actuators
+    thrust = rng.normal(size=(count, 1, len(actuators))) * 0.2 + 1.0
+    driven = (thrust + 0.2 * np.sin(6.0 * t)[None, :, None]) * actuators
     wind = rng.normal(size=(count, 1, 2)) * 2.0 + np.zeros((1, size, 1))
     dt = rng.uniform(0.5, 1.5, size=(count, size - 1))
     return WindowSeries(state, driven, wind, dt, np.ones(count))

@@ -29,7 +29,7 @@ def test_a_calibrated_band_holds_nine_in_ten_of_fresh_errors():
     [(1, 0.9, 0.95), (18, 0.9, 0.95), (30, 0.9, 0.93), (900, 0.9, 0.901), (4, 0.5, 0.625)],
 )
 def test_few_voyages_ask_for_a_wider_quantile(groups, level, wanted):
-    """level (1 + 1/groups), no further than 0.95, of the very errors it has seen."""
+    """level (1 + 1/groups), no further than 0.95, of the very errors that it was calibrated on."""
     errors = walks(500, 2)
     nothing = np.zeros_like(errors)
     learnt = prediction_interval.calibrate(errors, nothing, groups, level)

@@ -13,15 +13,15 @@ from shiplog.simulation.sensitivities import WindowSeries
 @jax.tree_util.register_static
 @dataclass(frozen=True)
 class Boat:
-    """u̇ = -drag u + push n; sway and yaw rate fade by themselves, and nothing hears `silent`."""
+    """u̇ = -drag u + thrust n; sway and yaw rate fade by themselves, and nothing hears `silent`."""
 
-    names = ("drag", "push", "silent")
+    names = ("drag", "thrust", "silent")
     substeps = 1
 
     def acceleration(self, theta, state, actuator, true_wind):
-        drag, push = theta[0], theta[1]
+        drag, thrust = theta[0], theta[1]
         u, v, r = state[..., 1], state[..., 3], state[..., 5]
-        return jnp.stack((-drag * u + push * actuator[..., 0], -0.1 * v, -0.1 * r), -1)
+        return jnp.stack((-drag * u + thrust * actuator[..., 0], -0.1 * v, -0.1 * r), -1)
 
 
 @jax.tree_util.register_static

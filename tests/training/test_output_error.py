@@ -19,9 +19,9 @@ from shiplog.training.output_error import CORRELATION, Identified, identify
 @jax.tree_util.register_static
 @dataclass(frozen=True)
 class Straight:
-    """u̇ = push n₁, v̇ = lift n₂ + cross n₁: a rollout is linear in the parameters."""
+    """u̇ = thrust n₁, v̇ = lift n₂ + cross n₁: a rollout is linear in the parameters."""
 
-    names = ("push", "lift", "cross")
+    names = ("thrust", "lift", "cross")
     substeps = 1
 
     def acceleration(self, theta, state, actuator, true_wind):
@@ -41,9 +41,9 @@ class Pair:
 
     def acceleration(self, theta, state, actuator, true_wind):
         a, b = theta[0], theta[1]
-        push = {"sum": a + b, "difference": a - b, "product": a * b}[self.kind]
+        thrust = {"sum": a + b, "difference": a - b, "product": a * b}[self.kind]
         u, v, r = state[..., 1], state[..., 3], state[..., 5]
-        return jnp.stack((-0.05 * u + push * actuator[..., 0], -v, -r), -1)
+        return jnp.stack((-0.05 * u + thrust * actuator[..., 0], -v, -r), -1)
 
 
 def noisy(data: WindowSeries, seed: int, sigma: float = 0.02) -> WindowSeries:
@@ -241,7 +241,7 @@ def test_where_the_evaluations_run_out_the_best_is_kept_and_reported(blurred, mo
     tired = identify(Boat(), START, WIDE, blurred, most=most, rounds=1)
     assert not tired.converged
     assert f"after {most} evaluations" in tired.message
-    assert "drag" in tired.message and "push" in tired.message
+    assert "drag" in tired.message and "thrust" in tired.message
     assert tired.loss[1] <= tired.loss[0]
     assert tired.evaluations <= most
     assert notes(tired, Boat.names, WIDE)[-1] == (
@@ -278,7 +278,7 @@ def test_a_ridge_of_any_firmness_knows_no_more_of_what_no_data_touch(exact, fact
 
 @pytest.mark.parametrize(("weight", "factor"), [(1.0, 1.0), (2.0, 1.0), (1.0, 0.5), (1.0, 3.0)])
 def test_the_covariance_is_the_closed_form_of_one_window(weight, factor):
-    """u_k = u₀ + push Σ n dt. With J the sum, in the loss's cm/s and trapezoidal seconds:
+    """u_k = u₀ + thrust Σ n dt. With J the sum, in the loss's cm/s and trapezoidal seconds:
     s² (w S + 1/f⁴) / (w s²JᵀJ/σ² + 1/f²)², S between the gradient's square and what is expected
     of it, f how many times the plausible spread s the ridge allows."""
     whole = measured(Straight(), (0.02, -0.01, 0.005), driven(2))
@@ -313,7 +313,7 @@ def test_each_window_is_one_observation_of_its_own_gradient():
     """Twice the windows, the same again: the data's part of the sandwich halves (Huber, White).
 
     Σ g gᵀ between the inverses of Σ JᵀJ, shrunk towards noise · Σ JᵀJ as if the three numbers
-    fitted were three more windows, times n/(n - 1); the ridge is far too weak to be seen."""
+    fitted were three more windows, times n/(n - 1); the ridge is far too weak to matter."""
     data = noisy(measured(Straight(), (0.02, -0.01, 0.005), driven(2)), seed=5)
     start, spread = np.array([0.03, 0.0, 0.0]), np.full(3, 100.0)
     one = identify(Straight(), start, spread, data)
