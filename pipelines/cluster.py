@@ -12,7 +12,7 @@ import polars as pl
 from pipelines.bars import Bars
 from pipelines.train_networks import training_of
 from shiplog.training import cluster, load_model, network_files, run_folder
-from shiplog.training.network_training import share_done
+from shiplog.training.network_training import ended, share_done
 from shiplog.training.queue import Task
 from shiplog.voyages import one_hertz
 
@@ -69,8 +69,7 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
                 log.warning("%s: %s", one.name, one.failure)
             elif one.ended:
                 network_files.save(run.seed(seed), one.progress)
-                said = (one.name, one.progress.best, one.progress.epoch)
-                log.info("%s: best validation L %.0f after %d epochs", *said)
+                log.info("%s: %s", one.name, ended(one.progress.best, one.progress.epoch))
             else:
                 network_files.save_checkpoint(run.seed(seed), one.progress)
             reached = one.progress.epoch if one.progress else 0

@@ -23,7 +23,7 @@ from shiplog.training import load_model, network_files, network_gradient, random
 from shiplog.training.jittering import jittered
 from shiplog.training.job import Training
 from shiplog.training.load_model import NetworkRun, Run
-from shiplog.training.network_training import Progress
+from shiplog.training.network_training import Progress, ended
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.queue import Report, Task, work
@@ -134,8 +134,7 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
                 log.warning("%s: %s", event.task.name, event.failure)
             else:
                 best, epochs, took = event.result
-                line = (event.task.name, best, epochs, took)
-                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *line)
+                log.info("%s: %s, %.0f s", event.task.name, ended(best, epochs), took)
     return failures
 
 
