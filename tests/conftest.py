@@ -20,12 +20,12 @@ disk_cache.keep_compiled()
 # one worker's, with the fixtures that are made once for it.
 LONGEST = (
     "pipelines/test_real_logs.py", "pipelines/test_demo.py", "diagnosis/test_whole_way.py",
-    "diagnosis/test_whole_way_trials.py",
-    "diagnosis/test_network_base.py", "pipelines/test_tour.py", "pipelines/test_paper.py",
-    "pipelines/test_train_physics.py", "voyages/test_sensor_consistency.py", "cli/test_endings.py",
-    "experiments/test_simulated_ship.py", "voyages/test_sensor_correction.py",
-    "training/test_hybrid_training.py", "diagnosis/test_residual_acceleration.py",
-    "cli/test_same_numbers.py",
+    "diagnosis/test_whole_way_trials.py", "diagnosis/test_network_base.py",
+    "pipelines/test_tour.py", "pipelines/test_paper.py", "pipelines/test_train_physics.py",
+    "voyages/test_sensor_consistency.py", "cli/test_endings.py",
+    "diagnosis/test_without_wind_sensor.py", "experiments/test_simulated_effects.py",
+    "experiments/test_simulated_logs.py", "voyages/test_sensor_correction.py",
+    "diagnosis/test_residual_acceleration.py", "cli/test_same_numbers.py",
 )  # fmt: skip
 ONE_WORKER = ("tests/diagnosis/test_whole_way",)  # files that begin so are one worker's together
 
