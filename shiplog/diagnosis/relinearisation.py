@@ -128,7 +128,7 @@ def _within_bounds(
 def within(
     mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """[Q] a Gaussian's likeliest numbers between bounds: what is held at one moves the others."""
+    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others."""
     if ((mean >= low) & (mean <= high)).all():
         return mean
     unit = np.sqrt(np.diagonal(covariance))

@@ -63,7 +63,7 @@ class Search:
         self.table.rescore()
 
     def without(self, name: str) -> None:
-        """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
+        """Go on without a cause, for as many sets again: those behind it were hardly weighed."""
         self.banned.add(name)
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
