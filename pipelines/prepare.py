@@ -113,6 +113,6 @@ def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
         voyage = ingest(path, chosen or fitting_profile(contents(path)))
     except Exception as error:
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
-        log.info("%s: its sensors are not compared with each other: %s", path.stem, why.message)
+        log.info("%s: sensors not held against each other: %s", path.stem, why.message)
         return []
     return sensor_consistency.findings(voyage.estimates, voyage.table.height, voyage.profile)
