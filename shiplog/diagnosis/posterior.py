@@ -111,7 +111,7 @@ def practical(table: Hypotheses, one: Hypothesis) -> tuple[str, ...]:
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
-    """Of what a hypothesis explains beyond nothing, the share that its causes explain."""
+    """The causes' share of the log Bayes factor of a hypothesis over no change."""
     nothing = table.nothing.evidence
     whole = one.evidence - nothing
     alone = max(

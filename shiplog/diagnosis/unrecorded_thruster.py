@@ -1,4 +1,4 @@
-"""A force that nobody records and that comes and goes: its log likelihood, place and course."""
+"""An unrecorded intermittent side force: its likelihood, its place and its course."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def estimate_side_force(
     linear: Linear, d: np.ndarray, ref: Reference, process_noise: ProcessNoise, weight: np.ndarray,
     nominal: np.ndarray | None = None,
 ) -> SideForce:  # fmt: skip
-    """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
-    as no other process noise does. Estimated from the residual.
+    """The most probable intermittent side force at one place along the ship, from the residual.
+    It accelerates sway and yaw together, as no other process noise does.
 
     d       [C] numbers of the pass; weight [S] of its segments
     nominal acceleration [3] of nominal process noise at one place; None without any

@@ -1,4 +1,4 @@
-"""An intermittent side force, of segments whose pushes are drawn."""
+"""An intermittent side force, of segments whose forces are drawn."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -24,7 +24,7 @@ def reference(monkeypatch):
 
 
 def passed(force: float):
-    """A pass of segments, a third of which are pushed by so many newtons at one place."""
+    """A pass of segments, on a third of which so many newtons act at one place."""
     record = straight.sailed(COUNT)
     knots = segments.grid(record).knots
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
@@ -35,7 +35,7 @@ def passed(force: float):
     )
 
 
-def test_pushes_at_one_place_are_found_there(reference):
+def test_forces_at_one_place_are_found_there(reference):
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
     found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
@@ -48,7 +48,7 @@ def test_pushes_at_one_place_are_found_there(reference):
 
 
 def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference):
-    """Sway and yaw pushed more than usual, apart from each other, and surge as usual."""
+    """Raised in sway and yaw, independently of each other, and nominal in surge."""
     record = straight.sailed(COUNT)
     knots = segments.grid(record).knots
     more = replace(
@@ -65,7 +65,7 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
-    """One on which the model diverged: rows of zeros, nothing of it seen."""
+    """One on which the model diverged: rows of zeros, nothing of it measured."""
     linear = passed(40.0)
     none = np.zeros(linear.j.shape[-1])
     lost = np.arange(COUNT) == 7
@@ -83,7 +83,7 @@ def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
 
 
-def test_what_nominally_pushes_at_one_place_is_no_force_of_the_trial(reference):
+def test_a_nominal_force_at_one_place_is_no_force_of_the_trial(reference):
     """Bursts at one place: a force at that place unless they are nominal there."""
     linear = passed(40.0)
     none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
@@ -122,14 +122,14 @@ def asked(monkeypatch):
     return output
 
 
-def test_what_nominally_pushes_at_one_place_is_tested_on_the_nominal_campaign(asked):
+def test_a_nominal_force_at_one_place_is_tested_on_the_nominal_campaign(asked):
     record, columns = straight.sailed(12), straight.columns_of(CAUSES)
     made = straight.campaign(record, straight.passed(record, columns), columns)
     grid = segments.grid(record)
     assert intermittent.nominal_side_force(made, grid) == pytest.approx(2.0 * UNIT)
     assert asked["weight"].sum() == 12.0
     assert intermittent.nominal_side_force(replace(made, weight=np.zeros(12)), grid) is None
-    asked["gain"] = -1.0  # it pushes in each channel by itself
+    asked["gain"] = -1.0  # it acts in each channel by itself
     assert intermittent.nominal_side_force(made, grid) is None
 
 
