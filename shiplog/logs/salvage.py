@@ -57,16 +57,20 @@ def _take(
         channel = tables.found.channels.get(number)
         logged = nanoseconds([m.log_time for m in met])
         tally.note(number, logged, known=channel is not None)
-        if channel is None or (topics is not None and channel.topic not in topics):
-            continue
-        reader = tables.decoder(channel)
-        if reader is None:
-            continue
-        tables.room -= len(met)
-        if tables.room < 0:
-            tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
-        else:
-            _decode(tables, channel, reader, met, logged)
+        if channel is not None and (topics is None or channel.topic in topics):
+            decode(tables, channel, met, logged)
+
+
+def decode(tables: Tables, channel: Channel, met: list[Message], logged: np.ndarray) -> None:
+    """Messages of one channel, and their log times [n] ns, into its table if it is wanted."""
+    reader = tables.decoder(channel)
+    if reader is None:
+        return
+    tables.room -= len(met)
+    if tables.room < 0:
+        tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
+    else:
+        _decode(tables, channel, reader, met, logged)
 
 
 def _decode(
@@ -89,7 +93,12 @@ def _decode(
 def _columns(
     reader: Decoder, payloads: list[bytes], leaves: list[str] | None
 ) -> tuple[pl.DataFrame, np.ndarray]:
-    """Each payload once, however often it was sent: millions of one kind cost no more than one."""
+    """Each payload once, however often it was sent: millions of one kind cost no more than one.
+
+    Those of a schema that are large are few, and to compare them takes longer than to decode them.
+    """
+    if reader.layout and sum(map(len, payloads)) > LARGE_TEXT * len(payloads):
+        return reader.columns(payloads, leaves)
     first = {payload: i for i, payload in enumerate(dict.fromkeys(payloads))}
     if len(first) > len(payloads) // 2:
         return reader.columns(payloads, leaves)

@@ -30,8 +30,9 @@ from mcap_ros2.writer import Writer as Ros2Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import rerun_route
+from shiplog.logs import preflight, read_ahead, rerun_route, scan
 from shiplog.logs.check import check
+from shiplog.logs.container import Index, Sound
 from shiplog.logs.read import contents, fields, read
 
 COUNT = 3000
@@ -562,18 +563,36 @@ def by_rerun(monkeypatch):
     monkeypatch.setattr(rerun_route, "LEAST_MESSAGES", 0)
     monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
     monkeypatch.setattr(rerun_route, "read_most", watched)
+    monkeypatch.setattr(preflight, "candidates", lambda tables: [])  # none is decoded before
     return given
 
 
-def by_hand(path: Path, wanted=None):
+@pytest.fixture
+def on_the_walk(monkeypatch):
+    """Every log is checked first, however small; says which topics were decoded meanwhile."""
+    given: list[str] = []
+    whole = preflight.checked
+
+    def watched(tables):
+        sound = whole(tables)
+        given.extend(sound[1] if sound else ())
+        return sound
+
+    monkeypatch.setattr(rerun_route, "LEAST_MESSAGES", 0)
+    monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
+    monkeypatch.setattr(preflight, "checked", watched)
+    return given
+
+
+def by_hand(path: Path, wanted=None, others=False):
     """The same through the packages, whatever Rerun could do."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rerun_route, "worth_it", lambda tables: False)
-        return read(path, wanted)
+        return read(path, wanted, others)
 
 
-def assert_same(path: Path, wanted=None):
-    one, other = read(path, wanted), by_hand(path, wanted)
+def assert_same(path: Path, wanted=None, others=False):
+    one, other = read(path, wanted, others), by_hand(path, wanted, others)
     assert (one.contents, one.health) == (other.contents, other.health)
     assert one.frames.keys() == other.frames.keys()
     for topic, frame in one.frames.items():
@@ -595,6 +614,84 @@ def test_rerun_and_the_packages_give_one_protobuf_table(tmp_path, by_rerun, want
     found = assert_same(path, wanted)
     assert set(by_rerun) == set(found.frames)
     assert found.health.route == "fast"
+
+
+NUMBERS = ("value", "small", "signed", "point.x", "maybe", "timestamp.nanos")
+
+
+@pytest.mark.parametrize("jitter", [0, 10], ids=["in order", "out of order"])
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_numbers_and_large_messages_are_decoded_on_the_walk(
+    tmp_path, on_the_walk, jitter, compression
+):
+    """/a as numbers, /b as pictures, /c by Rerun, which also gives texts."""
+
+    def make(k: int):
+        message = sample(k, newest=3)
+        message.raw = bytes([k % 256]) * (9000 if k % 3 == 1 else 1)
+        return message
+
+    path = protobuf_log(
+        tmp_path / "log.mcap", count=900, make=make, compression=compression,
+        times=lambda k: START + k // 3 * SECOND + (9 * SECOND if jitter and k % jitter == 0 else 0),
+    )  # fmt: skip
+    wanted = {"/a": NUMBERS, "/b": ("value", "names"), "/c": ("value", "names")}
+    found = assert_same(path, wanted)
+    assert sorted(on_the_walk) == ["/a", "/b"]
+    assert found.frames.keys() == {"/a", "/b", "/c"} and found.health.route == "fast"
+    assert assert_same(path, {"/a": NUMBERS}, others=True).frames["/c"].width == 3
+    assert assert_same(path, {}, others=True).frames.keys() == {"/a", "/b", "/c"}
+
+
+def test_a_bad_payload_costs_one_message_on_the_walk(tmp_path, on_the_walk):
+    path = known_colours(tmp_path / "log.mcap", count=90, replaced={30: b"\xff", 31: b"\x42\x20a"})
+    found = assert_same(path, {}, others=True)
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
+    assert {t: frame.height for t, frame in found.frames.items()} == {"/a": 29, "/b": 29, "/c": 30}
+    assert [f.value for f in found.health.findings] == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("lie", ["place", "time", "beyond"])
+def test_an_index_that_lies_is_not_believed(tmp_path, on_the_walk, monkeypatch, lie):
+    """Nothing of it is left in the tables; the log is read message by message."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    expected = by_hand(path, {}, True)
+    whole = scan.index_of
+
+    def lying(body, section):
+        for index in whole(body, section):
+            places, times = index.places.copy(), index.times.copy()
+            if lie == "time":
+                times[-1] += 1
+            else:
+                places[-1] = places[0] if lie == "place" else 1 << 40
+            yield Index(index.channel, times, places)
+
+    monkeypatch.setattr(scan, "index_of", lying)
+    found = read(path, {}, others=True)
+    assert on_the_walk == []
+    assert found.frames.keys() == expected.frames.keys()
+    for topic, frame in found.frames.items():
+        assert_frame_equal(frame, expected.frames[topic])
+
+
+def test_chunks_read_ahead_are_those_of_the_file(tmp_path, monkeypatch):
+    """With threads and without: the same items, and the same losses where a chunk is damaged."""
+    path = known_colours(tmp_path / "log.mcap")
+    where, size, _ = chunks(path)[3]
+    data = bytearray(path.read_bytes())
+    data[where + size // 2] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(data)
+    for log in (path, damaged):
+        met = []
+        for fewest in (2, 10**9):
+            monkeypatch.setattr(read_ahead, "FEWEST_CHUNKS", fewest)
+            found = scan.survey(log)
+            items = [i for i in scan.walk(found) if isinstance(i, Sound)]
+            met.append(([(i.offset, bytes(i.chunk.data)) for i in items], found.losses))
+        assert met[0] == met[1] and len(met[0][0]) > 8
+        assert len(met[0][1]) == (log == damaged)
 
 
 def test_topics_with_odd_or_shared_names_do_not_get_mixed_up(tmp_path, by_rerun):
@@ -857,6 +954,14 @@ def test_rerun_and_the_packages_give_one_table_of_every_foreign_log(shared_data,
     for path in sorted((shared_data / "mcap").glob("[cp]*/*.mcap")):
         assert_same(path)
     assert len(by_rerun) > 600
+
+
+@pytest.mark.shared
+def test_the_walk_and_the_packages_give_one_table_of_every_foreign_log(shared_data, on_the_walk):
+    for path in sorted((shared_data / "mcap").glob("[cp]*/*.mcap")):
+        assert_same(path)
+        assert_same(path, {}, others=True)
+    assert len(on_the_walk) > 1200
 
 
 @pytest.mark.shared
