@@ -6,6 +6,7 @@ ten times slower.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
@@ -13,8 +14,8 @@ import numpy as np
 import polars as pl
 from mcap.records import Channel, Message
 
-from . import scan
-from .container import Index, Survey
+from . import chunks, scan
+from .container import Alone, Index, Sound, Survey
 from .messages import Decoder
 from .records import TooLarge
 from .tables import Tables, Tally
@@ -115,7 +116,7 @@ def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, l
     found = scan.survey(path)
     payloads: dict[str, set[int]] = {topic: set() for topic in suspects}
     again: dict[str, list[int]] = {topic: [] for topic in suspects}
-    for chunk in messages(found):
+    for chunk in _messages_on(found, suspects):
         for message in chunk:
             channel = found.channels.get(message.channel_id)
             topic = channel.topic if channel else ""
@@ -125,6 +126,21 @@ def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, l
                     again[topic].append(message.log_time)
                 payloads[topic].add(payload)
     return again
+
+
+def _messages_on(found: Survey, topics: Collection[str]) -> Iterator[list[Message]]:
+    """Those on some topics at least, without a copy of the others where they stand in chunks."""
+    if found.sections > 1:  # whose channels have other numbers in the chunks
+        yield from messages(found)
+        return
+    numbers = {number for number, channel in found.channels.items() if channel.topic in topics}
+    for item in scan.walk(found):
+        if isinstance(item, Sound):
+            with contextlib.suppress(ValueError):  # it was reported when the log was read
+                for batch in chunks.contents(item.chunk, only=numbers):
+                    yield [record for record in batch if isinstance(record, Message)]
+        elif isinstance(item, Alone):
+            yield from scan.contents_of(found, item)
 
 
 def nanoseconds(times: list[int]) -> np.ndarray:
