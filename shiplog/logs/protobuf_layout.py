@@ -247,8 +247,6 @@ def _value(layout: _Layout, data: bytes, at: int, end: int, wire: int) -> tuple[
     if wire == VARINT:
         begin, (_, after) = at, _varint(data, at, end)
         layout.mask[begin:after] = 0x80
-        if after - begin == LONGEST_VARINT:
-            layout.mask[after - 1] = 0xFF
     elif wire == BYTES:
         size, begin = _varint(data, at, end, shortest=True)
         layout.mask[at:begin] = 0xFF
@@ -285,9 +283,7 @@ def _note(
             layout.inside.add(name)
         below = None if name is None else f"{name}."
         _lay_out(layout, data, begin, after, _inner(known), below, left - 1)
-    elif name is not None:
-        if name in layout.fields:  # the last one counts
-            raise _Odd
+    elif name is not None:  # sent twice, the last one counts
         layout.fields[name] = known.type, begin, after - begin
 
 
@@ -313,7 +309,7 @@ def _varint(data: bytes, at: int, end: int, shortest: bool = False) -> tuple[int
     for place in range(at, min(end, at + LONGEST_VARINT)):
         value |= (data[place] & 0x7F) << 7 * (place - at)
         if data[place] < 0x80:
-            if value >> 64 or (shortest and place > at and data[place] == 0):
+            if shortest and place > at and data[place] == 0:
                 raise _Odd
             return value, place + 1
     raise _Odd

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from google.protobuf import descriptor_pb2 as pb
 from mcap.records import Schema
 from polars.testing import assert_frame_equal
-from test_read import DESCRIPTORS, Kind, sample
+from test_read import DESCRIPTORS, KIND, Kind, sample
 
 from shiplog.logs import protobuf
 from shiplog.logs.protobuf_layout import FlatMessages
@@ -25,6 +26,36 @@ def reader() -> protobuf.ProtobufMessages:
     return protobuf.messages(Schema(1, DESCRIPTORS, "protobuf", "t.Kind"))
 
 
+def other_kind(*, demanding: bool = False) -> protobuf.ProtobufMessages:
+    """A choice of two numbers, a map and a list of integers; or one field that must be sent."""
+    file = pb.FileDescriptorProto(name="o.proto", package="o", syntax="proto2")
+    kind = file.message_type.add(name="Other")
+    if demanding:
+        kind.field.add(name="x", number=1, type=KIND.TYPE_DOUBLE, label=KIND.LABEL_REQUIRED)
+    else:
+        file.syntax = "proto3"
+        kind.oneof_decl.add(name="choice")
+        for number, name in ((1, "x"), (2, "y")):
+            kind.field.add(name=name, number=number, type=KIND.TYPE_DOUBLE, label=1, oneof_index=0)
+        entry = kind.nested_type.add(name="NamesEntry")
+        entry.options.map_entry = True
+        for number, name in ((1, "key"), (2, "value")):
+            entry.field.add(name=name, number=number, type=KIND.TYPE_STRING, label=1)
+        kind.field.add(name="names", number=3, type=KIND.TYPE_MESSAGE, label=3,
+                       type_name=".o.Other.NamesEntry")  # fmt: skip
+        kind.field.add(name="whole", number=4, type=KIND.TYPE_INT64, label=3)
+        inner = file.message_type.add(name="Inner")
+        inner.oneof_decl.add(name="choice")
+        for number, name in ((1, "a"), (2, "b")):
+            inner.field.add(name=name, number=number, type=KIND.TYPE_DOUBLE, label=1, oneof_index=0)
+        kind.field.add(
+            name="inner", number=6, type=KIND.TYPE_MESSAGE, label=1, type_name=".o.Inner"
+        )
+        kind.field.add(name="z", number=5, type=KIND.TYPE_INT32, label=1)
+    described = pb.FileDescriptorSet(file=[file]).SerializeToString()
+    return protobuf.messages(Schema(1, described, "protobuf", "o.Other"))
+
+
 def at_once(flat: FlatMessages, payloads: Sequence[bytes]):
     groups = defaultdict(list)
     for row, payload in enumerate(payloads):
@@ -33,8 +64,12 @@ def at_once(flat: FlatMessages, payloads: Sequence[bytes]):
     return flat.columns(len(payloads), groups)
 
 
-def assert_as_the_package(payloads: Sequence[bytes], leaves: Sequence[str] = NUMBERS):
-    whole = reader()
+def assert_as_the_package(
+    payloads: Sequence[bytes],
+    leaves: Sequence[str] = NUMBERS,
+    whole: protobuf.ProtobufMessages | None = None,
+):
+    whole = whole or reader()
     flat = whole.flat(leaves)
     assert flat is not None
     frame, bad = at_once(flat, payloads)
@@ -105,6 +140,8 @@ ODD = {
     "a message twice": STAMP + b"\x0a\x02\x10\x05",
     "a tag in two bytes more than it needs": b"\x91\x80\x00" + bytes(8),
     "a length longer than it needs": b"\x0a\x82\x00\x08\x07",
+    "a tag in more bytes than a tag may have": b"\x91\x80\x80\x80\x80\x00" + bytes(8),
+    "a length in more bytes than it may have": b"\x0a\x82\x80\x80\x80\x80\x00\x08\x07",
     "a number longer than it needs": b"\x20\x81\x00",
     "eleven bytes of a number": b"\x28" + b"\xff" * 10 + b"\x01",
     "ten bytes, too large": b"\x28" + b"\xff" * 9 + b"\x02",
@@ -141,10 +178,44 @@ def test_what_is_odd_is_as_the_package_has_it(payload):
     assert_as_the_package([payload, payload, plain(1), payload])
     twin = bytearray(payload)
     for place in range(len(payload)):
-        twin[place] ^= 0x01
-        assert_as_the_package([payload, bytes(twin), payload])
-        assert_as_the_package([bytes(twin), payload])
-        twin[place] ^= 0x01
+        for bit in (0x01, 0x80):
+            twin[place] ^= bit
+            assert_as_the_package([payload, bytes(twin), payload])
+            assert_as_the_package([bytes(twin), payload])
+            twin[place] ^= bit
+
+
+DOUBLE = {k: np.float64(k).tobytes() for k in (1, 2)}
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"\x09" + DOUBLE[1], b"\x11" + DOUBLE[2], b"\x09" + DOUBLE[1] + b"\x11" + DOUBLE[2],
+        b"\x11" + DOUBLE[2] + b"\x09" + DOUBLE[1], b"\x1a\x06\x0a\x01k\x12\x01v\x28\x07",
+        b"\x1a\x06\x0a\x01\xff\x12\x01v\x28\x07", b"\x22\x03\x01\x80\x01\x28\x07",
+        b"\x22\x02\x01\x80\x28\x07", b"\x20\x01\x20\x02\x28\x07",
+        b"\x22\x0b" + b"\xff" * 10 + b"\x01\x28\x07", b"\x22\x03\x01\x01\x01\x28\x07",
+        b"\x32\x09\x09" + DOUBLE[1] + b"\x32\x09\x11" + DOUBLE[2],
+    ],
+    ids=["x", "y", "x, then y", "y, then x", "a map", "a map of no UTF-8", "a list",
+         "a list, cut", "a list, one by one", "a list of a long number", "a list of three", "merged"],
+)  # fmt: skip
+def test_choices_maps_and_lists_are_as_the_package_has_them(payload):
+    """Of a choice the last one counts."""
+    whole = other_kind()
+    leaves = ["x", "y", "z", "inner.a", "inner.b"]
+    assert_as_the_package([payload], leaves, whole)
+    twin = bytearray(payload)
+    for place in range(len(payload)):
+        twin[place] ^= 0x80
+        assert_as_the_package([payload, b"\x28\x05", bytes(twin), payload], leaves, whole)
+        twin[place] ^= 0x80
+
+
+def test_a_field_that_must_be_sent_is_the_packages_to_miss():
+    assert other_kind(demanding=True).flat(["x"]) is None
+    assert other_kind().flat(["x"]) is not None
 
 
 def test_damaged_bytes_are_as_the_package_has_them():
