@@ -199,7 +199,7 @@ DOUBLE = {k: np.float64(k).tobytes() for k in (1, 2)}
         b"\x32\x09\x09" + DOUBLE[1] + b"\x32\x09\x11" + DOUBLE[2],
     ],
     ids=["x", "y", "x, then y", "y, then x", "a map", "a map of no UTF-8", "a list",
-         "a list, cut", "a list, one by one", "a list of a long number", "a list of three", "merged"],
+         "a list, cut", "one by one", "a long number", "three", "merged"],
 )  # fmt: skip
 def test_choices_maps_and_lists_are_as_the_package_has_them(payload):
     """Of a choice the last one counts."""
