@@ -30,6 +30,7 @@ from mcap_ros2.writer import Writer as Ros2Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
+from shiplog.logs import chunks as chunks_module
 from shiplog.logs import preflight, read_ahead, rerun_route, scan
 from shiplog.logs.check import check
 from shiplog.logs.container import Index, Sound
@@ -624,7 +625,7 @@ NUMBERS = ("value", "small", "signed", "point.x", "maybe", "timestamp.nanos")
 def test_numbers_and_large_messages_are_decoded_on_the_walk(
     tmp_path, on_the_walk, jitter, compression
 ):
-    """/a as numbers, /b as pictures, /c by Rerun, which also gives texts."""
+    """/a by Rerun, which also gives texts, /b as pictures, /c as numbers; in the log's order."""
 
     def make(k: int):
         message = sample(k, newest=3)
@@ -635,11 +636,11 @@ def test_numbers_and_large_messages_are_decoded_on_the_walk(
         tmp_path / "log.mcap", count=900, make=make, compression=compression,
         times=lambda k: START + k // 3 * SECOND + (9 * SECOND if jitter and k % jitter == 0 else 0),
     )  # fmt: skip
-    wanted = {"/a": NUMBERS, "/b": ("value", "names"), "/c": ("value", "names")}
+    wanted = {"/a": ("value", "names"), "/b": ("value", "names"), "/c": NUMBERS}
     found = assert_same(path, wanted)
-    assert sorted(on_the_walk) == ["/a", "/b"]
-    assert found.frames.keys() == {"/a", "/b", "/c"} and found.health.route == "fast"
-    assert assert_same(path, {"/a": NUMBERS}, others=True).frames["/c"].width == 3
+    assert sorted(on_the_walk) == ["/b", "/c"]
+    assert list(found.frames) == ["/a", "/b", "/c"] and found.health.route == "fast"
+    assert assert_same(path, {"/c": NUMBERS}, others=True).frames["/a"].width == 3
     assert assert_same(path, {}, others=True).frames.keys() == {"/a", "/b", "/c"}
 
 
@@ -651,17 +652,48 @@ def test_a_bad_payload_costs_one_message_on_the_walk(tmp_path, on_the_walk):
     assert [f.value for f in found.health.findings] == [1.0, 1.0]
 
 
+def test_chunks_too_large_to_be_unpacked_at_once_are_decoded_on_the_walk(
+    tmp_path, on_the_walk, monkeypatch
+):
+    """And a walk that misses a message of theirs is not believed."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    monkeypatch.setattr(chunks_module, "AT_ONCE", 4096)
+    assert_same(path, {}, others=True)
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
+    on_the_walk.clear()
+    whole, missed = preflight._Waiting.take_alone, []
+
+    def missing(self, message):
+        if missed:
+            whole(self, message)
+        missed.append(message)
+
+    monkeypatch.setattr(preflight._Waiting, "take_alone", missing)
+    assert_same(path, {}, others=True)
+    assert on_the_walk == [] and missed
+
+
+def test_a_topic_of_two_channels_is_not_decoded_on_the_walk(tmp_path, on_the_walk):
+    path = known_colours(tmp_path / "log.mcap", count=300, topics=("/a", "/b", "/a"))
+    assert assert_same(path, {}, others=True).frames["/a"].height == 200
+    assert on_the_walk == ["/b"]
+
+
 @pytest.mark.parametrize("lie", ["place", "time", "beyond"])
 def test_an_index_that_lies_is_not_believed(tmp_path, on_the_walk, monkeypatch, lie):
-    """Nothing of it is left in the tables; the log is read message by message."""
+    """Nothing of what was decoded before is left in the tables: the log is read anew."""
     path = known_colours(tmp_path / "log.mcap", count=900)
     expected = by_hand(path, {}, True)
-    whole = scan.index_of
+    whole, met = scan.index_of, []
+    monkeypatch.setattr(preflight, "HELD_BYTES", 1000)
 
     def lying(body, section):
         for index in whole(body, section):
             places, times = index.places.copy(), index.times.copy()
-            if lie == "time":
+            met.append(index)
+            if len(met) < 9:
+                pass
+            elif lie == "time":
                 times[-1] += 1
             else:
                 places[-1] = places[0] if lie == "place" else 1 << 40
