@@ -6,10 +6,8 @@ Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fau
 
 from __future__ import annotations
 
-import errno
 import io
 import logging
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -23,10 +21,6 @@ from shiplog.exceptions import ShiplogError
 
 STOPPED = 130  # by Ctrl-C, as shells have it
 STOPPED_SENTENCE = "stopped; what was finished is kept"
-MENDABLE = (  # what the system says of a path that the user can mend
-    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
-    errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
-)  # fmt: skip
 
 
 class _Lines(logging.Handler):
@@ -75,11 +69,6 @@ def _fault(error: Exception) -> ShiplogError:
     """The message for a user."""
     if isinstance(error, ShiplogError):
         return error
-    if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
-        return ShiplogError(
-            f"{os.fsdecode(error.filename)}: {error.strerror}.",
-            hint="look whether that path is what you meant, may be used, and has room on its disk.",
-        )
     from shiplog.unexpected import unexpected
 
     return unexpected(error)

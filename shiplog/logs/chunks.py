@@ -11,7 +11,7 @@ import logging
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
 
 import lz4.frame
@@ -59,7 +59,8 @@ def chunk(body: bytes) -> Chunk | None:
     begin = where[0]
     (packed,) = LENGTH.unpack_from(body, begin - LENGTH.size)
     compression = body[FIXED.size : FIXED.size + name].decode("utf-8", "backslashreplace")
-    return Chunk(compression, body[begin : begin + packed], end, start, crc, size)
+    data = memoryview(body)[begin : begin + packed]  # no copy: it may be megabytes
+    return Chunk(compression, data, end, start, crc, size)  # type: ignore[arg-type]
 
 
 def opened(packed: Chunk) -> Chunk:
@@ -85,10 +86,13 @@ def opened(packed: Chunk) -> Chunk:
         raise ValueError("cannot be decompressed") from error
 
 
-def contents(sound: Chunk, counts: Counter[int] | None = None) -> Iterator[list[McapRecord]]:
+def contents(
+    sound: Chunk, counts: Counter[int] | None = None, only: Container[int] | None = None
+) -> Iterator[list[McapRecord]]:
     """Schemas, channels and messages of an opened chunk, in batches; all of them or none.
 
     counts  messages by channel so far: they are then counted here, and not handed on
+    only    channels whose messages are handed on, if not all
     Raises ValueError where the bytes are no records, before any is handed on.
     """
     size = sound.uncompressed_size
@@ -99,7 +103,7 @@ def contents(sound: Chunk, counts: Counter[int] | None = None) -> Iterator[list[
         for first in range(0, len(places), BATCH_RECORDS):
             batch = places[first : first + BATCH_RECORDS]
             bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in batch)
-            yield list(_made(bodies, counts))
+            yield list(_made(bodies, counts, only))
 
 
 def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
@@ -108,13 +112,18 @@ def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
 
 
 def _made(
-    bodies: Iterable[tuple[int, memoryview, bool]], counts: Counter[int] | None
+    bodies: Iterable[tuple[int, memoryview, bool]],
+    counts: Counter[int] | None,
+    only: Container[int] | None = None,
 ) -> Iterator[McapRecord]:
     for opcode, body, whole in bodies:
-        if opcode == Opcode.MESSAGE and counts is not None:
-            if len(body) >= records.MESSAGE.size:
-                counts[body[0] + 256 * body[1]] += 1
-            continue
+        if opcode == Opcode.MESSAGE and len(body) >= records.MESSAGE.size:
+            channel = body[0] + 256 * body[1]
+            if counts is not None:
+                counts[channel] += 1
+                continue
+            if only is not None and channel not in only:
+                continue
         made = records.record(opcode, body, whole) or records.unnamed(opcode, body)
         if made is not None:
             yield made
@@ -123,6 +132,8 @@ def _made(
 def _at_once(packed: Chunk) -> bytes:
     """Never more than the chunk states, and that only when the frame agrees."""
     size = packed.uncompressed_size
+    if packed.compression == "":
+        return packed.data
     if packed.compression == "zstd":
         framed = zstandard.get_frame_parameters(packed.data).content_size
         if framed == size:
@@ -156,7 +167,9 @@ def _unpacked(packed: Chunk) -> Iterator[bytes]:
 
 def _pieces(packed: Chunk, most: int) -> Iterator[bytes]:
     """A chunk's bytes, never more than `most` of them at once."""
-    if packed.compression == "":
+    if packed.compression == "" and len(packed.data) <= AT_ONCE:
+        yield packed.data
+    elif packed.compression == "":
         for at in range(0, len(packed.data), most):
             yield packed.data[at : at + most]
     elif packed.compression == "lz4":

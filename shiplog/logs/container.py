@@ -86,10 +86,15 @@ class Alone:
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """What follows a chunk: the log times of one channel's messages in it [n] ns, in file order."""
+    """What follows a chunk: one channel's messages in it, in file order.
+
+    times   [n] ns, log times
+    places  [n] bytes, where the records begin in the unpacked chunk
+    """
 
     channel: int
     times: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(slots=True)
@@ -243,4 +248,4 @@ def index_of(body: bytes, section: int) -> Iterator[Index]:
         return
     pairs = np.frombuffer(body, "<i8", length // 8, begin.size).reshape(-1, 2)
     in_file = pairs[np.argsort(pairs[:, 1], kind="stable")]
-    yield Index(channel + section * SECTION, in_file[:, 0])
+    yield Index(channel + section * SECTION, in_file[:, 0], in_file[:, 1])

@@ -35,7 +35,10 @@ def losses(
             sentence = f"The log is cut off: at byte {loss.offset} it {loss.reason}"
         names = sorted({topics[number] for number in loss.held if number in topics})
         if start is not None and end is not None:
-            sentence += f"; {_what(loss, names)} from {start:.1f} s to {end:.1f} s"
+            when = f"from {start:.1f} s to {end:.1f} s"
+            if start < end <= 0.0:
+                when = f"of {-start:.1f} s before the first message that can be read"
+            sentence += f"; {_what(loss, names)} {when}"
             sentence += " are lost" if loss.chunk else " may be lost"
         channel = names[0] if len(names) == 1 else "log"
         findings.append(Finding(loss.kind, channel, sentence + ".", start, end))
@@ -93,6 +96,8 @@ def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
 
 def twice(frame: pl.DataFrame) -> set[int]:
     """Log times of the messages that share their stamp with another, and may be the same one."""
+    if (frame["stamp"].drop_nulls().diff().drop_nulls() > 0).all():
+        return set()
     stamp = pl.col("stamp")
     shared = frame.filter(stamp.is_not_null()).filter(stamp.is_duplicated())
     return set(shared["log_time"].to_list())

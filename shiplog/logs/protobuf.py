@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import polars as pl
@@ -11,6 +11,7 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from .messages import Messages, leaves_of
+from .protobuf_layout import FlatMessages, flat, repeated
 
 F = FieldDescriptor
 DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read
@@ -25,15 +26,26 @@ SCALAR_TYPES: dict[int, pl.DataType] = {
 }  # fmt: skip
 
 
-def messages(schema: Schema) -> Messages:
+class ProtobufMessages(Messages):
+    """Messages of a schema that can also be decoded many at once."""
+
+    def __init__(self, descriptor: Descriptor, parse: Callable[[bytes], Any]) -> None:
+        kind = _struct(descriptor, (descriptor.full_name,))
+        bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
+        super().__init__(kind, parse, _getter(), bulk)
+        self._descriptor = descriptor
+
+    def flat(self, leaves: Sequence[str]) -> FlatMessages | None:
+        """The decoder of these leaves alone, where they are numbers."""
+        return flat(self, self._descriptor, leaves)
+
+
+def messages(schema: Schema) -> ProtobufMessages:
     """The decoder of one schema; any exception says that its descriptors are broken."""
     parse = DecoderFactory().decoder_for("protobuf", schema)
     if parse is None:
         raise ValueError("no protobuf descriptors")
-    descriptor = parse(b"").DESCRIPTOR
-    kind = _struct(descriptor, (descriptor.full_name,))
-    bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
-    return Messages(kind, parse, _getter(), bulk)
+    return ProtobufMessages(parse(b"").DESCRIPTOR, parse)
 
 
 def _struct(kind: Descriptor, inside: tuple[str, ...]) -> pl.Struct:
@@ -53,13 +65,7 @@ def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | Non
         single = _struct(kind, (*inside, kind.full_name))
         if not single.fields:
             return None
-    return pl.List(single) if _repeated(field) else single
-
-
-def _repeated(field: FieldDescriptor) -> bool:
-    if hasattr(field, "is_repeated"):  # protobuf 6 and later; `label` is on its way out
-        return bool(field.is_repeated)
-    return getattr(field, "label", None) == F.LABEL_REPEATED
+    return pl.List(single) if repeated(field) else single
 
 
 def _getter() -> Callable[[Any, str], Any]:

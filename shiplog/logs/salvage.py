@@ -6,6 +6,7 @@ ten times slower.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
@@ -13,8 +14,8 @@ import numpy as np
 import polars as pl
 from mcap.records import Channel, Message
 
-from . import scan
-from .container import Index, Survey
+from . import chunks, scan
+from .container import Alone, Index, Sound, Survey
 from .messages import Decoder
 from .records import TooLarge
 from .tables import Tables, Tally
@@ -57,16 +58,20 @@ def _take(
         channel = tables.found.channels.get(number)
         logged = nanoseconds([m.log_time for m in met])
         tally.note(number, logged, known=channel is not None)
-        if channel is None or (topics is not None and channel.topic not in topics):
-            continue
-        reader = tables.decoder(channel)
-        if reader is None:
-            continue
-        tables.room -= len(met)
-        if tables.room < 0:
-            tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
-        else:
-            _decode(tables, channel, reader, met, logged)
+        if channel is not None and (topics is None or channel.topic in topics):
+            decode(tables, channel, met, logged)
+
+
+def decode(tables: Tables, channel: Channel, met: list[Message], logged: np.ndarray) -> None:
+    """Messages of one channel, and their log times [n] ns, into its table if it is wanted."""
+    reader = tables.decoder(channel)
+    if reader is None:
+        return
+    tables.room -= len(met)
+    if tables.room < 0:
+        tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
+    else:
+        _decode(tables, channel, reader, met, logged)
 
 
 def _decode(
@@ -89,7 +94,12 @@ def _decode(
 def _columns(
     reader: Decoder, payloads: list[bytes], leaves: list[str] | None
 ) -> tuple[pl.DataFrame, np.ndarray]:
-    """Each payload once, however often it was sent: millions of one kind cost no more than one."""
+    """Each payload once, however often it was sent: millions of one kind cost no more than one.
+
+    Those of a schema that are large are few, and to compare them takes longer than to decode them.
+    """
+    if reader.layout and sum(map(len, payloads)) > LARGE_TEXT * len(payloads):
+        return reader.columns(payloads, leaves)
     first = {payload: i for i, payload in enumerate(dict.fromkeys(payloads))}
     if len(first) > len(payloads) // 2:
         return reader.columns(payloads, leaves)
@@ -106,7 +116,7 @@ def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, l
     found = scan.survey(path)
     payloads: dict[str, set[int]] = {topic: set() for topic in suspects}
     again: dict[str, list[int]] = {topic: [] for topic in suspects}
-    for chunk in messages(found):
+    for chunk in _messages_on(found, suspects):
         for message in chunk:
             channel = found.channels.get(message.channel_id)
             topic = channel.topic if channel else ""
@@ -116,6 +126,21 @@ def repeated(path: Path, suspects: Mapping[str, Collection[int]]) -> dict[str, l
                     again[topic].append(message.log_time)
                 payloads[topic].add(payload)
     return again
+
+
+def _messages_on(found: Survey, topics: Collection[str]) -> Iterator[list[Message]]:
+    """Those on some topics at least, without a copy of the others where they stand in chunks."""
+    if found.sections > 1:  # whose channels have other numbers in the chunks
+        yield from messages(found)
+        return
+    numbers = {number for number, channel in found.channels.items() if channel.topic in topics}
+    for item in scan.walk(found):
+        if isinstance(item, Sound):
+            with contextlib.suppress(ValueError):  # it was reported when the log was read
+                for batch in chunks.contents(item.chunk, only=numbers):
+                    yield [record for record in batch if isinstance(record, Message)]
+        elif isinstance(item, Alone):
+            yield from scan.contents_of(found, item)
 
 
 def nanoseconds(times: list[int]) -> np.ndarray:

@@ -65,6 +65,46 @@ def ingest(path, profile: Profile) -> Voyage:
 
 def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
+    aligned = _aligned(reading, profile)
+    table, grid = aligned.table, aligned.grid
+    estimates = tuple(sensor_consistency.estimates(table, profile))
+    consistency = sensor_consistency.findings(estimates, table.height, profile)
+    named = table.lazy().with_columns(voyage=pl.lit(""))
+    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    report = VoyageReport(
+        name=reading.contents.path.stem,
+        messages_read=reading.health.messages_read,
+        messages_lost=reading.health.messages_lost,
+        rows=table.height,
+        seconds=round(grid.seconds, 3),
+        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
+        usable_s=usable_s,
+        windows=windows,
+        instruments=tuple(_instrument(*one) for one in aligned.samples),
+    )
+    return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
+
+
+def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
+    """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
+    table = _aligned(reading, profile).table
+    return sensor_consistency.findings(
+        sensor_consistency.estimates(table, profile), table.height, profile
+    )
+
+
+@dataclass(frozen=True)
+class _Aligned:
+    """A log on its 10 Hz grid, reduced to midship and marked."""
+
+    table: pl.DataFrame  # as a Voyage has it
+    grid: VoyageGrid
+    samples: list[tuple[str, resampling.Samples]]  # of each sensor and actuator
+    left_out: list[Finding]
+    datum: tuple[float, float] | None
+
+
+def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = _without_strays(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
@@ -102,22 +142,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    estimates = tuple(sensor_consistency.estimates(table, profile))
-    consistency = sensor_consistency.findings(estimates, table.height, profile)
-    named = table.lazy().with_columns(voyage=pl.lit(""))
-    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
-    report = VoyageReport(
-        name=reading.contents.path.stem,
-        messages_read=reading.health.messages_read,
-        messages_lost=reading.health.messages_lost,
-        rows=table.height,
-        seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *left_out, *grid.findings, *consistency),
-        usable_s=usable_s,
-        windows=windows,
-        instruments=tuple(_instrument(*one) for one in [*sampled.items(), *driven.items()]),
-    )
-    return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
+    return _Aligned(table, grid, [*sampled.items(), *driven.items()], left_out, datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:

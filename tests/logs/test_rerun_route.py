@@ -11,27 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
-from made_logs import (
-    COUNT,
-    SECOND,
-    START,
-    assert_same,
-    by_the_package,
-    chunks,
-    protobuf_log,
-    sample,
-)
+from made_logs import COUNT, SECOND, START, assert_same, by_the_package, chunks, known_colours
 from mcap.writer import IndexType
 from mcap_ros2.writer import Writer as Ros2Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.logs import rerun_route
 from shiplog.logs.read import read
-
-
-def known_colours(path: Path, **options) -> Path:
-    """A log that Rerun can read: no enum number beyond the schema."""
-    return protobuf_log(path, make=lambda k: sample(k, newest=3), **options)
 
 
 @pytest.mark.parametrize(
