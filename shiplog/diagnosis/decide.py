@@ -36,7 +36,7 @@ def decide(
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
     mostly = posteriors.share_of_causes(table, best) >= thresholds.MOST
-    mostly = mostly and not _imitated(table, fit, names)
+    mostly = mostly and (posteriors.slight(table, best) or not _imitated(table, fit, names))
     verdict, structure, named, side_force = "undecided", None, (), None
     if names and mostly:
         verdict, named = "named", _named(table, found, best, names)
