@@ -869,8 +869,25 @@ def edited(tmp_path, old, new):
         ("eps = 1.42", 'eps = "1.42"', ["rudder.eps", "'1.42'", "not a number"]),
         ("eps = 1.42", "eps = true", ["rudder.eps", "True", "not a number"]),
         ("eps = 1.42", "eps = [1.42]", ["rudder.eps", "not a number"]),
+        ("eps = 1.42", "eps = 1" + 400 * "0", ["rudder.eps", "inf", "0.2 to 3"]),
+        ("eps = 1.42", "eps = 1" + 6000 * "0", ["not valid TOML"]),
+        ("eps = 1.42", "eps = " + 20_000 * "[", ["not valid TOML"]),
     ],
-    ids=["high", "low", "nan", "key", "section", "missing", "syntax", "string", "bool", "array"],
+    ids=[
+        "high",
+        "low",
+        "nan",
+        "key",
+        "section",
+        "missing",
+        "syntax",
+        "string",
+        "bool",
+        "array",
+        "400 digits",
+        "6000 digits",
+        "nested",
+    ],
 )
 def test_a_file_that_cannot_be_is_refused_with_its_name(esso, tmp_path, old, new, words):
     path = edited(tmp_path, old, new)
