@@ -15,7 +15,7 @@ import polars as pl
 from mcap.records import Channel, Message
 
 from . import chunks, scan
-from .container import Alone, Index, Sound, Survey
+from .container import SECTION, Alone, Index, Sound, Survey
 from .messages import Decoder
 from .records import HEAD, MESSAGE, TooLarge
 from .tables import Tables, Tally, room
@@ -42,8 +42,8 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     for item in scan.walk(tables.found):
         if isinstance(item, Index):
             continue
-        if _beyond(item, tables.room):
-            _count(tables, topics, item, tally)
+        if left_out := _beyond(item, tables.room):
+            _count(tables, topics, left_out, tally)
             continue
         for met in scan.contents_of(tables.found, item):
             for message in met:
@@ -56,22 +56,24 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     return tally
 
 
-def _beyond(item: Sound | Alone, most: int) -> bool:
-    """Whether a chunk holds more messages than so many; then they are counted and not made."""
+def _beyond(item: Sound | Alone, most: int) -> Counter[int]:
+    """The messages by channel of a chunk that holds more than so many; else nothing.
+
+    They are counted and not made; every description of a channel is known by now.
+    """
     if isinstance(item, Alone) or item.chunk.uncompressed_size // SMALLEST_MESSAGE <= most:
-        return False
+        return Counter()
     try:
-        return chunks.message_counts(item.chunk).total() > most
+        counts = chunks.message_counts(item.chunk)
     except ValueError:  # `contents_of` says what is wrong with it
-        return False
+        return Counter()
+    first = item.section * SECTION
+    return Counter({n + first: c for n, c in counts.items()} if counts.total() > most else {})
 
 
 def _count(
-    tables: Tables, topics: Collection[str] | None, item: Sound | Alone, tally: Tally
+    tables: Tables, topics: Collection[str] | None, counts: Mapping[int, int], tally: Tally
 ) -> None:
-    counts: Counter[int] = Counter()
-    for _ in scan.contents_of(tables.found, item, counts):
-        pass
     for number, count in counts.items():
         channel = tables.found.channels.get(number)
         tally.add(number, count, known=channel is not None)
