@@ -10,6 +10,7 @@ from pathlib import Path
 from pipelines.bars import tracked
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ShiplogError
+from shiplog.logs import reading_limits
 from shiplog.logs.check import check
 from shiplog.logs.health_report import Finding, VoyageReport
 from shiplog.logs.read import contents
@@ -56,6 +57,7 @@ def ingest_logs(
     store.mend()  # else it would wait for the next voyage that is new
     for path in tracked(paths, "ingesting"):
         try:
+            reading_limits.begin(path)
             found = contents(path)
             profile_of = chosen or fitting_profile(found)
             if profile_of.source not in reported:
@@ -78,6 +80,7 @@ def ingest_logs(
             continue
         reports.append(voyage.report)
         log.info("%s: %s", voyage.name, state)
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 
@@ -96,6 +99,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
     refused: dict[str, ShiplogError] = {}
     for path in tracked(expand(paths), "checking"):
         try:
+            reading_limits.begin(path)
             health = check(path)
         except ShiplogError as error:
             refused[str(path)] = error
@@ -104,6 +108,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 

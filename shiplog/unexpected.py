@@ -21,6 +21,12 @@ def unexpected(error: BaseException, doing: str = "") -> Unexpected:
 
     doing   what the program was doing, such as the name of a log; empty for the command itself
     """
+    if isinstance(error, MemoryError):
+        return Unexpected(
+            f"{doing + ': ' if doing else ''}more memory was needed than there is, or than a file "
+            "of its size may take.",
+            hint="if the file is sound, it is too large for this computer: cut it into parts.",
+        )
     import traceback  # as below: seldom needed, and every command would wait for it
 
     words = " ".join(str(error).split())

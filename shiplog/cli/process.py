@@ -18,6 +18,7 @@ from typing import NoReturn
 import typer
 
 from shiplog import disk_cache
+from shiplog.cli import guard
 from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
 
@@ -45,7 +46,8 @@ def main() -> None:
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stopped)
-    sys.exit(run())
+    ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
+    sys.exit(run() if ended is None else ended)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

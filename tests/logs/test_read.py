@@ -635,6 +635,15 @@ def test_rerun_is_not_waited_for_longer_than_it_may_take(tmp_path, by_rerun, mon
     assert set(by_rerun) == {"/a", "/b", "/c"}
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_a_reader_without_memory_leaves_the_log_to_the_other(tmp_path, by_rerun, monkeypatch):
+    """It may take 1 GB less than it has reserved, so it gets no more."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    monkeypatch.setattr(rerun_route.reading_limits, "memory", lambda size: -1 << 30)
+    assert_same(path)
+    assert by_rerun == []
+
+
 def test_a_killed_worker_is_replaced(tmp_path, by_rerun):
     path = known_colours(tmp_path / "log.mcap", count=90)
     read(path)
