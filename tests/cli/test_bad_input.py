@@ -184,8 +184,8 @@ PROFILES = {
                            lambda d: d.through("= [0.7, -0.2]", "= [1e4, 0.0]")),
     "sign 0": (1, ["`sign` is 0"], lambda d: d.through(
         'field = "heading_deg"', 'sign = 0.0\nfield = "heading_deg"')),
-    "scale 1e308": (1, ["sensors.heading: `sign` is -1e+308", "between 1e-12 and 1e+06"], lambda d: d.through(
-        'field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
+    "scale 1e308": (1, ["sensors.heading: `sign` is -1e+308", "between 1e-12 and 1e+06"],
+        lambda d: d.through('field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
     "offset 1e308": (1, ["sensors.heading.offset"], lambda d: d.through(
         'field = "heading_deg"', 'offset = 1e308\nfield = "heading_deg"')),
     "water of 1 kg/m³, 3 m above ground": (1, ["site.density", "site.depth_m", "site.datum.0"],
