@@ -10,7 +10,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from .messages import Messages, leaves_of
+from .messages import Fields, Messages, leaves_of
 
 F = FieldDescriptor
 DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read
@@ -31,17 +31,18 @@ def messages(schema: Schema) -> Messages:
     if parse is None:
         raise ValueError("no protobuf descriptors")
     descriptor = parse(b"").DESCRIPTOR
-    kind = _struct(descriptor, (descriptor.full_name,))
+    kind = _struct(descriptor, (descriptor.full_name,), Fields())
     bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
     return Messages(kind, parse, _getter(), bulk)
 
 
-def _struct(kind: Descriptor, inside: tuple[str, ...]) -> pl.Struct:
-    types = {field.name: _dtype(field, inside) for field in kind.fields}
+def _struct(kind: Descriptor, inside: tuple[str, ...], met: Fields) -> pl.Struct:
+    met.more(len(kind.fields))
+    types = {field.name: _dtype(field, inside, met) for field in kind.fields}
     return pl.Struct({name: dtype for name, dtype in types.items() if dtype is not None})
 
 
-def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | None:
+def _dtype(field: FieldDescriptor, inside: tuple[str, ...], met: Fields) -> pl.DataType | None:
     """The type of a field; None for what holds nothing, or would contain itself."""
     single = SCALAR_TYPES.get(field.type)
     if single is None:
@@ -50,7 +51,7 @@ def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | Non
             return None
         if len(inside) > DEEPEST:
             return None
-        single = _struct(kind, (*inside, kind.full_name))
+        single = _struct(kind, (*inside, kind.full_name), met)
         if not single.fields:
             return None
     return pl.List(single) if _repeated(field) else single
