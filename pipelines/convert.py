@@ -51,7 +51,7 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
                     done.logs.append(target)
         except ShiplogError as error:
             done.refused[str(path)] = str(error)
-        except Exception as error:  # one bad source never ends the others
+        except BaseException as error:  # one bad source never ends the others; a panic, too
             done.refused[str(path)] = str(unexpected(error, path.name))
     reading_limits.end()
     return done

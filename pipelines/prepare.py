@@ -75,7 +75,7 @@ def ingest_logs(
         except ShiplogError as error:
             refused[str(path)] = error
             continue
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
@@ -104,7 +104,7 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
         except ShiplogError as error:
             refused[str(path)] = error
             continue
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
@@ -116,7 +116,7 @@ def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
     """What ingest would say of the sensors against each other; nothing where it would refuse."""
     try:
         voyage = ingest(path, chosen or fitting_profile(contents(path)))
-    except Exception as error:
+    except BaseException as error:
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
         log.info("%s: sensors not held against each other: %s", path.stem, why.message)
         return []

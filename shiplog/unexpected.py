@@ -17,10 +17,12 @@ class Unexpected(ShiplogError):
 
 
 def unexpected(error: BaseException, doing: str = "") -> Unexpected:
-    """Write the trace of an exception and say where it is.
+    """Write the trace of an exception and say where it is. One that asks to end is raised again.
 
     doing   what the program was doing, such as the name of a log; empty for the command itself
     """
+    if isinstance(error, (KeyboardInterrupt, SystemExit, GeneratorExit)):
+        raise error
     if isinstance(error, MemoryError):
         return Unexpected(
             f"{doing + ': ' if doing else ''}more memory was needed than there is, or than a file "

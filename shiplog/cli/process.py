@@ -66,14 +66,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message
             typer.echo(STOPPED_SENTENCE, err=True)
         return code
-    except Exception as error:
+    except BaseException as error:  # a panic of polars is no Exception
         fault = _fault(error)
         typer.echo(str(fault), err=True)
         return fault.exit_code
     return 0
 
 
-def _fault(error: Exception) -> ShiplogError:
+def _fault(error: BaseException) -> ShiplogError:
     """The message for a user."""
     if isinstance(error, ShiplogError):
         return error

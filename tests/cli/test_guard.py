@@ -33,6 +33,8 @@ main()
 """
 FAULTS = {
     "memory of Python's": ("bytearray(limits.LEAST_BYTES + (1 << 30))", "more memory was needed"),
+    "a panic, which is no Exception": ("raise type('Panic', (BaseException,), {})('at the disco')",
+                                       "an unexpected fault of the program: Panic"),
     "an abort": ("os.abort()", "it needed more memory than a file of its size may"),
     "a segmentation fault": ("os.kill(os.getpid(), 11)", "ended the process that read it (SIG"),
     "no end": ("limits.LEAST_S = 0.0; begin(path)\n        while True: pass",
