@@ -18,9 +18,10 @@ from pathlib import Path
 from shiplog.exceptions import LogUnreadable
 
 # Of a small file, and of a large one: memory, of which the libraries alone reserve 0.4 GB on two
-# cores and more on many; and processor time, of which a usual log takes 0.1 s for a MB.
+# cores and more on many; and processor time, of which a sound log takes 1 s for a MB on the slower
+# route, its check and its sensors included.
 LEAST_BYTES, BYTES_PER_BYTE = 4 << 30, 64
-LEAST_S, S_PER_MB = 120.0, 2.0
+LEAST_S, S_PER_MB = 60.0, 20.0
 
 
 @dataclass
