@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -65,6 +66,7 @@ def _ended(number: int, file: str) -> int:
 
 
 def _fork(fatal: dict[bytes, int]) -> _Child | None:
+    gc.freeze()  # a collection would touch every object, and copy the pages that are shared
     reading, writing = os.pipe()
     parent = os.getpid()
     pid = os.fork()

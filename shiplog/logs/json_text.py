@@ -32,7 +32,8 @@ class Json:
         self, payloads: Sequence[bytes], leaves: Collection[str] | None
     ) -> tuple[pl.DataFrame, np.ndarray]:
         bad = np.zeros(len(payloads), np.bool_)
-        payloads = [b"" if _beyond(payload) else payload for payload in payloads]
+        if any(len(payload) > 2 * DEEPEST for payload in payloads):  # as one so deep has to be
+            payloads = [b"" if _beyond(payload) else payload for payload in payloads]
         text = b"\n".join(
             p.replace(b"\n", b" ").replace(b"\r", b" ") if b"\n" in p or b"\r" in p else p
             for p in payloads
@@ -73,6 +74,8 @@ class Json:
 
 def _beyond(payload: bytes) -> bool:
     """Whether a message goes deeper, or has more fields, than any does."""
+    if len(payload) <= 2 * DEEPEST:
+        return False
     brackets = payload.count(b"{") + payload.count(b"[")
     if brackets <= DEEPEST and payload.count(b":") <= MOST_FIELDS:
         return False

@@ -110,15 +110,15 @@ def split(pieces: Iterable[bytes], size: int) -> Iterator[tuple[memoryview, list
         data = memoryview(kept + piece[skip:] if kept or skip else piece)
         skip, at, end, rest = 0, 0, len(data), size - taken
         runs: list[Run] = []
-        before, alike = (0, 0), 0
+        before, alike = -1, 0
         while at + HEAD.size <= end:
             opcode, length = HEAD.unpack_from(data, at)
             begin, stop = at + HEAD.size, at + HEAD.size + length
             if opcode == 0 or stop - end > rest:
                 raise ValueError("does not hold sound records")
             if stop <= end:
-                alike = alike + 1 if (opcode, length) == before else 0
-                before = (opcode, length)
+                alike = alike + 1 if length == before else 0
+                before = length
                 count = 1 if alike < ALIKE else _alike(data, at, HEAD.size + length)
                 runs.append((opcode, begin, length, count))
                 stop = at + count * (HEAD.size + length)
