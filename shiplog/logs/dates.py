@@ -18,7 +18,9 @@ from shiplog.units import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
 EARLIEST_NS = 347_155_200 * SECOND_NS  # 1981: what starts in 1970 or in 1980 was not set
-AHEAD_NS = DAY_NS  # of this computer's clock: it may stand in another zone, or be set by hand
+# Of this computer's clock. What is set by hand may be a year ahead, and nothing depends on it; a
+# counter of weeks that was taken for one turn later is 19.6 years ahead.
+AHEAD_NS = 3 * 365 * DAY_NS
 LEAST_NOW_NS = 1_767_225_600 * SECOND_NS  # 2026: a computer that says less is not set itself
 CLOCKS = {  # a column of times, and whose they are; the first that can be right is believed
     "stamp": "the messages' own stamps", "log_time": "the recorder's clock",

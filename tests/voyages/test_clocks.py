@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sailing
 
+from shiplog.logs import dates
 from shiplog.logs.check import check
 from shiplog.voyages.ingest import ingest
 
@@ -132,3 +133,20 @@ def test_clocks_that_nothing_ties_together_are_reported_with_what_to_do(voyage):
     assert {f.channel for f in told} == {"position", "velocity", "wind", "rudder", "propeller"}
     assert "Set another `clock` for it in the profile" in told[0].sentence
     assert done.report.usable_s == 0
+
+
+@pytest.mark.parametrize(
+    ("day", "can_be"),
+    [
+        ("1970-01-01", False), ("1980-01-06", False), ("1980-12-31", False), ("1981-01-01", True),
+        ("2026-06-01", True), ("2029-05-01", True), ("2029-06-02", False), ("2043-01-01", False),
+    ],
+)  # fmt: skip
+def test_what_a_log_can_be_of(monkeypatch, day, can_be):
+    """By a computer that says 2026-06-01; one that says 1970 cannot tell what is to come."""
+    instant = int(np.datetime64(day, "ns").astype(np.int64))
+    now = int(np.datetime64("2026-06-01", "ns").astype(np.int64))
+    monkeypatch.setattr("time.time_ns", lambda: now)
+    assert dates.possible(instant) == can_be
+    monkeypatch.setattr("time.time_ns", lambda: 12 * SECOND)
+    assert dates.possible(instant) == (can_be or day > "2026")
