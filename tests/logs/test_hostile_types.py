@@ -6,10 +6,11 @@ import json
 
 import pytest
 from google.protobuf import descriptor_pb2
+from mcap.records import Schema
 from mcap.writer import Writer
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import json_text, messages
+from shiplog.logs import json_text, messages, protobuf
 from shiplog.logs.read import read
 
 START = 1_700_000_000_000_000_000
@@ -67,6 +68,18 @@ def test_a_schema_of_billions_of_fields_is_refused(log, encoding, schema):
         read(log(encoding, schema, [bytes(16)]))
 
 
+@pytest.mark.parametrize(("width", "fields"), [(99, 9900), (100, 10_100)])
+def test_how_many_fields_a_schema_may_have(width, fields):
+    """Of two types, the parts of the first being of the second."""
+    data = protobuf_fan(2, width)
+    schema = Schema(id=width, name="p.T0", encoding="protobuf", data=data)
+    if fields > messages.MOST_FIELDS:
+        with pytest.raises(ValueError, match="more than 10000 fields"):
+            protobuf.messages(schema)
+    else:
+        assert len(protobuf.messages(schema).layout) == width**2
+
+
 def test_a_schema_of_hundreds_of_fields_is_read(log):
     found = read(log("protobuf", ("p.T0", "protobuf", protobuf_fan(3, 8)), [b""]))
     leaves = [name for name in found.frames["/x"].columns if name.count(".") == 2]
@@ -103,6 +116,6 @@ def test_a_json_message_beyond_any_is_left_out_and_the_others_are_read(log, text
 
 
 def test_a_json_message_just_within_is_read(log):
-    deep = '{"a":' + nested(json_text.DEEPEST, "[", "]") + "}"
+    deep = '{"b":[1],"a":' + nested(json_text.DEEPEST, "[", "]") + "}"
     found = read(log("json", ("j", "jsonschema", b"{}"), [deep.encode()]))
     assert found.frames["/x"].height == 1 and found.health.findings == ()
