@@ -60,7 +60,7 @@ class _Decoded:
 
     def __init__(self, tables: Tables) -> None:
         self.tables = tables
-        self.channels = {number: _Waiting(tables, number) for number in candidates(tables)}
+        self.channels = {number: Waiting(tables, number) for number in candidates(tables)}
         self._chunk = np.zeros(0, np.uint8)
         self._held = 0
 
@@ -97,7 +97,7 @@ class _Decoded:
         self._held = 0
 
 
-class _Waiting:
+class Waiting:
     """Messages of one channel until they are decoded together."""
 
     def __init__(self, tables: Tables, number: int) -> None:

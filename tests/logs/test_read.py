@@ -302,14 +302,14 @@ def test_chunks_too_large_to_be_unpacked_at_once_are_decoded_on_the_walk(
     assert_same(path, {}, others=True)
     assert set(on_the_walk) == {"/a", "/b", "/c"}
     on_the_walk.clear()
-    whole, missed = preflight._Waiting.take_alone, []
+    whole, missed = preflight.Waiting.take_alone, []
 
     def missing(self, message):
         if missed:
             whole(self, message)
         missed.append(message)
 
-    monkeypatch.setattr(preflight._Waiting, "take_alone", missing)
+    monkeypatch.setattr(preflight.Waiting, "take_alone", missing)
     assert_same(path, {}, others=True)
     assert on_the_walk == [] and missed
 
