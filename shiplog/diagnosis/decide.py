@@ -35,8 +35,9 @@ def decide(
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
-    mostly = posteriors.share_of_causes(table, best) >= thresholds.MOST
-    mostly = mostly and not _imitated(table, fit, names)
+    device = is_device(table, best, fit)  # then what remains has a name, too
+    mostly = device or posteriors.share_of_causes(table, best) >= thresholds.MOST
+    mostly = mostly and (posteriors.slight(table, best) or not _imitated(table, fit, names))
     verdict, structure, named, side_force = "undecided", None, (), None
     if names and mostly:
         verdict, named = "named", _named(table, found, best, names)
@@ -44,7 +45,7 @@ def decide(
         verdict, structure = "unknown", _structure(table, best, fit)
     elif found.none >= thresholds.STATED:
         verdict = "none"
-    if verdict in ("named", "unknown") and is_device(table, best, fit):
+    if verdict in ("named", "unknown") and device:
         verdict, structure, side_force = "named", None, best.side_force
     traces = ()
     if verdict == "none":
@@ -131,9 +132,7 @@ def is_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> bool:
 
 def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
     """The same with the intermittent force in its remainder."""
-    surge, sway, yaw = side_force.unit * side_force.force
-    remainder = replace(fit.remainder, intermittent=(float(surge), float(sway), float(yaw)))
-    return replace(fit, remainder=remainder)
+    return replace(fit, remainder=side_force.remainder)
 
 
 def _reasons(

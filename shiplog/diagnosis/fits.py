@@ -4,6 +4,7 @@ and the part of its remainder."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -136,7 +137,7 @@ def imitated(trial: Trial, one: Fit, label: str) -> float:
 
 def acts_on(trial: Trial, one: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts."""
-    changed_by = Remainder(family, CHANGE_SIZES[1], intermittent=one.remainder.intermittent)
+    changed_by = replace(one.remainder, kind=family, size=CHANGE_SIZES[1], noisy=False)
     level = evidence.level(trial, one.point, one.found.noise_factor, one.included, changed_by)
     of = trial.unseen if family in discrepancy.UNSEEN else trial.campaign.discrepancy
     columns = trial.families[family]

@@ -71,6 +71,11 @@ class Fit:
         """Labels of the causes that it holds, those of the model with them."""
         return tuple(self.found.numbers)
 
+    @property
+    def noise_factor(self) -> float:
+        """Of the process noise on its nominal one, a geometric mean over the channels."""
+        return self.found.noise_factor * float(np.prod(self.remainder.channels)) ** (1.0 / 3.0)
+
 
 @dataclass(frozen=True)
 class Level:

@@ -111,14 +111,16 @@ def practical(table: Hypotheses, one: Hypothesis) -> tuple[str, ...]:
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
-    """Of what a hypothesis explains beyond nothing, the share that its causes explain."""
-    nothing = table.nothing.evidence
-    whole = one.evidence - nothing
-    alone = max(
-        (table.found[one.causes, kind].evidence for kind in (NOMINAL, RAISED)
-         if (one.causes, kind) in table.found), default=nothing,
-    )  # fmt: skip
-    return (alone - nothing) / whole if whole > 0.0 else 1.0
+    """Of what a hypothesis explains beyond nothing, the share that its causes explain: over nothing
+    with nominal, or with raised process noise. What raised noise explains no cause does."""
+    shares = []
+    for kind in (NOMINAL, RAISED):
+        nothing, alone = table.found.get(((), kind)), table.found.get((one.causes, kind))
+        if nothing is None or alone is None:
+            continue
+        whole = one.evidence - nothing.evidence
+        shares.append((alone.evidence - nothing.evidence) / whole if whole > 0.0 else 1.0)
+    return max(shares, default=1.0)
 
 
 def slight(table: Hypotheses, one: Hypothesis) -> bool:

@@ -35,7 +35,8 @@ def converge(
     """These causes together, linearised at their numbers until these converge (from where they did
     before, if they have). A step goes too far if the evidence is then below the `lowest` that is
     possible, where that is known, or falls far."""
-    point, noise_factor, lately = None, 1.0, None
+    # where each channel has a factor of its own the common one stays near 1
+    point, noise_factor, lately = None, 1.0, 1.0 if remainder.shaped else None
     near: Path | Point | None = path
     key = (tuple(included), remainder)
     if key in trial.converged:

@@ -143,14 +143,14 @@ class Trial:
         near          a path to pull from, or a point that expects what these numbers do to its own
         noise_factor  λ that holds the path: one that follows every wave of the noise is as far
                       from the likely one as a free rollout, and its nonlinearity imitates evidence
-        remainder     whose intermittent force the path may follow
+        remainder     whose process noise and intermittent force the path may follow
         Raises np.linalg.LinAlgError where the model diverges only with these numbers: it is that
         hypothesis that fails.
         """
-        ref, intermittent = self.reference, None if remainder is None else remainder.intermittent
+        ref = self.reference
         wide = ref.wide
         if noise_factor is not None:
-            wide = ref.held(noise_factor, None if intermittent is None else np.array(intermittent))
+            wide = ref.held(noise_factor, remainder or Remainder())
         cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.about(cut, self.grid)

@@ -21,6 +21,7 @@ from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.voyage_effects import reduced
 
+KEPT_MODES = 4  # 20 MB each
 KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
 
 
@@ -36,24 +37,27 @@ class Products:
     ) -> None:  # fmt: skip
         self._campaign, self._unseen, self._grid = campaign, unseen, grid
         self._parts, self._voyage = parts, voyage
-        self._modes: list[tuple[Weighed, Modes]] = []
+        self._modes: list[tuple[Weighed, tuple, Modes]] = []
         self._totals: list[tuple[weakref.ref[Weighed], tuple, np.ndarray, float]] = []
         self._volumes: dict[tuple, float] = {}
 
     def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
         """Products of the point, and the wanted factors λ: one pass serves every λ, but that of an
         intermittent force together with the process noise, whose axes turn with it."""
-        process_noise = remainder.in_noise(self._campaign.reference.process_noise)
+        process_noise, shape, left = (
+            remainder.in_noise(self._campaign.reference.process_noise), remainder.shape,
+            noise_factor,
+        )  # fmt: skip
         if process_noise.intermittent is not None:
-            found = likelihood.modes(point.weighed, process_noise.times(noise_factor))
-            return self._with_families(found, point), 1.0
-        for of, found in self._modes:
-            if of is point.weighed:
-                return found, noise_factor
+            process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0
+        for of, known, found in self._modes:
+            if of is point.weighed and known == shape:
+                return found, left
         found = self._with_families(likelihood.modes(point.weighed, process_noise), point)
-        # the first point's, for `volume`, and the last two
-        self._modes = [*self._modes[:1], *self._modes[1:][-1:], (point.weighed, found)]
-        return found, noise_factor
+        # the first point's, for `volume`, and the last ones
+        last = self._modes[1:][2 - KEPT_MODES :]
+        self._modes = [*self._modes[:1], *last, (point.weighed, shape, found)]
+        return found, left
 
     def _with_families(self, modes: Modes, point: Point) -> Modes:
         cut, misfit = point.linear.cut, self._campaign.reference.misfit
@@ -73,7 +77,7 @@ class Products:
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
     ) -> tuple[np.ndarray, float]:
         """Products [1 + C, 1 + C] of all parts, and log|I + D^½ M D^½| of them."""
-        key = (noise, weight.tobytes(), remainder.intermittent)
+        key = (noise, weight.tobytes(), remainder.shape)
         for of, known, total, volume in self._totals:
             if of() is point.weighed and known == key:
                 return total, volume
@@ -94,7 +98,7 @@ class Products:
     ) -> float:
         """log |C| at one level of process noise, the same for every hypothesis: that of the first
         point. How far a model lets noise be felt is no evidence of a cause."""
-        key = (noise_factor, remainder.intermittent, weight.tobytes())
+        key = (noise_factor, remainder.shape, weight.tobytes())
         if key not in self._volumes:
             modes, by = self.modes(first, noise_factor, remainder)
             total = self.total(first, noise_factor, weight, remainder)

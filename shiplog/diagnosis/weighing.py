@@ -13,19 +13,43 @@ from shiplog.diagnosis.fitted import Fit, Found, Level, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.relinearisation import converge
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
+from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the nominal process noise, from which an intermittent force is tested
 RAISING = Remainder(RAISED)
+NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
+FORCE_ROUNDS = 3  # of fitting an intermittent force and numbers in turn
+
+
+@dataclass(frozen=True)
+class Rough:
+    """A set of causes with raised process noise: where it is linearised, and its levels there."""
+
+    point: Point
+    remainder: Remainder
+    levels: list[Level]
+
+    @property
+    def best(self) -> Level:
+        return max(self.levels, key=lambda level: level.value)
+
+    def fit(
+        self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level
+    ) -> Fit:  # fmt: skip
+        numbers = evidence.numbers_of(trial, one, self.point, included)
+        found = Found("+".join(labels), one.value, one.noise_factor, *numbers)
+        return Fit(self.point, found, self.remainder)
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of one family's weights: with what evidence, at what process noise."""
+    """A change of one family's weights: where it is linearised, with what evidence, at what process
+    noise."""
 
+    point: Point
     remainder: Remainder
     value: float
     noise: float
@@ -55,18 +79,39 @@ def weigh(
     nominal = best(trial, levels, NOMINAL).noise_factor
     if abs(math.log(nominal)) > 2.0 * trial.nominal_spread:  # its prior favours the nominal noise
         levels += nominal_levels(trial, point, included, nominal)
-    for kind in (NOMINAL, RAISED):
-        one = best(trial, levels, kind)
-        found = Found("+".join(labels), one.value, one.noise_factor,
-                      *evidence.numbers_of(trial, one, point, included))  # fmt: skip
-        table.put(labels, one.value, Fit(point, found, Remainder(kind)))
+    plain = Rough(point, RAISING, levels)
+    nominal_fit = plain.fit(trial, labels, included, best(trial, levels, NOMINAL))
+    table.put(labels, nominal_fit.found.evidence, replace(nominal_fit, remainder=Remainder()))
+    rough = rougher(table, labels, plain)
+    raised_fit = rough.fit(trial, labels, included, rough.best)
+    table.put(labels, raised_fit.found.evidence, raised_fit)
     if len(labels) == 1:
         gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
         table.noted_alone(labels[0], gained)
-    _weigh_families(table, labels, point, levels)
-    if best(trial, levels, RAISED).noise_factor > RAISED_FROM:
-        _weigh_intermittent(table, labels, point)
+    _weigh_families(table, labels, plain, rough)
+    if plain.best.noise_factor > RAISED_FROM:
+        _weigh_intermittent(table, labels)
     table.forget(banned)
+
+
+def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
+    """Raised noise with a factor of its own in each channel, where that is more probable than one
+    for all. Factors and numbers are fitted in turn: each is off where the other one is."""
+    if plain.best.noise_factor <= RAISED_FROM:
+        return plain
+    trial, included = table.trial, table.included(labels)
+    fit = plain.fit(trial, labels, included, plain.best)
+    for _ in range(NOISE_ROUNDS):
+        remainder = table.raised_by_channel(fit)
+        point, found = converge(
+            trial, included, fit.found.numbers, fit.point.path, remainder=remainder
+        )
+        if not math.isfinite(found.evidence):
+            return plain
+        fit = Fit(point, found, remainder)
+    levels = evidence.levels(trial, point, included, found.noise_factor, remainder)
+    shaped = Rough(point, remainder, levels)
+    return shaped if shaped.best.value > plain.best.value else plain
 
 
 def nominal_levels(
@@ -100,7 +145,7 @@ def raised_over_nominal(trial: Trial, noise: float) -> float:
 
 
 def changed(
-    trial: Trial, point: Point, included: tuple[str, ...], levels: Sequence[Level], family: str
+    trial: Trial, plain: Rough, rough: Rough, included: tuple[str, ...], family: str
 ) -> Change:
     """A change of one family's weights together with included causes, at its best size and noise.
 
@@ -108,53 +153,66 @@ def changed(
     family counts only if it is more probable with nominal noise than raised noise alone;
     otherwise its functions are a fit to noise.
     """
-    nominal, raised = [], []
-    for level in levels:  # made under `raised`
-        gained, size = fits.changed(trial, point, level, included, family, RAISING)
-        value, noise = level.value + gained, level.noise_factor
-        nominal.append((value - raised_over_nominal(trial, noise), size, noise))
-        raised.append((value, size, noise))
-    noisy = max(nominal)[0] > max(level.value for level in levels)
-    value, size, noise = max(raised if noisy else nominal)
-    return Change(Remainder(family, size, noisy), value, noise)
+
+    def tried(of: Rough) -> list[tuple[float, float, float]]:
+        """Log evidence, size of the change, λ at each level, which are made under `raised`."""
+        found = []
+        for level in of.levels:
+            gained, size = fits.changed(trial, of.point, level, included, family, of.remainder)
+            found.append((level.value + gained, size, level.noise_factor))
+        return found
+
+    nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
+    noisy = max(nominal)[0] > rough.best.value
+    value, size, noise = max(tried(rough) if noisy else nominal)
+    if not noisy:
+        return Change(plain.point, Remainder(family, size), value, noise)
+    remainder = replace(rough.remainder, kind=family, size=size, noisy=True)
+    return Change(rough.point, remainder, value, noise)
 
 
-def _weigh_families(
-    table: Hypotheses, labels: tuple[str, ...], point: Point, levels: Sequence[Level]
-) -> None:
+def _weigh_families(table: Hypotheses, labels: tuple[str, ...], plain: Rough, rough: Rough) -> None:
     trial, included = table.trial, table.included(labels)
-    plain = max((table.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
-    changes = [changed(trial, point, included, levels, family) for family in trial.families]
+    alone = max((table.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
+    changes = [changed(trial, plain, rough, included, family) for family in trial.families]
     scores = [table.score(c.value, labels, c.remainder.kind) for c in changes]
-    near = max((plain.score, *(score - SEARCH_NATS for score in scores)))
+    near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
     for one, score in zip(changes, scores, strict=True):
-        _weigh_change(table, labels, point, one, plain, score >= near)
+        _weigh_change(table, labels, one, alone, score >= near)
 
 
 def _weigh_change(
-    table: Hypotheses, labels: tuple[str, ...], point: Point, one: Change, plain: Hypothesis,
-    leads: bool,
-) -> None:  # fmt: skip
+    table: Hypotheses, labels: tuple[str, ...], one: Change, alone: Hypothesis, leads: bool
+) -> None:
     """The set together with a change of one family; linearised again if that is promising."""
     trial, included, remainder = table.trial, table.included(labels), one.remainder
     if not leads:  # far behind: its numbers are never asked for
-        found = replace(plain.found, evidence=one.value)
-        table.put(labels, one.value, Fit(point, found, remainder))
+        found = replace(alone.found, evidence=one.value)
+        table.put(labels, one.value, Fit(one.point, found, remainder))
         return
-    here, _ = evidence.scan(trial, point, (), included, one.noise, remainder)
+    here, _ = evidence.scan(trial, one.point, (), included, one.noise, remainder)
     if labels:
-        again, base = converge(trial, included, here.numbers, point.path, remainder=remainder)
+        again, base = converge(trial, included, here.numbers, one.point.path, remainder=remainder)
         if math.isfinite(base.evidence) and base.evidence > one.value:
             table.put(labels, base.evidence, Fit(again, base, remainder))
             return
-    table.put(labels, max(one.value, here.evidence), Fit(point, here, remainder))
+    table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
 
 
-def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...], point: Point) -> None:
-    """An intermittent side force instead of raised process noise. A force without a gain over
-    raised noise is that noise, and is not counted twice."""
+def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
+    """An intermittent side force instead of raised process noise, with the causes fitted together
+    with it: fitted to raised noise alone they would make up for it. Less probable than noise that
+    is raised in each channel by itself it is that noise, and is not counted twice."""
     raised = table.found[labels, RAISED]
-    fit = Fit(point, raised.found, Remainder(INTERMITTENT))
-    tried = table.intermittent(fit)
-    if tried.gain > 0.0:
-        table.put(labels, raised.evidence + tried.gain, fit, tried)
+    fit = table.fit(raised)
+    for _ in range(FORCE_ROUNDS):
+        tried = table.intermittent(fit)
+        point, found = converge(
+            table.trial, table.included(labels), fit.found.numbers, fit.point.path,
+            remainder=tried.remainder,
+        )  # fmt: skip
+        if not math.isfinite(found.evidence):
+            return
+        fit = Fit(point, found, tried.remainder)
+    if tried.gain > 0.0 and found.evidence > raised.evidence:
+        table.put(labels, found.evidence, fit, tried)
