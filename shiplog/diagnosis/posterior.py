@@ -116,10 +116,9 @@ def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
     shares = []
     for kind in (NOMINAL, RAISED):
         nothing, alone = table.found.get(((), kind)), table.found.get((one.causes, kind))
-        if nothing is None or alone is None:
-            continue
-        whole = one.evidence - nothing.evidence
-        shares.append((alone.evidence - nothing.evidence) / whole if whole > 0.0 else 1.0)
+        if nothing is not None and one.evidence > nothing.evidence:
+            gained = 0.0 if alone is None else alone.evidence - nothing.evidence
+            shares.append(gained / (one.evidence - nothing.evidence))
     return max(shares, default=1.0)
 
 

@@ -13,7 +13,7 @@ from shiplog.diagnosis.fitted import Fit, Found, Level, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.relinearisation import converge
-from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder, noise_prior
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
@@ -88,9 +88,11 @@ def weigh(
     if len(labels) == 1:
         gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
         table.noted_alone(labels[0], gained)
-    _weigh_families(table, labels, plain, rough)
     if plain.best.noise_factor > RAISED_FROM:
-        _weigh_intermittent(table, labels)
+        pushed = _weigh_intermittent(table, labels)
+        if pushed is not None and pushed.best.value > rough.best.value:
+            rough = pushed
+    _weigh_families(table, labels, plain, rough)
     table.forget(banned)
 
 
@@ -149,9 +151,9 @@ def changed(
 ) -> Change:
     """A change of one family's weights together with included causes, at its best size and noise.
 
-    The noise may be raised as well, since no family describes an unknown force exactly. The
-    family counts only if it is more probable with nominal noise than raised noise alone;
-    otherwise its functions are a fit to noise.
+    The noise may be raised as well, since no family describes an unknown force exactly: in the
+    most probable way, `rough`. The family counts only if it is more probable with nominal noise
+    than noise alone that is raised by one factor; otherwise its functions are a fit to noise.
     """
 
     def tried(of: Rough) -> list[tuple[float, float, float]]:
@@ -163,7 +165,7 @@ def changed(
         return found
 
     nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
-    noisy = max(nominal)[0] > rough.best.value
+    noisy = max(nominal)[0] > plain.best.value
     value, size, noise = max(tried(rough) if noisy else nominal)
     if not noisy:
         return Change(plain.point, Remainder(family, size), value, noise)
@@ -173,7 +175,9 @@ def changed(
 
 def _weigh_families(table: Hypotheses, labels: tuple[str, ...], plain: Rough, rough: Rough) -> None:
     trial, included = table.trial, table.included(labels)
-    alone = max((table.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
+    kinds = (NOMINAL, RAISED, INTERMITTENT)
+    found = (table.found[labels, kind] for kind in kinds if (labels, kind) in table.found)
+    alone = max(found, key=lambda h: h.score)
     changes = [changed(trial, plain, rough, included, family) for family in trial.families]
     scores = [table.score(c.value, labels, c.remainder.kind) for c in changes]
     near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
@@ -199,10 +203,10 @@ def _weigh_change(
     table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
 
 
-def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
+def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> Rough | None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
-    is raised in each channel by itself it is that noise, and is not counted twice."""
+    is raised in each channel by itself it is that noise, and is not counted twice: None."""
     raised = table.found[labels, RAISED]
     fit = table.fit(raised)
     for _ in range(FORCE_ROUNDS):
@@ -212,7 +216,11 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
             remainder=tried.remainder,
         )  # fmt: skip
         if not math.isfinite(found.evidence):
-            return
+            return None
         fit = Fit(point, found, tried.remainder)
-    if tried.gain > 0.0 and found.evidence > raised.evidence:
-        table.put(labels, found.evidence, fit, tried)
+    if tried.gain <= 0.0 or found.evidence <= raised.evidence:
+        return None
+    table.put(labels, found.evidence, fit, tried)
+    included, at = table.included(labels), found.noise_factor
+    return Rough(point, fit.remainder, evidence.levels(table.trial, point, included, at,
+                                                       fit.remainder))  # fmt: skip

@@ -28,6 +28,7 @@ from shiplog.diagnosis import (
     measurement_correction,
     next_manoeuvre,
     placebo,
+    raised_noise,
     relinearisation,
     search,
     segments,
@@ -41,6 +42,7 @@ from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.relinearisation import converge, within
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError
 from shiplog.training.run_config import Config, Physics
@@ -413,9 +415,9 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
     # an earlier force is no matter
     noise = replace(process_noise, intermittent=np.array([9.0, 9.0, 9.0]))
-    found = unrecorded_thruster.estimate_side_force(
-        linear, np.zeros(0), reference, noise, np.ones(count)
-    )
+    plain = replace(noise, intermittent=None)
+    left = raised_noise.left_by(linear, np.zeros(0), plain, np.ones(count), 1.0)
+    found = unrecorded_thruster.estimate_side_force(left, reference)
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0
@@ -423,10 +425,11 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
 
 def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
     """By as much as the process noise and it together may push, twice."""
-    ref, intermittent = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
-    plain, pulsed = ref.held(1.5), ref.held(1.5, intermittent)
+    ref, force = sea.campaign.reference, (0.0, 0.02, 0.01)
+    plain = ref.held(1.5, Remainder())
+    pulsed = ref.held(1.5, Remainder("intermittent", channels=(1.0, 2.0, 1.0), intermittent=force))
     assert pulsed.acceleration**2 == pytest.approx(
-        plain.acceleration**2 + (2.0 * intermittent) ** 2
+        (plain.acceleration * (1.0, 2.0, 1.0)) ** 2 + (2.0 * np.array(force)) ** 2
     )
 
 
