@@ -11,8 +11,8 @@ import polars as pl
 
 from pipelines.bars import Bars
 from pipelines.train_networks import training_of
-from shiplog.training import cluster, load_model, run_folder, seed_files
-from shiplog.training.network_training import share_done
+from shiplog.training import cluster, load_model, network_files, run_folder
+from shiplog.training.network_training import ended, share_done
 from shiplog.training.queue import Task
 from shiplog.voyages import one_hertz
 
@@ -56,7 +56,7 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
         for task in tasks
     }
     trainings = {
-        name: (training_of(run, seed), seed_files.load_checkpoint(run.seed(seed)))
+        name: (training_of(run, seed), network_files.load_checkpoint(run.seed(seed)))
         for name, (run, seed) in places.items()
     }
     failures: dict[str, str] = {}
@@ -68,11 +68,10 @@ def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
                 failures[one.name] = one.failure
                 log.warning("%s: %s", one.name, one.failure)
             elif one.ended:
-                seed_files.save_network(run.seed(seed), one.progress)
-                said = (one.name, one.progress.best, one.progress.epoch)
-                log.info("%s: best validation L %.0f after %d epochs", *said)
+                network_files.save(run.seed(seed), one.progress)
+                log.info("%s: %s", one.name, ended(one.progress.best, one.progress.epoch))
             else:
-                seed_files.save_checkpoint(run.seed(seed), one.progress)
+                network_files.save_checkpoint(run.seed(seed), one.progress)
             reached = one.progress.epoch if one.progress else 0
             bars.show(one.name, share_done(reached, run.config.paper), one.ended)
     return failures

@@ -83,12 +83,12 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
-        f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship and another sea:\n\n"
+        f"{result.text}\n\nHalf a year later ({NEXT_SEASON}), the same ship:\n\n"
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
         f"Look at it again: rerun {result.recording} {season.recording}\n"
-        "Two more seasons wait, season3_* and season4_*: "
+        "The store has two more seasons, season3_* and season4_*: "
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
     content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}

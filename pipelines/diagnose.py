@@ -23,7 +23,6 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
-from shiplog.diagnosis.result import Decision
 from shiplog.models.causes import Cause, user
 from shiplog.paths import refuse_taken
 from shiplog.profile import Profile
@@ -114,10 +113,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
     notes = []
     if before_effect and nominal is None:
-        notes.append(
-            f"The training voyages of {run.name} are not in {store.path}. Without a nominal "
-            "campaign, causes that a new fit would absorb are not tested."
-        )
+        notes.append(answer.without_nominal(run, store.path))
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
     decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking, reach)
@@ -142,14 +138,14 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             decision, found = held.simulated_with(decision)
     lost = held.lost(found) if held else ""
     if lost:
-        dropped |= {n.cause.label: f"{lost}: no cause can be named" for n in decision.named}
+        dropped |= {n.cause.label: answer.none_named(lost) for n in decision.named}
         decision, found = decisions.untold(decision), None
     simulated = (tried, decision)
     if network is not None:
         simulated = network.extended_by(decision)
         whole = simulated[0].covering(simulated[1].nothing.point)
     if held and decision.named and tried.reference.adapts:
-        notes += _of_own_voyages(run, decision)
+        notes += answer.of_own_voyages(run, decision)
         alone = held.adapted(decision).reduction if decision.adapted else None
     reach("report")
     context = Context(
@@ -169,19 +165,6 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
     return DiagnosedTrial(verdict, out, decision, tried, simulated, whole, held, after)
-
-
-def _of_own_voyages(run: Run, decision: Decision) -> list[str]:
-    """What a verdict about a run's own training voyages cannot tell."""
-    notes = []
-    if run.judges_itself:
-        notes.append(
-            f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
-            "cause. The numbers are then those of the residual, and too small."
-        )
-    if decision.adapted:
-        notes.append(f"{run.name} is fitted again together with the named causes.")
-    return notes
 
 
 def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
@@ -211,7 +194,6 @@ def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Pat
         log.info("no named cause can be part of a model: %s is not written", out)
         return
     extension_file.extend(run, out, done.after, cause_files)
-    log.info("extended model in %s", out)
 
 
 def diagnose_command(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,17 +20,12 @@ from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.training import load_model
 from shiplog.training.load_model import Run
-from shiplog.training.run_checks import (
-    refuse_no_test_voyage,
-    refuse_other_columns,
-    refuse_other_window,
-)
-from shiplog.voyages import one_hertz, parts, windows
+from shiplog.training.run_checks import refuse_other_columns, refuse_other_window
+from shiplog.training.voyages_to_test import held_back
+from shiplog.voyages import one_hertz, windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -130,7 +124,7 @@ def evaluate_runs(
     for other in opened[1:]:
         refuse_other_window(first, other)
         refuse_other_columns(first, other.profile.columns, other.name)
-    names = _test_voyages(first, store, voyages)
+    names = held_back(first, store, voyages)
     profile = store.profile(names)
     refuse_other_columns(first, profile.columns, "the chosen voyages")
     rows = one_hertz.with_elapsed(store.seconds(names, profile))
@@ -231,24 +225,6 @@ def compare_runs(
     answers = {run.name: found.answer(run) for run in found.runs}
     content = {"contract": 1, "recording": str(recording), "runs": answers}
     return Compared(f"{found.text()}\n\nRecording: {recording}", content, recording)
-
-
-def _test_voyages(run: Run, store: Store, voyages: Sequence[str]) -> list[str]:
-    """The user's choice, else the run's own test voyages, else all that it was not trained on."""
-    used = {*run.config.split.training, *run.config.split.validation}
-    if voyages:
-        names = store.select(list(voyages))
-        overlap = parts.overlapping(names, used)
-        if overlap:
-            log.warning(
-                "%s was trained or validated on: its errors there are no test", listed(overlap)
-            )
-        return names
-    stored = store.select()
-    names = store.there(run.config.split.test)
-    names = names or [n for n in stored if not parts.overlapping([n], used)]
-    refuse_no_test_voyage(names, store.path, run)
-    return names
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

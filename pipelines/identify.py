@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,16 @@ from threadpoolctl import threadpool_limits
 from pipelines.bars import reach, staged
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
-from shiplog.models import MODELS
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
-from shiplog.training import identifiability, load_model, run_folder, seed_files
+from shiplog.training import identifiability, load_model, physics_files, run_folder
 from shiplog.training.cross_validation import CrossValidated, cross_validate
-from shiplog.training.held_out import HeldOutErrors, refuse_nothing_held_out
+from shiplog.training.held_out import (
+    HeldOutErrors,
+    refuse_nothing_held_out,
+    unfitted_sentence,
+)
 from shiplog.training.load_model import Run
 from shiplog.training.model_selection import choose_network, choose_ridge, physics
 from shiplog.training.options import TrainOptions
@@ -103,12 +105,7 @@ def _begin(
     settings = config.physics.model_copy(update=resolved)
     config = config.model_copy(update={"physics": settings})
     run = run_folder.create(out, config, profile, None, planned, learnt, held)
-    count = int(ready.free.sum()) if config.physics.fit else 0
-    log.info(
-        "%s: %d of %d parameters free, %d windows of %s; they start from %s",
-        run.label, count, len(ready.start.names), len(ready.voyages), listed(split.training),
-        ready.start.source,
-    )  # fmt: skip
+    log.info("%s of %s: %s", run.label, listed(split.training), ready.sentence(config.physics.fit))
     return run, ready
 
 
@@ -196,7 +193,7 @@ def save(
     )
     toml = start.with_values(values, source).to_toml()
     fixed: Mapping[str, np.ndarray] = simulator.model.fixed  # type: ignore[attr-defined]
-    seed_files.save_physics(run.seed(seed), simulator, fixed, toml, identified)
+    physics_files.save(run.seed(seed), simulator, fixed, toml, identified)
 
 
 def _apart(days: list[str], voyages: list[str]) -> bool:
@@ -216,7 +213,7 @@ def _keep(run: RunFolder, ready: Prepared) -> list[str]:
         prediction_interval.calibrate(error, np.zeros_like(states), len(set(ready.voyages)))
     )
     loss = losses(ready.model, ready.start.values, ready.data)
-    return [f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."]
+    return [unfitted_sentence(loss)]
 
 
 def _simulator(model: Any, found: Identified) -> Simulator:
@@ -243,9 +240,7 @@ def _band(run: RunFolder, ready: Prepared, validated: CrossValidated | None) -> 
 
 def identify_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
     """`shiplog train` of a physical model."""
-    if not MODELS[options.model].residual and options.seeds > 1:
-        log.info("an identification draws nothing: one seed stands for all")
-        options = replace(options, seeds=1)
+    options = options.without_idle_seeds()
     run, notes = identify_run(options.config(split), store, out, options.parameters)
     return answer(run, notes, store.path)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -17,8 +16,6 @@ from shiplog.voyages.campaign_consistency import SensorCampaign
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.store import Store
 
-log = logging.getLogger(__name__)
-
 
 def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[SensorCampaign, Profile]]:
     """Voyages of one ship, apart where none was sailed for a season. Raises StoreError."""
@@ -32,7 +29,6 @@ def campaigns(store: Store, voyages: Sequence[str]) -> list[tuple[SensorCampaign
     found = []
     for names in campaign_consistency.seasons(begins):
         profile = store.profile(names)
-        log.info("sensors against each other over %d voyages", len(names))
         rows = dict(zip(names, (t.collect() for t in store.tables(names)), strict=True))
         found.append((campaign_consistency.campaign(rows, profile), profile))
     return found
@@ -51,7 +47,7 @@ def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
              ", ".join(d.voyage for d in one.deviating.get((e.kind, e.channel), ())) or "-")
             for e in one.estimates
         ]  # fmt: skip
-        head = ("kind", "channel", "value (90 % interval)", "unit", "said", "voyages that deviate")
+        head = ("kind", "channel", "value (90 % interval)", "unit", "reported", "deviating voyages")
         text += [tables.table(head, rows), ""]
         text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
         content.append(_json(one, profile))

@@ -19,11 +19,11 @@ from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
-from shiplog.training import load_model, network_gradient, random_streams, run_folder, seed_files
+from shiplog.training import load_model, network_files, network_gradient, random_streams, run_folder
 from shiplog.training.jittering import jittered
 from shiplog.training.job import Training
 from shiplog.training.load_model import NetworkRun, Run
-from shiplog.training.network_training import Progress
+from shiplog.training.network_training import Progress, ended
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.queue import Report, Task, work
@@ -134,8 +134,7 @@ def do(tasks: Sequence[Task], workers: int | None = None) -> dict[str, str]:
                 log.warning("%s: %s", event.task.name, event.failure)
             else:
                 best, epochs, took = event.result
-                line = (event.task.name, best, epochs, took)
-                log.info("%s: best validation L %.0f after %d epochs, %.0f s", *line)
+                log.info("%s: %s, %.0f s", event.task.name, ended(best, epochs), took)
     return failures
 
 
@@ -170,10 +169,12 @@ def train_seed(path: Path, seed: int, report: Report | None = None) -> tuple[flo
     folder = run.seed(seed)
 
     def keep(progress: Progress) -> None:
-        seed_files.save_checkpoint(folder, progress)
+        network_files.save_checkpoint(folder, progress)
 
-    progress = training_of(run, seed).run(seed_files.load_checkpoint(folder), keep, report=report)
-    seed_files.save_network(folder, progress)
+    progress = training_of(run, seed).run(
+        network_files.load_checkpoint(folder), keep, report=report
+    )
+    network_files.save(folder, progress)
     return progress.best, progress.epoch, time.time() - began
 
 

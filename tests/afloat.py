@@ -31,7 +31,7 @@ WIDE = Wide(
     np.array([0.02, 0.02, 0.02]),
 )
 PROCESS_NOISE = (
-    ProcessNoise(  # as learnt on an ordinary campaign: noise of 2 s averages, and what pushes it
+    ProcessNoise(  # as learnt on an ordinary campaign: noise of 2 s averages, and its acceleration
         np.array([0.007, 0.0076, 0.0066, 0.0073, 0.0006, 0.0013]),
         np.array([7e-4, 7e-4, 5e-4]),
         4.0,
@@ -79,11 +79,11 @@ def record(
     )  # fmt: skip
 
 
-def sailed_with(sailed: simulated_ship.Voyage, acceleration: np.ndarray) -> np.ndarray:
-    """States [K, 6] of the project's MMG, with its controls and wind, under `push` [K, 3]: forces
-    in N and N m that no actuator makes. Explicit Euler at 0.1 s."""
+def sailed_with(sailed: simulated_ship.Voyage, force: np.ndarray) -> np.ndarray:
+    """States [K, 6] of the project's MMG, with its controls and wind, under `force` [K, 3]:
+    N and N m that no actuator makes. Explicit Euler at 0.1 s."""
     start = jnp.array([0.0, 0.1, 0.0, 0.0, 0.3, 0.0])
-    return np.asarray(_sail(start, controls(sailed), true_wind(sailed), acceleration))
+    return np.asarray(_sail(start, controls(sailed), true_wind(sailed), force))
 
 
 @jax.jit

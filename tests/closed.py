@@ -50,7 +50,7 @@ def record(
     wind_angle: float = 0.0,
     wind_scale: float = 1.0,
 ) -> Record:
-    """What ingest makes of the path, seen by instruments that are wrong.
+    """What ingest makes of the path, measured by instruments that are wrong.
 
     heading, bias   what the compass and the gyro show too much [rad, rad/s]; scale: times
     by_compass      whether a body velocity is one over ground that the compass has turned

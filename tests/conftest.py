@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from xdist.scheduler import LoadFileScheduling
 
 from shiplog import disk_cache
 
@@ -19,12 +20,14 @@ disk_cache.keep_compiled()
 # one worker's, with the fixtures that are made once for it.
 LONGEST = (
     "pipelines/test_real_logs.py", "pipelines/test_demo.py", "diagnosis/test_whole_way.py",
-    "diagnosis/test_network_base.py", "pipelines/test_tour.py", "pipelines/test_paper.py",
-    "pipelines/test_train_physics.py", "voyages/test_sensor_consistency.py", "cli/test_endings.py",
-    "experiments/test_simulated_ship.py", "voyages/test_sensor_correction.py",
-    "training/test_hybrid_training.py", "diagnosis/test_residual_acceleration.py",
-    "cli/test_same_numbers.py",
+    "diagnosis/test_whole_way_trials.py", "diagnosis/test_network_base.py",
+    "pipelines/test_tour.py", "pipelines/test_paper.py", "pipelines/test_train_physics.py",
+    "voyages/test_sensor_consistency.py", "cli/test_endings.py",
+    "diagnosis/test_without_wind_sensor.py", "experiments/test_simulated_effects.py",
+    "experiments/test_simulated_logs.py", "voyages/test_sensor_correction.py",
+    "diagnosis/test_residual_acceleration.py", "cli/test_same_numbers.py",
 )  # fmt: skip
+ONE_WORKER = ("tests/diagnosis/test_whole_way",)  # files that begin so are one worker's together
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -32,6 +35,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Path(__file__).parent
     rank = {tests / name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path, len(rank)))
+
+
+class ByFixtures(LoadFileScheduling):
+    """A file is one worker's, and so are the files of ONE_WORKER: their fixtures take minutes."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        shared = (name for name in ONE_WORKER if nodeid.startswith(name))
+        return next(shared, super()._split_scope(nodeid))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log) -> ByFixtures:
+    return ByFixtures(config, log)
 
 
 @pytest.fixture(scope="session")

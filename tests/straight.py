@@ -112,9 +112,9 @@ def passed(
 ) -> Linear:  # fmt: skip
     """One pass of a record, drawn: e = Z z + J d + noise with `numbers` d [C] in SI.
 
-    noise    times the standard deviations of UNREST that the noise and the acceleration have
+    noise    times the standard deviations of PROCESS_NOISE, of instrument and process noise
     sensitivity  what one unit of a number moves an observation by, in its standard deviations
-    pushed   [S, 3J] accelerations in addition to the process noise
+    accelerations   [S, 3J] in addition to the process noise
     """
     rng = np.random.default_rng(seed)
     g = segments.grid(record)

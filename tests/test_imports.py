@@ -132,6 +132,16 @@ def test_commands_that_need_no_network_do_not_load_torch():
     assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
 
 
+def test_what_runs_no_network_does_not_load_torch():
+    """A diagnosis, an evaluation and a training of an MMG; and what they leave open until it is
+    known which model a run is of."""
+    program = (
+        "import sys, pipelines.api, pipelines.diagnose, pipelines.evaluate, pipelines.identify, "
+        "pipelines.train, pipelines.train_again; sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+
+
 def test_double_precision_is_switched_on_in_one_place():
     """Of modules that compute with JAX, every one loads it."""
     switch = "jax_enable_x64"

@@ -20,7 +20,7 @@ def test_every_shipped_profile_is_taken(name):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "words"),
     [
         (ARM, "lever_arm_m = [nan, 0.0]", f"sensors.position.lever_arm_m.0 {FINITE}"),
         (ARM, "lever_arm_m = [0.0, 1e999]", f"sensors.position.lever_arm_m.1 {FINITE}"),
@@ -42,11 +42,11 @@ def test_every_shipped_profile_is_taken(name):
         ("[ship]", "x = " + "[" * 20_000 + "]" * 20_000 + "\n[ship]", "not valid TOML"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused_with_its_key(old, new, said):
+def test_what_cannot_be_is_refused_with_its_key(old, new, words):
     assert old in sailing.PROFILE
     with pytest.raises(ProfileError) as found:
         sailing.profile(sailing.PROFILE.replace(old, new))
-    assert said in found.value.message and found.value.hint
+    assert words in found.value.message and found.value.hint
     assert "constrained" not in found.value.message and "tuple[" not in found.value.message
 
 
@@ -87,19 +87,19 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
 
 
 @pytest.mark.parametrize(
-    ("sensors", "said"),
+    ("sensors", "words"),
     [
         (("position", "velocity"), "has no heading,"),
         (("heading",), "has no position and no velocity,"),
         ((), "has no position and no velocity and no heading,"),
     ],
 )
-def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, said):
+def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, words):
     sections = sailing.PROFILE.split("[sensors.")
     kept = [part for part in sections[1:] if part.startswith(sensors)]
     ship, actuators = sections[0], "[[actuators]]" + sailing.PROFILE.split("[[actuators]]", 1)[1]
     text = "".join((ship, *(f"[sensors.{part}" for part in kept), actuators))
     with pytest.raises(ProfileError) as refused:
         profile_file.parse(text, "circle.toml")
-    assert said in str(refused.value)
+    assert words in str(refused.value)
     assert ("record a gyro or a GNSS compass" in str(refused.value)) == ("heading" not in sensors)

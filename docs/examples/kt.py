@@ -101,7 +101,7 @@ class KT:
             nd = actuator[..., s.column] * s.diameter
             b = jnp.where(nd >= 0.0, p["propeller.ahead"], p["propeller.astern"])
             ahead = b * g.density * s.diameter**2 * nd * jnp.abs(nd) / g.mass
-            added = self._pushed(ahead, jnp.zeros_like(u), s.ahead, s.starboard)
+            added = self._accelerated(ahead, jnp.zeros_like(u), s.ahead, s.starboard)
             parts["propeller"] = parts.get("propeller", 0.0) + added
             jet = jet + jnp.maximum(nd, 0.0) ** 2 / len(g.propellers)
         if g.rudders:
@@ -114,12 +114,14 @@ class KT:
         for t in g.thrusters:
             command = actuator[..., t.column] / t.full
             angle = t.direction if t.turned_by is None else actuator[..., t.turned_by]
-            push = p[f"thruster.{t.name}"] * GRAVITY * command * jnp.abs(command)
-            added = self._pushed(push * jnp.cos(angle), push * jnp.sin(angle), t.ahead, t.starboard)
+            thrust = p[f"thruster.{t.name}"] * GRAVITY * command * jnp.abs(command)
+            added = self._accelerated(
+                thrust * jnp.cos(angle), thrust * jnp.sin(angle), t.ahead, t.starboard
+            )
             parts["thruster"] = parts.get("thruster", 0.0) + added
         return parts
 
-    def _pushed(self, x: Array, y: Array, ahead: float, starboard: float) -> Array:
+    def _accelerated(self, x: Array, y: Array, ahead: float, starboard: float) -> Array:
         """ν̇ of a force per mass at a place."""
         turning = (ahead * y - starboard * x) / (GYRATION * self.geometry.length) ** 2
         return jnp.stack((x, y, turning), -1)
@@ -165,5 +167,5 @@ def opened(profile: Profile, settings: Settings, arrays: Mapping[str, np.ndarray
 MODEL = PhysicalModel(
     begin, opened,
     lacks="a K-T model has no forces of hull, screw and rudder in newtons: causes that change "
-    "forces cannot be told",
+    "forces cannot be identified",
 )  # fmt: skip

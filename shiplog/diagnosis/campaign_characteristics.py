@@ -45,7 +45,7 @@ class Characteristics:
     deviation   group of columns → standard deviation of one part's numbers, in their units
     size        family of the discrepancy → prior size of its weights
     apart       how far voyages are from each other, in those deviations
-    share       how much of itself a trial counts
+    share       share of itself that a trial counts
     noise       standard deviation, over the parts, of the logarithm of the process noise
     weight      [S] of each segment
     path        of each segment, as a trial's segments have theirs: about the discrepancy
@@ -144,8 +144,8 @@ def _path_about(
     model: Extended, record: Record, at: Converged, made: NominalPass, expected: np.ndarray,
     process_noise: ProcessNoise, numbers: Mapping[str, np.ndarray] | None,
 ) -> Path:  # fmt: skip
-    """The path of each segment about its model with the discrepancy, as firmly held as a trial's:
-    what is not linear must be the same in both."""
+    """The path of each segment about its model with the discrepancy, as firmly held as a trial's.
+    Nonlinear errors are then the same in both."""
     about = made.accelerations @ expected
     whole = np.concatenate((at.theta, made.columns.numbers(numbers or {})))
     hold = nominal_fit.hold(process_noise, process_noise.acceleration)

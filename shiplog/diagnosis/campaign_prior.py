@@ -1,9 +1,9 @@
 """What a nominal campaign says of a trial's numbers: their prior.
 
 Voyages of one ship differ, and parts of one voyage differ: each voyage has numbers θ + c and each
-of its parts θ + c + b (nested random effects: Laird & Ware 1982). How far parts differ is learned
-in `voyage_effects`. How far voyages differ in that unit, and how much of itself a voyage counts, is
-what predicts each nominal voyage best from the others. A trial is further voyages of the ship.
+of its parts θ + c + b (nested random effects: Laird & Ware 1982). How far parts differ is estimated
+in `voyage_effects`. Two more numbers predict each nominal voyage best from the others: how far
+voyages differ in that unit, and the weight of a voyage. A trial is further voyages of the ship.
 """
 
 from __future__ import annotations

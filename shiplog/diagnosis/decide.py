@@ -63,8 +63,8 @@ def decide(
 
 
 def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> bool:
-    """Whether the remainder could reproduce most of a named cause's effect: with an unknown
-    force of the controls, an offset of the rudder may be a part of that force."""
+    """Whether the remainder could reproduce most of a named cause's effect. An offset of the
+    rudder, for instance, may be a part of an unknown force of the controls."""
     shares = [
         fits.imitated(table.trial, fit, label)
         for label in fit.included

@@ -1,15 +1,16 @@
-"""What a model gets wrong, as functions of what the model sees and of what it does not.
+"""The discrepancy: a model's error as functions of its inputs, and of omitted inputs.
 
-An acceleration that depends on motion, controls or wind is what equations of another form leave
-over; one that depends on position, heading or time no model of forces has. Each family is a sum of
-fixed features with unknown weights (Kennedy & O'Hagan 2001). The nominal campaign teaches the
-weights of what a model sees; an unknown structure of the trial is a change of one family's weights.
+Equations of another form leave an acceleration that depends on motion, controls or wind. No model
+of forces has one that depends on position, heading or time. Each family is a sum of fixed features
+with unknown weights (Kennedy & O'Hagan 2001). The weights of motion, controls and wind are
+estimated from the nominal campaign. An unknown structure of the trial is a change of one family's
+weights.
 
-Motion, controls and wind have the products of ship hydrodynamics (Abkowitz 1964; moduli after
-Fedyaevsky & Sobolev 1964) together with smooth random features (Rahimi & Recht 2007). What depends
-on position, heading or time acts from outside the ship: first a force along the earth's axes that
-is steady or grows evenly, as a line's or a tug's does, then smooth features. An even force is
-expected to be larger than what varies in every other way.
+Features of motion, controls and wind are the products of ship hydrodynamics (Abkowitz 1964; moduli
+after Fedyaevsky & Sobolev 1964) and smooth random features (Rahimi & Recht 2007). A dependence on
+position, heading or time acts from outside the ship. Its first features are a force along the
+earth's axes that is steady or grows evenly, such as a line's or a tug's; smooth features follow.
+The even force is expected to be larger than the others.
 """
 
 from __future__ import annotations

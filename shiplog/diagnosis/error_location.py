@@ -1,4 +1,4 @@
-"""Where a model is wrong: by channel, where it never was, where no force of its own explains it."""
+"""Where a model errs: by channel, outside its training data, where an external force acts."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, .
 def uncovered(
     run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
 ) -> list[Interval]:
-    """Windows that the training data never came near."""
+    """Windows outside the training data."""
     rows = one_hertz.with_elapsed(store.seconds(names, profile))
     trained = covering.of(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(

@@ -43,7 +43,7 @@ TOWARDS = (("ahead", "astern"), ("to starboard", "to port"), ("to starboard", "t
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """One event, in the channel where it is most beyond it.
+    """One event, in the channel where it exceeds the ship's own forces most.
 
     peak     the largest force [N], or moment [N m] where the channel is yaw_rate
     percent  of full thrust; of its full turning moment where the channel is yaw_rate
@@ -107,7 +107,7 @@ def find(
 ) -> tuple[Stretch, ...]:
     """All events, in order of voyage and time.
 
-    linear   of a record's segments, best those of `unexplained.covering`
+    linear   of a record's segments, best those of `residual_acceleration.covering`
     d        [C] the columns' numbers
     physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
     """
@@ -291,7 +291,7 @@ def _event(
     high = np.flatnonzero(share[last + 1 :] < EDGE) + last + 1
 
     def crossing(inside: int, outside: int) -> float:
-        """When it passed EDGE; the knot inside, where that was beyond it but below EDGE."""
+        """When it passed EDGE; the node inside, where that was beyond the limit but below EDGE."""
         way = (share[inside] - EDGE) / (share[inside] - share[outside])
         return float(time[inside] + max(way, 0.0) * (time[outside] - time[inside]))
 

@@ -44,7 +44,7 @@ class ExpectedEvidence:
         return np.sqrt(2.0 * (nats + self.cost) / np.maximum(self.each, 1e-12))
 
     def together(self, nats: float) -> float:
-        """The size that would, had all its numbers that size."""
+        """The size with this expected log Bayes factor, if all its numbers have that size."""
         return float(np.sqrt(2.0 * (nats + self.cost) / max(self.each.sum(), 1e-12)))
 
 

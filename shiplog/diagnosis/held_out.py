@@ -1,4 +1,4 @@
-"""What causes are worth on windows whose voyage had no part in their numbers."""
+"""The gain of causes on held-out windows: numbers fitted without the windows' voyage."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class HeldOut(Rollouts):
-    """The same with the trial whose causes are judged on them; `own` of a network, whose causes
-    another model found."""
+    """Windows and model, with the trial whose causes are judged on them. `own` is a network whose
+    causes were found on another model."""
 
     trial: Trial
     own: Own | None = None
@@ -71,11 +71,11 @@ class HeldOut(Rollouts):
         return gain(self.losses_before, after, self.voyages)
 
     def adapted(self, decision: Decision) -> Gain:
-        """What the model's own coefficients take off alone, fitted again with nothing named."""
+        """Gain of fitting the model's own coefficients again, with no cause named."""
         return self.gain(decision.unnamed)
 
     def extended(self, decision: Decision) -> ExtendedSimulator:
-        """The model with what is named in it, with numbers from all voyages."""
+        """The model with the named causes, their numbers fitted to all voyages."""
         named, coefficients = decision.named, None
         if decision.adapted:
             trial, simulated = self.simulated(decision)
@@ -87,7 +87,7 @@ class HeldOut(Rollouts):
         )  # fmt: skip
 
     def simulated(self, decision: Decision) -> tuple[Trial, Decision]:
-        """The model that is simulated on the trial's segments, with what is named in it."""
+        """The model that is simulated on the trial's segments, with the named causes."""
         return (self.trial, decision) if self.own is None else self.own.extended_by(decision)
 
     def better(self, decision: Decision, found: Gain) -> tuple[Decision, Gain]:
@@ -98,7 +98,7 @@ class HeldOut(Rollouts):
         return (adapted, again) if again.after < found.after else (decision, found)
 
     def simulated_with(self, decision: Decision) -> tuple[Decision, Gain | None]:
-        """What others named in this model, and what it is worth there."""
+        """Decision and gain with the causes that another model named, in this one."""
         plain = replace(decision, adapted=False)
         if not decision.named:
             return plain, None
@@ -113,9 +113,11 @@ class HeldOut(Rollouts):
         )  # fmt: skip
 
     def lost(self, found: Gain | None) -> str:
-        """Why no name would be believed: a sign turned round does far more for the rollouts than
-        all that was named, or they are worse than a ship that keeps its velocities, with what was
-        named in them too. Empty where neither holds."""
+        """Why no cause can be named; empty where one can.
+
+        Either a reversed sign reduces the error far more than all named causes do, or the model is
+        worse than holding the velocity, with the named causes in it too.
+        """
         own = float(self.losses_before.sum(1).mean())
         after = own if found is None else min(own, found.after)
         hold = float(self.parts(self.cut.state[:, :1]).sum(1).mean())
@@ -160,8 +162,8 @@ class HeldOut(Rollouts):
     def without(
         self, decision: Decision, voyage: str, half: Half
     ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-        """Numbers of the named causes from all else alone, and the coefficients together with them
-        where the model adapts."""
+        """Numbers of the named causes, fitted without a part of the data; and the coefficients
+        together with them where the model adapts."""
         recorded, segment = self.trial.record, decision.fit.point.linear.cut
         index = recorded.names.index(voyage) if voyage in recorded.names else -1
         out = segment.voyage == index

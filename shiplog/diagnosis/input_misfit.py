@@ -1,10 +1,10 @@
-"""What a ship's MMG gets wrong of a network's inputs: a smooth function of them, the same on all
-voyages.
+"""The error of a ship's MMG as a smooth function of a network's inputs, the same on all voyages.
 
-It lasts as long as a manoeuvre, so that process noise of seconds cannot represent it. Without it, a
-cause that resembles it gains a few hundred nats. It is part of every hypothesis
-(Kennedy & O'Hagan 2001: the discrepancy as a function of the inputs); what depends on heading,
-place or time it cannot explain. And it is what the network is bent by where it is fitted again.
+The error lasts as long as a manoeuvre, so that process noise of seconds cannot represent it.
+Without it, a cause that resembles it gains a few hundred nats. It is part of every hypothesis
+(Kennedy & O'Hagan 2001: the discrepancy as a function of the inputs). It cannot explain a
+dependence on heading, place or time. Where the network is fitted again, this function is added to
+it.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Interval:
-    """A stretch of a voyage that is another matter: external, gap or coverage."""
+    """An interval that the verdict lists by itself: external, gap or coverage."""
 
     voyage: str
     start_s: float

@@ -1,12 +1,12 @@
-"""Short rollouts along the measured path, and how everything that could be wrong bends them.
+"""Short rollouts along the measured path, and their derivatives by everything that may be wrong.
 
-A free rollout of a minute loses the path of a ship that turns easily, and its derivatives are
-then of another voyage. So each segment of 30 s is first pulled onto what was measured, by its
-initial state and a slowly varying acceleration; around that path the simulation is linear in all
-that follows: y ≈ y* + Z (z - z*) + J d.
+A free rollout of a minute soon leaves the path of a ship that turns easily, and its derivatives are
+then those of another voyage. Each segment is therefore first fitted to the measurement, by its
+initial state and a slowly varying acceleration. About this smoothed path the simulation is linear:
+y ≈ y* + Z (z - z*) + J d.
 
-Of a model that training cut into several steps a second, so is the time between two nodes. A
-segment in which the model diverges all the same is left out and counted (`Linear.lost`).
+Where training divided a second into several steps, the time between two nodes is divided too. A
+segment in which the model still diverges is left out and counted (`Linear.lost`).
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class Advice:
 def advice(
     trial: Trial, named: Sequence[Named], fixed: Mapping[str, np.ndarray]
 ) -> dict[str, Advice]:
-    """Label → what would tell it best from all that these data cannot tell it from.
+    """Label → the manoeuvre that separates it best from its aliases.
 
     fixed   numbers of the causes that the model has already
     """

@@ -165,10 +165,10 @@ def discrepancy_here(total: np.ndarray, known: np.ndarray, columns: Columns) -> 
 
 
 def anchored(start: Start, theta: np.ndarray, columns: Columns) -> np.ndarray:
-    """[C] how the run's own coefficients pull on those that stand elsewhere, in units.
+    """Pull [C], in units, of the run's own coefficients on those that have moved.
 
-    Forces and masses share a scale: held to where they last stood, and not to the run's, masses
-    halve in a few rounds, and a load is found to weigh less than it does.
+    Forces and masses share a scale. Held to their last values instead of the run's, masses would
+    halve in a few rounds, and a load would be found too light.
     """
     pull = np.zeros(len(columns.unit))
     pull[: columns.base] = (start.values - theta) / columns.unit[: columns.base]

@@ -43,12 +43,11 @@ class Reference:
                  latter is the run's own coefficients'
     nominal      that campaign, and its `modes` under the nominal process noise; None where the
                  model was trained on the very data that are diagnosed
-    freedom      degrees of it with which κ is known: the sizes of covariances hang on it
+    freedom      degrees of freedom with which κ is known; intervals are wider with fewer
     adapts       whether the model has absorbed causes there, and is fitted again with them
-    learned      whether it stands for a network that has, and that no voyage is held out to
-    misfit       what is wrong of such a network's inputs
-    counts       for how much of itself a trial counts: what is wrong there each voyage has its own
-                 of
+    learned      whether it stands for such a network, of whose training no voyage was held out
+    misfit       the error of its MMG as a function of the network's inputs
+    counts       share of itself that a trial counts, as its voyages have errors of their own
     expected     [W] weights of the discrepancy that a path follows; none where None
     """
 

@@ -33,7 +33,7 @@ PENALTIES = 10.0 ** np.arange(-4.0, 2.0)  # of the mean square of a feature
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """How far one unseen variable predicts the unexplained acceleration.
+    """How far one omitted input predicts the residual acceleration.
 
     r2      share of the variance of each channel, on voyages left out; below 0: worse than none
     chance  the largest share when the variable is shifted in time against all else
@@ -81,11 +81,11 @@ def table(
 ) -> tuple[Dependence, ...]:
     """One row each for heading, position, time and controls.
 
-    knots   of `unexplained.table`, or the same columns of any other model's residual
+    knots   of `residual_acceleration.table`, or the same columns of any other model's residual
     rng     draws the shifts
     knot    s between knots
 
-    R² is beyond what a regression on everything visible predicts; that of position also beyond
+    R² is beyond what a regression on the model's inputs predicts; that of position also beyond
     heading, or every steady force would count as a matter of place.
     """
     shared, folds = _knots(knots, profile)

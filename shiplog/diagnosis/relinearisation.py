@@ -32,9 +32,12 @@ def converge(
     lowest: float = -np.inf,
     remainder: Remainder = evidence.NO_CHANGE_OF_NOISE,
 ) -> tuple[Point, Found]:
-    """These causes together, linearised at their numbers until these converge (from where they did
-    before, if they have). A step goes too far if the evidence is then below the `lowest` that is
-    possible, where that is known, or falls far."""
+    """These causes together, linearised again until their numbers converge.
+
+    They start from where an earlier fit of them converged, if there was one. A step has gone too
+    far if the evidence is then below the `lowest` that is possible. Where that is known, no further
+    step may lose STEP_NATS. A step that has gone too far is halved.
+    """
     # where each channel has a factor of its own the common one stays near 1
     point, noise_factor, lately = None, 1.0, 1.0 if remainder.shaped else None
     near: Path | Point | None = path
@@ -126,7 +129,7 @@ def _within_bounds(
 def within(
     mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """[Q] a Gaussian's likeliest numbers between bounds: what is held at one moves the others."""
+    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others."""
     if ((mean >= low) & (mean <= high)).all():
         return mean
     unit = np.sqrt(np.diagonal(covariance))

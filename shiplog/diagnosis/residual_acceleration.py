@@ -1,4 +1,4 @@
-"""The acceleration that a model leaves unexplained along what was measured, and what went with it.
+"""The residual acceleration along the measured path, with the conditions at each node.
 
 z | e ~ N(V Zᵀ R⁻¹ (e - J d), V),  V = (Zᵀ R⁻¹ Z + P)⁻¹: the posterior of a linear Gaussian model
 (Rasmussen & Williams 2006, Sec. 2.1), segment by segment, P the precision of `ProcessNoise`.

@@ -1,8 +1,8 @@
-"""Which hypotheses are weighed: a search outwards from the best ones found so far.
+"""The search: which hypotheses are weighed, starting from the best ones so far.
 
-A set of causes is linearised again where its numbers are most probable, and compared under every
-kind of remainder. From the best hypotheses one cause is added or dropped, until no set that is
-worth it is left; which set came first cannot matter.
+Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
+remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
+set is left. The order in which sets are weighed does not matter.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Search:
         self.table.rescore()
 
     def without(self, name: str) -> None:
-        """Go on without a cause, as far again: what stood behind it has hardly been looked at."""
+        """Go on without a cause, for as many sets again: those behind it were hardly weighed."""
         self.banned.add(name)
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()

@@ -45,10 +45,13 @@ class Readings:
         self._known: list[tuple[Numbers, Read]] = []
 
     def of(self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers) -> Read:
-        """How a cause changes what is read depends on what is put right before: together with a
-        clock that is late by a second an antenna's columns are a second old, and two clocks would
-        seem to disagree. Nor do columns from a little together with serve: those of several clocks
-        then differ by their noise, and a sum of them explains that of the data."""
+        """The segments as read with these numbers.
+
+        The effect of a sensor's cause depends on the corrections before it. With a clock that is
+        one second late, the antenna's columns are one second late too, and two clocks would seem to
+        disagree. Columns at nearby numbers are no substitute. Those of several clocks differ by
+        noise, and a sum of them would fit the noise of the data.
+        """
         reading = {
             c.label: np.asarray(numbers[c.label])
             for c in reference.model.causes
@@ -138,14 +141,15 @@ class Trial:
         noise_factor: float | None = None,
         remainder: Remainder | None = None,
     ) -> Point:
-        """Linearised with these numbers, around a path pulled onto what was then measured.
+        """The trial linearised with these numbers, about a path fitted to the measurement.
 
-        near          a path to pull from, or a point that expects what these numbers do to its own
-        noise_factor  λ that holds the path: one that follows every wave of the noise is as far
-                      from the likely one as a free rollout, and its nonlinearity imitates evidence
+        near          a path to start from, or a point whose linearisation predicts the path
+        noise_factor  λ that limits the path. A path that follows every wave of the noise is as far
+                      from the likely one as a free rollout; its nonlinearity imitates evidence
         remainder     whose process noise and intermittent force the path may follow
-        Raises np.linalg.LinAlgError where the model diverges only with these numbers: it is that
-        hypothesis that fails.
+
+        Raises np.linalg.LinAlgError where the model diverges with these numbers only: this
+        hypothesis then fails.
         """
         ref = self.reference
         wide = ref.wide

@@ -96,8 +96,8 @@ class Products:
     def volume(
         self, first: Point, noise_factor: float, weight: np.ndarray, remainder: Remainder
     ) -> float:
-        """log |C| at one level of process noise, the same for every hypothesis: that of the first
-        point. How far a model lets noise be felt is no evidence of a cause."""
+        """log |C| at one level of process noise: that of the first point, for every hypothesis.
+        Otherwise a model with less damping would gain evidence because it amplifies the noise."""
         key = (noise_factor, remainder.shape, weight.tobytes())
         if key not in self._volumes:
             modes, by = self.modes(first, noise_factor, remainder)

@@ -73,7 +73,7 @@ def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -
 
 
 def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
-    """What judges in a trial, with what the run has of causes, as it stands before any more."""
+    """The model that is judged in a trial, with the causes that the run has already."""
     if run.judges_itself:
         return run.extended(run.config.seeds[0], trial.record)
     ref = trial.reference
@@ -90,14 +90,14 @@ def simulator(run: Run, trial: Trial) -> ExtendedSimulator:
 
 
 def model_of(run: Run, causes: Sequence[Cause], setting: Setting) -> tuple[Extended, Start]:
-    """The run's physics with room for these causes, and where its coefficients stand."""
+    """The run's physics extended by these causes, and its coefficients."""
     base, start, stand_in, values = run.judge()
     constants = constants_for(run, causes, setting)
     return Extended(base, tuple(causes), stand_in, values, constants), start
 
 
 def constants_for(run: Run, causes: Sequence[Cause], setting: Setting) -> dict[str, np.ndarray]:
-    """What these causes' forces need, as the run has it or as its setting says."""
+    """Constants of these causes' forces: the run's, else those of its setting."""
     held = {} if run.extension is None else run.extension.constants
     return constants_of(causes, setting) | dict(held)
 

@@ -1,4 +1,4 @@
-"""A force that nobody records and that comes and goes: its log likelihood, place and course."""
+"""An unrecorded intermittent side force: its likelihood, its place and its course."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ class SideForce:
 def estimate_side_force(
     left: Left, ref: Reference, at_one_place: np.ndarray | None = None
 ) -> SideForce:
-    """An unrecorded intermittent side force at one place along the ship: it correlates sway and yaw
-    as no other process noise does. `at_one_place` as `raised_noise.by_channel` has it."""
+    """The most probable intermittent side force at one place along the ship, from the residual.
+    It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
+    `raised_noise.by_channel` has it."""
     raised, _ = by_channel(left, at_one_place)
     ship, length = ref.model.stand_in, ref.setting.scale["length"]
     across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m

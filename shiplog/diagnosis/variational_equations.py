@@ -1,4 +1,4 @@
-"""The variational equations of a rollout: how start, knots and numbers bend it, step by step.
+"""The variational equations of a rollout: the effect of start, nodes and numbers, step by step.
 
     δ̇ = A(t) δ + B(t),  A, B the derivatives along the path
 

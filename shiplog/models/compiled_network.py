@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from shiplog.models.feedforward import FeedForward
 from shiplog.models.mmg.wind import apparent
+
+if TYPE_CHECKING:
+    from shiplog.models.feedforward import FeedForward
 
 FEATURES = 300
 KERNEL_WIDTH = 2.0  # no voyage covers all combinations of many inputs: data of few serve best so

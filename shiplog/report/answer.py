@@ -104,7 +104,7 @@ def verdict(
     word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
-    sentence = f"{context.lost}: no cause can be named."
+    sentence = f"{none_named(context.lost)}."
     if not context.lost:
         sentence = verdicts.sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
@@ -131,6 +131,32 @@ def verdict(
         unavailable=unavailable,
         notes=tuple(notes),
     )
+
+
+def none_named(lost: str) -> str:
+    """Why a cause is not named: what `HeldOut.lost` says of the model."""
+    return f"{lost}: no cause can be named"
+
+
+def without_nominal(run: Run, store: Path) -> str:
+    """A note where the store has no voyage that the run was trained on."""
+    return (
+        f"The training voyages of {run.name} are not in {store}. Without a nominal campaign, "
+        "causes that a new fit would absorb are not tested."
+    )
+
+
+def of_own_voyages(run: Run, decision: Decision) -> list[str]:
+    """Notes on a verdict about a run's own training voyages."""
+    notes = []
+    if run.judges_itself:
+        notes.append(
+            f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
+            "cause. The numbers are then those of the residual, and too small."
+        )
+    if decision.adapted:
+        notes.append(f"{run.name} is fitted again together with the named causes.")
+    return notes
 
 
 def of_physics(run: Run, trial: Trial, found: Gain | None) -> list[str]:

@@ -296,7 +296,7 @@ def _left(gain: Gain, wrong: Sequence[dict]) -> str:
         return ""
     channel, share = max(left.items(), key=lambda pair: pair[1])
     return (
-        f"The largest part that is not is in {channel.replace('_', ' ')}: {share:.0%} of the error."
+        f"The largest unexplained part is in {channel.replace('_', ' ')}: {share:.0%} of the error."
     )
 
 

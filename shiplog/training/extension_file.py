@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +19,8 @@ from shiplog.paths import refuse_taken
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension
 from shiplog.training import run_files
 from shiplog.training.run_folder import RunFolder
+
+log = logging.getLogger(__name__)
 
 ANEW = (  # what of a run is not of the run that extends it
     ".*", "errors.parquet", "rollouts.parquet", "*.rrd", "band.safetensors", "extension.*",
@@ -72,4 +75,5 @@ def extend(
             shutil.copy(path, new / f"extension-{i}.py")
         files.write_json(new / "extension.json", content | {"base": folder.name})
         run_files.save_arrays(new / "extension.safetensors", arrays)
+    log.info("%s with its causes is the run %s", folder.name, out)
     return out

@@ -75,6 +75,11 @@ class HeldOutErrors(NamedTuple):
         )
 
 
+def unfitted_sentence(loss: np.ndarray) -> str:
+    """Of starting values that stay as they are: L of every window [N]."""
+    return f"Mean L {loss.mean():.0f} over the {len(loss)} windows named, with nothing fitted."
+
+
 def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
     share = after.mean() / before.mean()
     return (

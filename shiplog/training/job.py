@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from shiplog.exceptions import RunError
-from shiplog.models.feedforward import FeedForward, Scaling, Shape
+from shiplog.models.feedforward import FeedForward, Scaling
+from shiplog.models.network_shape import Shape
 from shiplog.training import network_training
 from shiplog.training.network_gradient import Batch
 from shiplog.training.network_training import Checkpoint, Progress

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -16,16 +16,19 @@ from shiplog.models import NETWORK, PHYSICS, compiled_network, mmg
 from shiplog.models.causes import Cause
 from shiplog.models.coefficients import Parameters
 from shiplog.models.extended import Extended
-from shiplog.models.feedforward import FeedForward, Scaling, Shape
 from shiplog.models.mmg import MMG
+from shiplog.models.network_shape import Shape
 from shiplog.models.starting_values import Start
 from shiplog.simulation import force_breakdown, prediction_interval
 from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension, campaign
 from shiplog.simulation.sensitivities import Simulator
-from shiplog.training import earlier_runs, extension_file, run_files, run_folder, seed_files
+from shiplog.training import earlier_runs, extension_file, run_files, run_folder
 from shiplog.training.run_folder import RunFolder
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
+
+if TYPE_CHECKING:
+    from shiplog.models.feedforward import FeedForward, Scaling
 
 HELD_SPREAD = 1e-9  # spread of numbers that a diagnosis leaves where they are
 
@@ -140,7 +143,7 @@ class Run(RunFolder, ABC):
 @dataclass(frozen=True)
 class NetworkRun(Run):
     """A network has no coefficients. Causes are tested on the ship's MMG in its stead, and
-    are added to it."""
+    are added to it. Torch is loaded where the network itself is asked for."""
 
     @property
     def shape(self) -> Shape:
@@ -155,19 +158,20 @@ class NetworkRun(Run):
         )
 
     def scaling(self) -> Scaling:
-        """Raises RunError."""
-        path = self.path / "scaling.safetensors"
-        tensors = run_files.tensors(path)
-        try:
-            return Scaling(*(tensors[name] for name in Scaling.__slots__))
-        except KeyError as error:
-            raise run_files.unreadable(path, f"it lacks {error}") from error
+        """Raises UnreadableError."""
+        from shiplog.training import network_files
+
+        return network_files.scaling(self.path)
 
     def empty_model(self) -> FeedForward:
+        from shiplog.models.feedforward import FeedForward
+
         return FeedForward(self.shape, self.scaling())
 
     def simulator(self, seed: int) -> FeedForward:
-        return seed_files.fill(self.empty_model(), self.seed(seed))
+        from shiplog.training import network_files
+
+        return network_files.fill(self.empty_model(), self.seed(seed))
 
     @property
     def judges_itself(self) -> bool:

@@ -94,7 +94,7 @@ def choose_network(
         model, done = hybrid_training.fit(
             ready.model, physics, part,
             width=settings.width, strength=strength,
-            rng=np.random.default_rng(random_streams.generator(seed, "residual").initial_seed()),
+            rng=np.random.default_rng(random_streams.number(seed, "residual")),
         )  # fmt: skip
         return Simulator(model, done.values, done.covariance), done
 

@@ -14,7 +14,8 @@ import torch
 from torch import Tensor
 
 from shiplog import channels
-from shiplog.models.feedforward import Scaling, Shape, driven_by
+from shiplog.models.feedforward import Scaling, driven_by
+from shiplog.models.network_shape import Shape
 from shiplog.training import kernel
 from shiplog.voyages.windows import Windows
 

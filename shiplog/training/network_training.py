@@ -128,6 +128,11 @@ def share_done(epoch: int, settings: Paper) -> float:
     return min(0.99, epoch / max(settings.most_epochs or settings.least_epochs, 1))
 
 
+def ended(best: float, epochs: int) -> str:
+    """What a finished training came to."""
+    return f"best validation L {best:.0f} after {epochs} epochs"
+
+
 def paper_done(progress: Progress, settings: Paper) -> bool:
     """Whether the stopping rule holds, Eq. 24, or no loss is a number any more."""
     _, training, validation, _ = progress.history[-1]

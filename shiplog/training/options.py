@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import logging
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from shiplog.models import MODELS, PHYSICS, taking
 from shiplog.training.run_config import RECIPES, WIND_INPUTS, Config
 from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.split_settings import Split
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -83,6 +86,14 @@ class TrainOptions:
                 f"--data {self.data} is of noisy copies, which an identification has no use for.",
                 hint=f"choose {listed(n for n, a in AUGMENTATIONS.items() if not a.copies)}.",
             )
+
+    def without_idle_seeds(self) -> TrainOptions:
+        """The same with one seed where the model draws nothing, so that all would be alike."""
+        kind = MODELS[self.model]
+        if self.seeds == 1 or kind.family is not PHYSICS or kind.residual:
+            return self
+        log.info("An identification draws nothing at random: one seed stands for all.")
+        return replace(self, seeds=1)
 
     def config(self, split: Split) -> Config:
         """The configuration of the run, with its voyages."""

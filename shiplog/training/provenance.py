@@ -13,7 +13,6 @@ from importlib.metadata import version
 from pathlib import Path, PurePath
 
 import polars as pl
-import torch
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ def provenance(logs_sha256: Mapping[str, str | None], began: float) -> dict:
         "shiplog": version("shiplog"),
         "commit": commit_of_source(),
         "python": platform.python_version(),
-        "torch": torch.__version__,
+        "torch": version("torch"),
         "polars": pl.__version__,
         "machine": platform.machine(),
         "device": "cpu",

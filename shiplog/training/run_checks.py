@@ -3,10 +3,10 @@ with."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Mapping, Sized
 from pathlib import Path
 
-from shiplog.exceptions import RunError, StoreError, listed
+from shiplog.exceptions import RunError, listed
 from shiplog.profile import Profile
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
@@ -58,15 +58,6 @@ def refuse_extended(path: Path) -> None:
         raise RunError(
             f"The run {path} was extended by a diagnosis, and not trained.",
             hint="repeat the run that it extends, and diagnose again.",
-        )
-
-
-def refuse_no_test_voyage(names: Sequence[str], store: Path, run: RunFolder) -> None:
-    """Raises StoreError where no voyage in the store is left to evaluate the run on."""
-    if not names:
-        raise StoreError(
-            f"Every voyage in {store} was used to train or validate {run.name}.",
-            hint="ingest voyages that it was not trained on, or name some with --voyages.",
         )
 
 

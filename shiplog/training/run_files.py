@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-import torch
 from safetensors import SafetensorError
-from safetensors.numpy import load_file as load_arrays
-from safetensors.numpy import save_file as save_numpy
-from safetensors.torch import load_file, save_file
+from safetensors.numpy import load_file, save_file
 
 from shiplog import files
 from shiplog.exceptions import UnreadableError
@@ -39,7 +36,7 @@ def table(path: Path) -> pl.DataFrame:
         raise unreadable(path, error) from error
 
 
-def tensors(path: Path) -> dict[str, torch.Tensor]:
+def arrays(path: Path) -> dict[str, np.ndarray]:
     """Raises UnreadableError."""
     try:
         return load_file(path)
@@ -47,20 +44,7 @@ def tensors(path: Path) -> dict[str, torch.Tensor]:
         raise unreadable(path, error) from error
 
 
-def arrays(path: Path) -> dict[str, np.ndarray]:
-    """Raises UnreadableError."""
-    try:
-        return load_arrays(path)
-    except (OSError, SafetensorError) as error:
-        raise unreadable(path, error) from error
-
-
-def save_tensors(path: Path, values: dict[str, torch.Tensor]) -> None:
-    with files.whole(path) as partial:
-        save_file(values, partial)
-
-
 def save_arrays(path: Path, values: Mapping[str, np.ndarray]) -> None:
     with files.whole(path) as partial:
         plain = {name: np.array(a, dtype=float, order="C") for name, a in values.items()}
-        save_numpy(plain, partial)
+        save_file(plain, partial)

@@ -7,7 +7,7 @@ them stands in `load_model`.
     <run>/windows.parquet                     which windows it was trained on
     <run>/training.parquet  validation.parquet    the 1 Hz rows they were cut from
     <run>/scaling.safetensors               mean and std of inputs and accelerations (networks)
-    <run>/seed<k>/                          see `seed_files`
+    <run>/seed<k>/                          see `network_files` and `physics_files`
     <run>/cross_validation.parquet          L of every training window by a fit without its voyage
     <run>/band.safetensors                  how far off a simulation may be
     <run>/extension.*                       causes that a diagnosis put into it: `extension_file`
@@ -24,6 +24,7 @@ import logging
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import polars as pl
 from pydantic import ValidationError
@@ -31,7 +32,6 @@ from pydantic import ValidationError
 from shiplog import files
 from shiplog.exceptions import RunError, UnreadableError
 from shiplog.models import MODELS, Kind
-from shiplog.models.feedforward import Scaling
 from shiplog.paths import check_run, refuse_taken
 from shiplog.profile import Profile
 from shiplog.profile_file import advice
@@ -39,6 +39,9 @@ from shiplog.simulation.prediction_interval import Band
 from shiplog.training import run_config as configuration
 from shiplog.training import run_files
 from shiplog.training.run_config import Config
+
+if TYPE_CHECKING:
+    from shiplog.models.feedforward import Scaling
 
 log = logging.getLogger(__name__)
 
@@ -88,7 +91,7 @@ class RunFolder:
         return run_files.table(self.path / "validation.parquet")
 
     def seed(self, seed: int) -> Path:
-        """The folder of one seed; see `seed_files`."""
+        """The folder of one seed; see `network_files` and `physics_files`."""
         return self.path / f"seed{seed}"
 
     def finished(self, seed: int) -> bool:
@@ -168,10 +171,9 @@ def create(
         validation.write_parquet(new / "validation.parquet")
         files.write_json(new / "profile.json", profile.model_dump(mode="json"))
         if scaling is not None:
-            run_files.save_tensors(
-                new / "scaling.safetensors",
-                {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__},
-            )
+            from shiplog.training import network_files  # with torch, which others do without
+
+            network_files.save_scaling(new, scaling)
         files.write_text(new / "config.toml", config.to_toml())
     return RunFolder(partial, config, profile)
 

@@ -43,6 +43,14 @@ class Prepared:
     free: np.ndarray
     unseen: Windows | None
 
+    def sentence(self, fit: bool) -> str:
+        """What is identified from what; `fit` is whether any parameter moves."""
+        count = int(self.free.sum()) if fit else 0
+        return (
+            f"{count} of {len(self.start.names)} parameters free, {len(self.voyages)} windows, "
+            f"starting values from {self.start.source}"
+        )
+
 
 def prepare(
     config: Config,

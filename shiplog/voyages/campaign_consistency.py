@@ -6,6 +6,7 @@ A voyage whose own estimate is far from the campaign's is named: it deviates.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -18,6 +19,8 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import sensor_consistency
 from shiplog.voyages.sensor_consistency import SURE_HALF_INTERVALS, Estimate, Motion
+
+log = logging.getLogger(__name__)
 
 SEASON_DAYS = 90.0  # days without a voyage, after which instruments may have been set anew
 CAMPAIGN_ROWS = 72_000  # of a campaign at 10 Hz: every voyage gives its share of two hours
@@ -72,6 +75,7 @@ def together(motions: Sequence[Motion]) -> Motion:
 
 def campaign(tables: Mapping[str, pl.DataFrame], profile: Profile) -> SensorCampaign:
     """Of voyages at 10 Hz that were read through one profile: voyage → its table."""
+    log.info("comparing the sensors of %d voyages with each other", len(tables))
     motions = {name: sensor_consistency.measured(table, profile) for name, table in tables.items()}
     found = tuple(sensor_consistency.of_motion(together(list(motions.values())), profile))
     of = {(e.kind, e.channel): e for e in found}

@@ -48,7 +48,7 @@ def of_ship(length: float, speed: float, recorded: float = math.inf) -> Timescal
 
     length    m
     speed     working speed: what 19 of 20 seconds of its nominal voyages do not exceed [m/s]
-    recorded  s, of the shorter campaign: it is cut into `ENOUGH` segments at least
+    recorded  s, of the shorter campaign: it is cut into `CAMPAIGN_SEGMENTS` segments at least
 
     In steps of two, so that a ship of the three-metre class keeps 30 s, 2 s and 2 s; not below
     21 s, where a segment tells little more than its initial state, nor above 240 s, where small

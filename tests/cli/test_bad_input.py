@@ -9,92 +9,10 @@ import os
 import sys
 from pathlib import Path
 
-import polars as pl
 import pytest
-import sailing
+from command_desk import TABLE, Desk, judge
 
-from shiplog import cli, disk_cache
-
-PROFILE = sailing.PROFILE
-TABLE = {  # what kvlcc2's [table] section reads
-    "run_id": ["z1"] * 3, "t_s": [0.0, 0.1, 0.2], "x0_m": [0.0] * 3, "y0_m": [0.0] * 3,
-    "psi_deg": [0.0] * 3, "u_body_mps": [1.0] * 3, "v_body_mps": [0.0] * 3, "r_degps": [0.0] * 3,
-    "delta_deg": [0.0] * 3, "n_rps": [9.0] * 3,
-}  # fmt: skip
-
-
-class Desk:
-    """A folder with a good log, a good profile and an ingested store, to spoil things in."""
-
-    def __init__(self, folder: Path, log: Path, store: Path) -> None:
-        self.folder, self.log, self.store = folder, log, store
-
-    def path(self, name: str) -> Path:
-        return self.folder / name
-
-    def file(self, name: str, content: bytes | str = b"") -> Path:
-        path = self.path(name)
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    def dir(self, name: str) -> Path:
-        self.path(name).mkdir()
-        return self.path(name)
-
-    def profile(self, old: str = "", new: str = "") -> Path:
-        assert old in PROFILE
-        return self.file("p.toml", PROFILE.replace(old, new) if old else PROFILE)
-
-    def ingest(self, *arguments) -> list:
-        return ["ingest", *arguments, "--store", self.path("new")]
-
-    def through(self, old: str, new: str) -> list:
-        """Ingest the good log through a spoilt profile."""
-        return self.ingest(self.log, "--profile", self.profile(old, new))
-
-    def train(self, *arguments) -> list:
-        return ["train", "--store", self.store, "--out", self.path("run"), *arguments]
-
-    def table(self, name: str = "t.csv", **changed) -> Path:
-        frame = pl.DataFrame({**TABLE, **changed})
-        frame.write_csv(self.path(name)) if name.endswith("csv") else frame.write_parquet(
-            self.path(name)
-        )
-        return self.path(name)
-
-    def convert(self, *tables, profile: str | Path = "kvlcc2") -> list:
-        return ["convert", *tables, "--profile", profile, "--out", self.path("logs")]
-
-
-@pytest.fixture(scope="module")
-def known(tmp_path_factory):
-    """Two voyages of the circling ship, ingested."""
-    folder = tmp_path_factory.mktemp("known")
-    logs = [sailing.write(folder / f"{n}.mcap", sailing.series(s)) for n, s in
-            (("one", 60.0), ("two", 50.0))]  # fmt: skip
-    (folder / "circle.toml").write_text(PROFILE)
-    arguments = ["ingest", *logs, "--profile", folder / "circle.toml", "--store", folder / "store"]
-    assert cli.run([str(a) for a in arguments]) == 0
-    return folder
-
-
-@pytest.fixture
-def desk(known, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return Desk(tmp_path, known / "one.mcap", known / "store")
-
-
-def judge(arguments, code, words, capsys) -> str:
-    """Run a command line; its sentences."""
-    found = cli.run([os.fsdecode(a) if isinstance(a, Path) else str(a) for a in arguments])
-    output = capsys.readouterr()
-    output = output.out + output.err
-    assert found == code, output
-    assert "Traceback" not in output and "unexpected fault" not in output, output
-    missing = [word for word in words if word not in " ".join(output.split())]
-    assert not missing, output
-    assert not list((disk_cache.folder() / "faults").glob("*"))
-    return output
+from shiplog import cli
 
 
 def halves(desk: Desk) -> bytes:
@@ -138,7 +56,6 @@ LOGS = {
         d.file("a" * 245 + ".mcap", d.log.read_bytes()), "--profile", d.profile())),
     "a log of nobody's profile": (1, ["shiplog profile"], lambda d: d.ingest(d.log)),
 }  # fmt: skip
-
 PROFILES = {
     "unknown": (1, ["did you mean 'esso-osaka'"],
                 lambda d: d.ingest(d.log, "--profile", "esso-osak")),
@@ -202,7 +119,6 @@ PROFILES = {
     "table's channel unknown": (1, ["the channel 'speed'"],
                                 lambda d: d.through("[ship]", "[table]\nu = 'speed'\n[ship]")),
 }  # fmt: skip
-
 TABLES = {
     "no such table": (1, ["does not exist"], lambda d: d.convert("nowhere.csv")),
     "no table": (1, ["is no table"], lambda d: d.convert(d.file("t.xlsx", b"PK"))),
@@ -223,7 +139,6 @@ TABLES = {
     "a log that is there already": (1, ["exists already"], lambda d: [
         *d.convert(d.table())[:-1], d.file("z1.mcap").parent]),
 }  # fmt: skip
-
 OPTIONS = {
     "no such command": (2, ["No such command"], lambda d: ["sail"]),
     "no such option": (2, ["No such option"], lambda d: d.train("--speed", "10")),
@@ -257,7 +172,6 @@ OPTIONS = {
         "--voyages", "one", "--validation", "one", "--window", "20")),
     "a window longer than the voyages": (1, ["--window"], lambda d: d.train("--window", "900")),
 }  # fmt: skip
-
 FOLDERS = {
     "ingest: the store is a file": (1, ["is a file"], lambda d: [
         "ingest", d.log, "--profile", d.profile(), "--store", d.file("s")]),
@@ -294,7 +208,6 @@ FOLDERS = {
     "demo: no such folder": (1, ["No log in"], lambda d: ["demo", "--logs", d.path("logs")]),
     "demo: --out is a file": (1, ["is a file"], lambda d: ["demo", "--out", d.file("f")]),
 }  # fmt: skip
-
 CASES = [
     pytest.param(*case, id=f"{table}: {name}")
     for table, cases in (
@@ -342,86 +255,3 @@ def test_a_log_whose_name_is_no_text(desk, capsys):
     Path(os.fsdecode(path)).write_bytes(desk.log.read_bytes())
     arguments = desk.ingest(Path(os.fsdecode(path)), "--profile", desk.profile())
     judge(arguments, 1, ["is not text"], capsys)
-
-
-# --- what nobody foresaw
-
-
-def test_any_other_exception_is_one_sentence_and_its_trace_is_kept(desk, capsys, monkeypatch):
-    from shiplog.voyages import catalogue
-
-    def broken(_store):
-        raise ZeroDivisionError("division\nby zero")
-
-    monkeypatch.setattr(catalogue, "entries", broken)
-    assert cli.run(["voyages", "--store", str(desk.store)]) == 1
-    output = capsys.readouterr().err
-    assert "Traceback" not in output
-    (trace,) = (desk.folder / "cache" / "shiplog" / "faults").iterdir()
-    first, _ = output.split("\n", 1)
-    assert "ZeroDivisionError: division by zero" in first and str(trace) in first
-    text = trace.read_text()
-    assert "in broken" in text and "Traceback" in text
-
-
-def test_a_trace_is_kept_where_there_is_no_cache(desk, capsys, monkeypatch):
-    """In the temporary folder."""
-    import tempfile
-
-    from shiplog.voyages import catalogue
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(desk.file("no-folder") / "cache"))
-    monkeypatch.setattr(tempfile, "tempdir", str(desk.dir("tmp")))
-    monkeypatch.setattr(catalogue, "entries", lambda _store: 1 / 0)
-    assert cli.run(["voyages", "--store", str(desk.store)]) == 1
-    (trace,) = desk.path("tmp").iterdir()
-    assert str(trace) in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", [PermissionError, FileNotFoundError])
-def test_what_the_system_says_of_a_path_is_the_users_to_mend(desk, capsys, monkeypatch, kind):
-    import errno
-
-    from shiplog.voyages import catalogue
-
-    code = {PermissionError: errno.EACCES, FileNotFoundError: errno.ENOENT}[kind]
-
-    def refused(_store):
-        raise OSError(code, os.strerror(code), "/somewhere")
-
-    monkeypatch.setattr(catalogue, "entries", refused)
-    judge(["voyages", "--store", desk.store], 1, [f"/somewhere: {os.strerror(code)}"], capsys)
-
-
-def test_ctrl_c_is_reported_and_has_its_code(desk, capsys, monkeypatch):
-    from shiplog.voyages import catalogue
-
-    def interrupted(_store):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(catalogue, "entries", interrupted)
-    assert cli.run(["voyages", "--store", str(desk.store)]) == 130
-    assert "what was finished is kept" in capsys.readouterr().err
-
-
-def test_wrong_words_are_answered_before_anything_heavy_is_loaded(desk):
-    """torch, JAX and Rerun take seconds; a wrong word is answered without any of them."""
-    import subprocess
-
-    program = (
-        "import sys, shiplog.cli as c; code = c.run(sys.argv[1:]); "
-        "heavy = {'torch', 'jax', 'rerun', 'scipy', 'numba'} & set(sys.modules); "
-        "sys.exit(9 if heavy else code)"
-    )
-    missing = desk.path("nowhere")
-    for code, arguments in (
-        (2, desk.train("--model", "lstm")), (1, desk.train("--voyages", "x")),
-        (1, ["evaluate", missing]), (1, ["compare", missing]), (1, ["diagnose", missing]),
-        (1, ["demo", "--logs", missing]), (1, ["ingest", missing]),
-        (1, ["ingest", desk.log, "--profile", "x"]),
-    ):  # fmt: skip
-        done = subprocess.run(
-            [sys.executable, "-c", program, *map(str, arguments)], cwd=Path(__file__).parents[2],
-            check=False, capture_output=True, text=True,
-        )  # fmt: skip
-        assert done.returncode == code, (arguments, done.stderr)

@@ -11,9 +11,9 @@ import numpy as np
 import polars as pl
 import pytest
 import sailing
+from command_desk import judge
 from own_causes import GOOD
 from safetensors.numpy import load_file, save_file
-from test_bad_input import judge
 
 from pipelines.experiments import simulated_ship
 from shiplog import cli, files

@@ -54,7 +54,7 @@ def test_neither_of_two_is_named(trial):
     found = verdict(trial, {(DRAG, NOMINAL): 0.5, (LOAD, NOMINAL): 0.45, ((), NOMINAL): 0.05})
     assert (found.verdict, named(found)) == ("undecided", [])
     assert list(found.ranking)[:2] == ["drag", "load"]
-    # neither is shown: the numbers are of nothing
+    # neither is reported: the numbers are of nothing
     assert found.fit.included == ()
 
 

@@ -12,7 +12,7 @@ from shiplog.diagnosis.discrepancy import SEEN, UNSEEN, WAVES
 from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.profile import Profile
 
-PUSH = np.array([0.08, 0.05, 0.03])
+ACCELERATION = np.array([0.08, 0.05, 0.03])
 TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw
 
 
@@ -71,7 +71,7 @@ def products(name: str, of: Profile, at: Knots) -> np.ndarray:
 
 
 def one(name: str, of: Profile, *at: Knots) -> discrepancy.Family:
-    (family,) = discrepancy.of(of, PUSH, 0, (name,), *at).families
+    (family,) = discrepancy.of(of, ACCELERATION, 0, (name,), *at).families
     return family
 
 
@@ -250,22 +250,22 @@ def test_families_whose_inputs_do_not_vary_are_absent():
     still = np.zeros((4, 5, 6))
     still[..., 1] = 0.5
     calm = knots(still, np.full((4, 5, 3), 0.2), np.full((4, 5, 1), 0.5), np.full((4, 5, 2), 1.5))
-    assert discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), calm).families == ()
+    assert discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm).families == ()
     # what varies between campaigns is there, though each by itself is still
     later = Knots(calm.state + 0.1, calm.driven)
-    found = discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), calm, later)
+    found = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), calm, later)
     assert [f.name for f in found.families] == [
         "motion", "controls", "wind", "position", "heading"
     ]  # fmt: skip
     moving = knots(rng.standard_normal((4, 5, 6)))
-    whole = discrepancy.of(TWIN, PUSH, 0, (*SEEN, *UNSEEN), moving)
+    whole = discrepancy.of(TWIN, ACCELERATION, 0, (*SEEN, *UNSEEN), moving)
     assert [f.name for f in whole.families] == [*SEEN, *UNSEEN]
 
 
 def test_a_ship_without_a_wind_sensor_has_no_family_of_the_wind():
     of = profile(actuator("screw", "propeller"), wind=False)
     at = knots(controls=np.random.default_rng(6).standard_normal((4, 5, 1)))
-    names = [f.name for f in discrepancy.of(of, PUSH, 0, SEEN, at).families]
+    names = [f.name for f in discrepancy.of(of, ACCELERATION, 0, SEEN, at).families]
     assert names == ["motion", "controls"]
 
 
@@ -279,7 +279,7 @@ def test_a_feature_that_hardly_varies_is_not_blown_up():
 
 def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monkeypatch):
     at = knots(seed=8)
-    found = discrepancy.of(TWIN, PUSH, 7, SEEN, at)
+    found = discrepancy.of(TWIN, ACCELERATION, 7, SEEN, at)
     columns = np.concatenate([f.columns for f in found.families])
     assert columns.tolist() == list(range(7, 7 + found.count))
 
@@ -289,7 +289,7 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
     features = np.concatenate([f.features(at) for f in found.families], -1)
     for channel in range(3):
         own = accelerations[:, 5 * channel : 5 * channel + 5]
-        assert own == pytest.approx(PUSH[channel] * features[..., channel, :])
+        assert own == pytest.approx(ACCELERATION[channel] * features[..., channel, :])
 
 
 def test_the_same_ship_has_the_same_features_every_time():

@@ -1,4 +1,4 @@
-"""Pushes of known size and time, hidden in a voyage, and voyages without."""
+"""External forces of known size and time, hidden in a voyage, and voyages without."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def under(sailed, force, noise=1.0):
      ((0.0, 0.0, -30.0), "yaw_rate")],
     ids=["ahead", "held back", "aside", "turned"],
 )  # fmt: skip
-def test_a_push_is_found_in_time_and_size(sailed, force, channel):
+def test_an_external_force_is_found_in_time_and_size(sailed, force, channel):
     (stretch,) = found(under(sailed, force))
     assert stretch.voyage == "one"
     assert stretch.channel == channel
@@ -47,15 +47,15 @@ def test_a_push_is_found_in_time_and_size(sailed, force, channel):
     assert stretch.peak == pytest.approx(sum(force), rel=0.25)
 
 
-def test_without_a_push_there_is_none(sailed):
+def test_without_an_external_force_there_is_none(sailed):
     assert found(under(sailed, (0.0, 0.0, 0.0))) == ()
 
 
-def test_what_she_could_do_herself_is_no_push(sailed):
+def test_what_the_ship_can_do_itself_is_no_external_force(sailed):
     assert found(under(sailed, (3.0, 0.0, 0.0))) == ()  # full thrust is 4 N
 
 
-def test_another_ship_under_a_crude_model_is_not_pushed(sailed):
+def test_another_ship_under_a_crude_model_has_no_external_force(sailed):
     """The known ship shares no formula with the estimated MMG that it is judged by."""
     assert found(afloat.record(sailed)) == ()
 

@@ -42,7 +42,7 @@ def segments(count: int, seed: int = 0) -> Cut:
     return Cut(np.arange(count), y, used, driven, np.zeros(count, dtype=int), STEP)
 
 
-def pushes(cut: Cut, of) -> np.ndarray:
+def acceleration_of(cut: Cut, of) -> np.ndarray:
     """[S, 3J] of an acceleration `of` (state, driven) in sway."""
     knots = at_knots(cut, GRID)
     whole = np.zeros((len(cut), 3, KNOTS))
@@ -78,9 +78,9 @@ def learned(linear: Linear) -> input_misfit.Misfit:
     return input_misfit.of(network(), linear.cut, GRID, modes, one, one, PROCESS_NOISE.acceleration)
 
 
-def test_what_it_bends_the_network_by_is_what_it_pushes():
+def test_what_it_bends_the_network_by_is_its_acceleration():
     cut = segments(40)
-    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1]))
+    hidden = acceleration_of(cut, lambda s, d: np.sin(s[..., 1]))
     own = learned(bent(cut, hidden, hidden))
     weights = np.random.default_rng(3).standard_normal(own.count)
     knots, plain = at_knots(cut, GRID), network()
@@ -103,8 +103,8 @@ def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():
     speed gets hundreds of nats from it, of a process noise of seconds; conditional on
     the misfit a few."""
     cut = segments(150)
-    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1]))
-    column = pushes(cut, lambda s, d: d[..., 0] + 0.5 * s[..., 1])
+    hidden = acceleration_of(cut, lambda s, d: np.sin(s[..., 1]))
+    column = acceleration_of(cut, lambda s, d: d[..., 0] + 0.5 * s[..., 1])
     given = bent(cut, hidden, column)
     assert nats(given, None) > 200.0
     assert nats(given, learned(given)) < 20.0
@@ -113,12 +113,12 @@ def test_a_misfit_of_the_inputs_speaks_for_no_cause_that_looks_like_it():
 def test_what_the_network_cannot_see_is_still_named_with_it():
     """Hidden: the force of the speed, and one of the place."""
     cut = segments(150)
-    place = pushes(cut, lambda s, d: np.tanh(s[..., 0]))
-    hidden = pushes(cut, lambda s, d: np.sin(s[..., 1])) + 0.5 * place
+    place = acceleration_of(cut, lambda s, d: np.tanh(s[..., 0]))
+    hidden = acceleration_of(cut, lambda s, d: np.sin(s[..., 1])) + 0.5 * place
     given = bent(cut, hidden, place)
     own = learned(given)
     assert nats(given, own) > 50.0
-    still = bent(cut, pushes(cut, lambda s, d: np.sin(s[..., 1])), place)
+    still = bent(cut, acceleration_of(cut, lambda s, d: np.sin(s[..., 1])), place)
     assert nats(still, learned(still)) < 5.0
 
 
@@ -127,7 +127,13 @@ def test_it_keeps_what_voyages_say_something_of():
     near = segments(60)
     slow = replace(near, y=0.02 * near.y, driven=0.02 * near.driven)
     much, little = (
-        learned(bent(cut, pushes(cut, lambda s, d: s[..., 1]), pushes(cut, lambda s, d: d[..., 0])))
+        learned(
+            bent(
+                cut,
+                acceleration_of(cut, lambda s, d: s[..., 1]),
+                acceleration_of(cut, lambda s, d: d[..., 0]),
+            )
+        )
         for cut in (near, slow)
     )
     assert 0 < little.count < 0.25 * much.count

@@ -81,20 +81,24 @@ def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
         yield given.e[s].ravel()[used], j, c
 
 
-PULSED = replace(PROCESS_NOISE, intermittent=np.array([0.0, 0.9, -0.4]), intermittent_time=12.0)
+INTERMITTENT = replace(
+    PROCESS_NOISE, intermittent=np.array([0.0, 0.9, -0.4]), intermittent_time=12.0
+)
 COLOURED = replace(
     PROCESS_NOISE, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
 )  # fmt: skip
 EACH = pytest.mark.parametrize(
-    "process_noise", (PROCESS_NOISE, PULSED, COLOURED), ids=("plain", "pulse", "coloured")
+    "process_noise",
+    (PROCESS_NOISE, INTERMITTENT, COLOURED),
+    ids=("plain", "intermittent", "coloured"),
 )
 
 
 @EACH
 def test_gram_is_the_dense_gaussian(process_noise):
     """[e | J]ᵀ C⁻¹ [e | J] with start and acceleration in C. The start is fitted: log |C| is the
-    restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀| with V of noise and push."""
+    restricted one, log |V| + log |Z₀ᵀ V⁻¹ Z₀| - log |Z₀ᵀ R⁻¹ Z₀|; V is of both noises."""
     given = linear(3)
     found = _gram(likelihood.weighed(given, process_noise), process_noise)
     for s, (e, j, c) in enumerate(dense(given, process_noise)):
@@ -113,7 +117,7 @@ def test_gram_is_the_dense_gaussian(process_noise):
 
 @EACH
 def test_a_square_of_errors_alone_is_that_of_their_gram(process_noise):
-    """Of one pass under each size of process noise, with a pulse and without."""
+    """Of one pass under each size of process noise, with an intermittent force and without."""
     given = linear(3)
     alone = replace(given, j=given.j[..., :0])
     weighed = likelihood.weighed(alone, process_noise)
@@ -247,11 +251,11 @@ def test_marginal_is_the_dense_gaussian():
     assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=1e-4)
 
 
-def test_a_pulse_pushes_all_channels_together():
+def test_an_intermittent_force_acts_on_all_channels_together():
     """Covariance of channel a at knot i and b at knot k: p_a p_b e^(-|t|/12 s), and the process
     noise's own only within a channel."""
-    kernel = PULSED.kernel(4)
-    acceleration, intermittent = PULSED.acceleration, np.array([0.0, 0.9, -0.4])
+    kernel = INTERMITTENT.kernel(4)
+    acceleration, intermittent = INTERMITTENT.acceleration, np.array([0.0, 0.9, -0.4])
     for a in range(3):
         for b in range(3):
             for i, k in ((0, 0), (0, 2), (3, 1)):
@@ -260,18 +264,20 @@ def test_a_pulse_pushes_all_channels_together():
                 if a == b:
                     value += acceleration[a] ** 2 * np.exp(-far / 5.0)
                 assert kernel[4 * a + i, 4 * b + k] == pytest.approx(value, abs=1e-7)
-    noise_factor = PULSED.times(3.0).kernel(4) - PULSED.kernel(4)
-    assert noise_factor[0, 0] == pytest.approx(8.0 * acceleration[0] ** 2)  # the pulse stays
+    noise_factor = INTERMITTENT.times(3.0).kernel(4) - INTERMITTENT.kernel(4)
+    assert noise_factor[0, 0] == pytest.approx(
+        8.0 * acceleration[0] ** 2
+    )  # the intermittent force stays
     assert abs(noise_factor[0, 4]) < 1e-12
 
 
 def test_precision_is_the_inverse():
-    kernel = covariance(PULSED, 3)
-    assert PULSED.precision(3) @ kernel == pytest.approx(np.eye(15), abs=1e-6)
+    kernel = covariance(INTERMITTENT, 3)
+    assert INTERMITTENT.precision(3) @ kernel == pytest.approx(np.eye(15), abs=1e-6)
 
 
 def test_sizes_are_learnt_from_draws_of_the_model():
-    """Noise and push as drawn, from a beginning that is wrong by a factor of three."""
+    """Both noises as drawn, from a beginning that is wrong by a factor of three."""
     rng = np.random.default_rng(11)
     given = linear(250, bins=10, knots=5)
     kernel = covariance(PROCESS_NOISE, 5)
@@ -290,7 +296,7 @@ def test_sizes_are_learnt_from_draws_of_the_model():
 
 def test_sizes_learnt_are_the_likeliest():
     """Within five rounds, from a beginning that is wrong by a factor of ten: at another size of any
-    of them, the dense likelihood is less. White noise, of which no colour is asked."""
+    of them, the dense likelihood is less. White noise, whose colour is not estimated."""
     rng = np.random.default_rng(13)
     given = linear(20, bins=10, knots=5)
     used = rng.random(given.e.shape[:2]) > 0.3  # hardly ever whole

@@ -89,7 +89,7 @@ def test_the_whole_current_is_found_though_the_network_learned_in_it(afloat):
 
 
 def test_a_function_of_the_networks_inputs_is_in_every_hypothesis(afloat):
-    """The level's last numbers are its, and what they push is what is taken off."""
+    """The level's last numbers are its, and their accelerations are what is taken off."""
     trial, ref = afloat.trial, afloat.trial.reference
     assert ref.learned and ref.columns.base == len(ref.theta) > 0
     count = ref.columns.linearised
@@ -110,17 +110,17 @@ def test_a_function_of_the_networks_inputs_is_in_every_hypothesis(afloat):
 
 
 def test_what_is_named_stands_in_the_network_with_the_judges_numbers(afloat):
-    """And stays: what is fitted again beside it is the network's bends, on the judge's segments."""
-    trial, seen = afloat.network.extended_by(afloat.decision)
-    assert seen.named == afloat.decision.named
-    (one,) = seen.named
-    assert seen.fit.point.numbers["current"] == pytest.approx(one.numbers)
-    assert seen.fit.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
-    assert seen.nothing.point.numbers == {} and seen.nothing.included == ()
+    """And stays: fitted again with it are the network's bends, on the judge's segments."""
+    trial, extended = afloat.network.extended_by(afloat.decision)
+    assert extended.named == afloat.decision.named
+    (one,) = extended.named
+    assert extended.fit.point.numbers["current"] == pytest.approx(one.numbers)
+    assert extended.fit.found.numbers["current"] == pytest.approx(one.numbers, rel=1e-4)
+    assert extended.nothing.point.numbers == {} and extended.nothing.included == ()
     ref, base = trial.reference, trial.reference.model.base
-    d = fits.solution(trial, seen.fit).solution
+    d = fits.solution(trial, extended.fit).solution
     weights = d[ref.columns.linearised : len(ref.columns.unit)]
-    assert fits.coefficients(trial, seen.fit) == pytest.approx(ref.misfit.bends(weights))
+    assert fits.coefficients(trial, extended.fit) == pytest.approx(ref.misfit.bends(weights))
     assert np.abs(weights).max() > 0.0 and base.bent is None
     assert (trial.rows == afloat.trial.rows).all()
     assert afloat.network.extended_by(afloat.decision)[0] is trial
@@ -168,13 +168,13 @@ def test_what_refutes_a_cause_of_a_network_is_its_mmg(afloat):
 
 def test_the_network_is_fitted_again_where_that_makes_its_error_less(afloat):
     """Whatever the judge did; and with nothing named there is nothing to gain."""
-    plain, beside = (replace(afloat.decision, adapted=a) for a in (False, True))
-    losses = [afloat.held.gain(one).after for one in (plain, beside)]
-    for given in (plain, beside):
+    plain, adapted = (replace(afloat.decision, adapted=a) for a in (False, True))
+    losses = [afloat.held.gain(one).after for one in (plain, adapted)]
+    for given in (plain, adapted):
         decision, found = afloat.held.simulated_with(given)
         assert found.after == pytest.approx(min(losses))
         assert decision.adapted == (losses[1] < losses[0])
-    nothing, none = afloat.held.simulated_with(replace(beside, named=()))
+    nothing, none = afloat.held.simulated_with(replace(adapted, named=()))
     assert none is None and not nothing.adapted
 
 

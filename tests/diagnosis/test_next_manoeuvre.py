@@ -21,8 +21,8 @@ def test_what_a_rival_imitates_does_not_count():
     named = SimpleNamespace(cause=SimpleNamespace(label="one"), numbers=np.array([3.0]))
     # by hand: y = 1.5 x₁, where the coefficient is N(0, ¼) and the rival N(0, 1)
     y = 1.5 * x[:, 1]
-    beside = np.eye(3) + 0.25 * np.outer(x[:, 0], x[:, 0])
-    with_rival = beside + np.outer(x[:, 2], x[:, 2])
+    alone = np.eye(3) + 0.25 * np.outer(x[:, 0], x[:, 0])
+    with_rival = alone + np.outer(x[:, 2], x[:, 2])
     expected = 0.5 * y @ np.linalg.inv(with_rival) @ y
     assert next_manoeuvre.apart(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
 

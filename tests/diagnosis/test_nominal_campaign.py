@@ -148,7 +148,7 @@ def test_characteristics_say_every_group_once(learned):
     for family in made.discrepancy.families:
         assert made.effects.size[family.columns] == pytest.approx(found.size[family.name])
     assert made.reference.counts == found.share
-    # of a model without any misfit little is learned of it: sizes in units of the process noise
+    # of a model without any misfit little of it is estimated: sizes in units of the process noise
     assert max(found.size.values()) < 0.5
     # parts drawn with one process noise differ by what seven steps of a grid can tell
     assert 0.0 <= found.noise < 0.3

@@ -51,8 +51,8 @@ def test_it_is_the_same_in_whichever_part_it_is():
     ("name", "sizes"), (("drag", (1.0,)), ("motion", CHANGE_SIZES), ("time", CHANGE_SIZES))
 )
 def test_a_placebo_is_the_difference_of_two_evidences(name, sizes):
-    """Of each part against the prior of the others: with the cause's own number beside what is
-    nominal of it, and without; the most of all parts, and of all sizes."""
+    """Of each part against the prior of the others: with the cause's own number in addition to
+    what is nominal of it, and without; the most of all parts, and of all sizes."""
     made = campaign(1.5)
     columns = made.reference.columns
     count = len(made.reference.pull)

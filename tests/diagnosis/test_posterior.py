@@ -76,13 +76,13 @@ def test_one_of_two_stated_names_is_not_enough(trial):
     assert found.none < 1e-6
 
 
-@pytest.mark.parametrize(("more", "said"), ((-0.001, False), (0.001, True)))
-def test_a_name_is_stated_from_a_probability_on(trial, more, said):
+@pytest.mark.parametrize(("more", "stated"), ((-0.001, False), (0.001, True)))
+def test_a_name_is_stated_from_a_probability_on(trial, more, stated):
     p = thresholds.STATED + more
     found = posterior(weighed.search(trial, {(DRAG, NOMINAL): p, (LOAD, RAISED): 1.0 - p}))
-    assert (found.stated == DRAG) is said
+    assert (found.stated == DRAG) is stated
     found = posterior(weighed.search(trial, {(DRAG, RAISED): p, (LOAD, NOMINAL): 1.0 - p}))
-    assert (found.remainder == RAISED) is said
+    assert (found.remainder == RAISED) is stated
     # the nominal misfit is no remainder that anybody asks for
     assert posterior(weighed.search(trial, {(DRAG, NOMINAL): 1.0})).remainder is None
 
@@ -157,7 +157,7 @@ def test_a_force_that_merely_varies_is_none():
     slow = np.repeat(5.0 * rng.standard_normal((120, 1)), 16, axis=1)
     for force in (varies, slow):
         assert not of_one_device(force, np.full(force.shape, 0.3))
-    assert not of_one_device(0.2 * varies, np.full(varies.shape, 2.0))  # nor what is not seen
+    assert not of_one_device(0.2 * varies, np.full(varies.shape, 2.0))  # nor what is not measured
 
 
 def test_a_causes_label_begins_with_its_name():

@@ -19,7 +19,7 @@ def gain(low: float, high: float) -> Gain:
 
 
 class HeldOut:
-    """Gains by what is named, and by the name that is taken away; what was asked is kept."""
+    """Gains by what is named, and by the name that is taken away; what was tested is kept."""
 
     def __init__(self, gains, worths=None):
         self.gains, self.worths, self.asked = gains, worths or {}, []
@@ -66,7 +66,7 @@ def test_what_is_not_surely_worse_stays(trial, interval):
 
 @pytest.mark.parametrize("interval", (UNSURE, HARDLY))
 def test_with_a_remainder_an_unsure_gain_names_nothing(trial, interval):
-    """The verdict is the remainder's; the cause keeps its probability, and the reason is told."""
+    """The verdict is the remainder's; the cause keeps its probability, with the reason."""
     made = weighed.search(trial, {(DRAG, RAISED): 1.0})
     decision, found, gained, refuted = judged(made, HeldOut({DRAG: interval}))
     assert (decision.verdict, decision.named, gained, refuted) == ("unknown", (), None, {})

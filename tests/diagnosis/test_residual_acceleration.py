@@ -32,8 +32,8 @@ def rested(lengths: tuple[int, ...], voyages: tuple[int, ...]) -> Record:
     )  # fmt: skip
 
 
-def seen_directly(y: np.ndarray, rows: np.ndarray) -> Linear:
-    """Observations that are the knots themselves, [S, 3, J] seen as u, v, r of bins 0 to J - 2."""
+def observed_directly(y: np.ndarray, rows: np.ndarray) -> Linear:
+    """Observations of the nodes themselves: [S, 3, J] as u, v, r of bins 0 to J - 2."""
     count, _, knots = y.shape
     bins = knots - 1
     e, z = np.zeros((count, bins, 6)), np.zeros((bins, 6, 6 + 3 * knots))
@@ -54,7 +54,10 @@ def test_the_posterior_is_kriging():
     rng = np.random.default_rng(0)
     y = 1e-3 * rng.standard_normal((2, 3, 16))
     found = residual_acceleration.posterior(
-        seen_directly(y, np.array([0, 300])), np.array([4e-4]), PROCESS_NOISE, rested((700,), (0,))
+        observed_directly(y, np.array([0, 300])),
+        np.array([4e-4]),
+        PROCESS_NOISE,
+        rested((700,), (0,)),
     )
     t = 2.0 * np.arange(16)
     for channel in range(3):
@@ -81,14 +84,17 @@ def test_segments_cover_every_stretch_twice_and_to_its_end():
 def test_each_instant_counts_once_and_by_the_better_known():
     y = np.zeros((3, 3, 16))
     found = residual_acceleration.posterior(
-        seen_directly(y, np.array([0, 300, 399])), np.zeros(1), PROCESS_NOISE, rested((700,), (0,))
+        observed_directly(y, np.array([0, 300, 399])),
+        np.zeros(1),
+        PROCESS_NOISE,
+        rested((700,), (0,)),
     )
     keep = residual_acceleration.once(found)
     rows = np.sort(found.rows[keep])
     assert np.diff(rows).min() >= 10  # knots are 20 rows apart; no pair is nearer than half of it
     assert rows[0] == 0
     assert rows[-1] == 699
-    assert not keep[0, 15]  # seen at the next segment's first knot, here by nothing
+    assert not keep[0, 15]  # measured at the next segment's first node, here by nothing
     assert keep[1, 0]
 
 
@@ -99,7 +105,7 @@ def test_the_table_tells_what_went_with_it():
     state[:, 4] = 4.0
     wind = np.tile([3.0, -4.0], (700, 1))
     record = replace(record, state=state, wind=wind)
-    linear = seen_directly(np.ones((2, 3, 16)) * 1e-3, np.array([0, 300]))
+    linear = observed_directly(np.ones((2, 3, 16)) * 1e-3, np.array([0, 300]))
     table = residual_acceleration.table(
         residual_acceleration.posterior(linear, np.zeros(1), PROCESS_NOISE, record), record
     )
@@ -113,7 +119,7 @@ def test_the_table_tells_what_went_with_it():
 
 
 def test_a_force_that_no_model_has_is_found_with_its_uncertainty():
-    """A push that swells and ebbs, through helm, wind and noise, by the project's own MMG."""
+    """A force that swells and ebbs, through helm, wind and noise, by the project's own MMG."""
     sailed = afloat.voyage(150.0)
     swell = np.sin(2.0 * np.pi * sailed.time / 50.0)[:, None] * np.array([3.0, -2.0, 1.0])
     record = afloat.record(sailed, afloat.sailed_with(sailed, swell))

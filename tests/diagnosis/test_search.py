@@ -186,7 +186,7 @@ def test_what_a_model_has_already_stays_with_what_is_found():
     assert decision.named[0].numbers[0] == pytest.approx(1.0, abs=4.0 * spread)
 
 
-def pushes() -> np.ndarray:
+def raised_noise() -> np.ndarray:
     """[S, 3J] three times the nominal process noise."""
     plain, _ = trial_with({})
     kernel = np.linalg.cholesky(straight.PROCESS_NOISE.kernel(plain.grid.knots))
@@ -201,7 +201,7 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         asked.append(fit.remainder)
         return straight.no_hull(fit)
 
-    more = pushes()
+    more = raised_noise()
     for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
         asked.clear()
         trial, point = trial_with({}, accelerations=more)
@@ -248,7 +248,7 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     gain, noisy, monkeypatch
 ):
     """What gains a little together with noise that explains much is fitted to that noise."""
-    trial, point = trial_with({}, accelerations=pushes())
+    trial, point = trial_with({}, accelerations=raised_noise())
     trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
     monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
     levels = weighing.nominal_levels(trial, point, (), 1.0)

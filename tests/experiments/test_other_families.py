@@ -245,9 +245,9 @@ def test_process_noise_is_no_ornstein_uhlenbeck_process(kind):
     ship = ship_of("catamaran")
     noise = replace(ship.noise, kind=kind, damping=0.5, period=10.0, burst=0.9)
     times = 0.1 * np.arange(60_000)
-    push = process_noise(np.random.default_rng(2), noise, times, 1.0)
-    assert push.std(axis=0) == pytest.approx(noise.sigma, rel=0.35)
-    one = push[:, 1] / push[:, 1].std()
+    acceleration = process_noise(np.random.default_rng(2), noise, times, 1.0)
+    assert acceleration.std(axis=0) == pytest.approx(noise.sigma, rel=0.35)
+    one = acceleration[:, 1] / acceleration[:, 1].std()
     lagged = [float(np.mean(one[:-lag] * one[lag:])) for lag in range(10, 120, 5)]
     assert min(lagged) < -0.08
     periods = {cases.FAMILIES[f](s).noise.period for f in OWN for s in range(20)}

@@ -55,22 +55,24 @@ def test_a_hidden_instrument_shows_exactly_its_number():
         antenna_offset=(12.0, -3.0), wind_direction_offset=math.radians(-11.0),
         wind_speed_scale=0.2, clock_offset={"velocity": 1.3},
     )  # fmt: skip
-    plain, shown = columns(v, Effects()), columns(v, e)
+    plain, logged = columns(v, Effects()), columns(v, e)
     times, heading = plain["/gyro/heading_deg"]
-    assert turned(shown["/gyro/heading_deg"][1] - heading) == pytest.approx(3.0, abs=0.01)
+    assert turned(logged["/gyro/heading_deg"][1] - heading) == pytest.approx(3.0, abs=0.01)
     rate = np.interp(times, v.time, np.degrees(v.yaw_rate))
-    extra = shown["/gyro/yaw_rate_degps"][1] - plain["/gyro/yaw_rate_degps"][1]
+    extra = logged["/gyro/yaw_rate_degps"][1] - plain["/gyro/yaw_rate_degps"][1]
     assert extra == pytest.approx(0.2 + 0.05 * rate, abs=0.002)
     at, north = plain["/gnss/local/x_m"]
     psi = np.interp(at, v.time, v.heading)
-    moved = shown["/gnss/local/x_m"][1] - north
+    moved = logged["/gnss/local/x_m"][1] - north
     assert moved == pytest.approx(12.0 * np.cos(psi) + 3.0 * np.sin(psi), abs=0.002)
     blown, angle = plain["/wind/apparent/direction_deg"]
-    assert turned(shown["/wind/apparent/direction_deg"][1] - angle) == pytest.approx(-11.0, abs=0.2)
+    assert turned(logged["/wind/apparent/direction_deg"][1] - angle) == pytest.approx(
+        -11.0, abs=0.2
+    )
     speed = np.hypot(*(np.interp(blown, v.time, w) for w in (v.from_ahead, v.from_starboard)))
-    extra = shown["/wind/apparent/speed_mps"][1] - plain["/wind/apparent/speed_mps"][1]
+    extra = logged["/wind/apparent/speed_mps"][1] - plain["/wind/apparent/speed_mps"][1]
     assert extra == pytest.approx(0.2 * speed, abs=0.02)
-    assert shown["/rudder/rudder/angle_deg"][1] == pytest.approx(
+    assert logged["/rudder/rudder/angle_deg"][1] == pytest.approx(
         plain["/rudder/rudder/angle_deg"][1]
     )
 

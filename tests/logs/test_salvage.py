@@ -1,4 +1,4 @@
-"""Damaged files: what a search can find is read, and what is lost is said by topic and time."""
+"""Damaged files: what a search can find is read, and what is lost is reported by topic and time."""
 
 from __future__ import annotations
 
@@ -232,18 +232,18 @@ def test_a_log_whose_payloads_are_all_spoilt_is_refused_with_the_reason(reading)
 # --- claims of size
 
 
-def bomb(size: int, head: bytes = b"", said: int | None = None, crc: int | None = 0) -> bytes:
+def bomb(size: int, head: bytes = b"", stated: int | None = None, crc: int | None = 0) -> bytes:
     """A chunk of zeros behind `head`, packed to a ten-thousandth."""
     pack = zstandard.ZstdCompressor().compressobj()
     body = pack.compress(head) + pack.compress(bytes(size - len(head))) + pack.flush()
-    said = size if said is None else said
-    return struct.pack("<QQQI", START, START, said, crc or 0) + mcap.text("zstd") + (
+    stated = size if stated is None else stated
+    return struct.pack("<QQQI", START, START, stated, crc or 0) + mcap.text("zstd") + (
         struct.pack("<Q", len(body)) + body)  # fmt: skip
 
 
 @pytest.mark.parametrize(
     "made",
-    [bomb(200 << 20), bomb(200 << 20, said=1000), bomb(64 << 20, said=2 << 30)],
+    [bomb(200 << 20), bomb(200 << 20, stated=1000), bomb(64 << 20, stated=2 << 30)],
     ids=["of nothing", "that states less", "that states more"],
 )
 def test_a_chunk_that_unpacks_to_nothing_is_lost_and_is_never_held(reading, made, monkeypatch):

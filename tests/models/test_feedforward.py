@@ -6,7 +6,8 @@ import torch
 from small_networks import by_autograd, network, windows
 
 from shiplog.models.base import kinematics
-from shiplog.models.feedforward import Shape, exogenous
+from shiplog.models.feedforward import exogenous
+from shiplog.models.network_shape import Shape
 from shiplog.simulation import scoring
 from shiplog.simulation.rollout import rollout, simulate
 

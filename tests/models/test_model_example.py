@@ -74,7 +74,7 @@ def test_at_rest_nothing_moves_and_the_rudder_steers_in_the_slipstream(esso):
 
 
 def test_it_is_trained_evaluated_compared_and_diagnosed(kt, tmp_path):
-    """Nothing but the file and the line; what its coefficients cannot tell is said."""
+    """Nothing but the file and the line; what its coefficients cannot distinguish is reported."""
     for number in range(1, 4):
         voyage = simulated_ship.sail(270.0, seed=number, wind=simulated_ship.Wind(0.0, 0.0))
         start = datetime(2026, 5, 1, 10 + number, 0, tzinfo=UTC)
@@ -97,7 +97,7 @@ def test_it_is_trained_evaluated_compared_and_diagnosed(kt, tmp_path):
     assert code == 0 and "kt identified on ref" in reported and (tmp_path / "kt.rrd").is_file()
     to = tmp_path / "d.json"
     code, reported, _ = call("diagnose", run, *test, "--out", tmp_path / "d", "--json", to)
-    assert code == 0 and "causes that change forces cannot be told" in reported
+    assert code == 0 and "causes that change forces cannot be identified" in reported
     answer = json.loads(to.read_text(encoding="utf-8"))
     forces = {c["name"] for c in answer["unavailable"] if c["reason"].startswith("a K-T model")}
     assert {"fouling", "current"} <= forces and "heading_offset" not in forces

@@ -39,7 +39,7 @@ def test_none_is_none():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "words"),
     [
         ("def broken(:\n", "SyntaxError"),
         ("import nothing_of_that_name\n", "nothing_of_that_name"),
@@ -51,9 +51,9 @@ def test_none_is_none():
     ],
     ids=("syntax", "import", "none", "imported", "taken", "kind", "story"),
 )
-def test_a_file_that_cannot_be_taken_says_why(tmp_path, text, said):
+def test_a_file_that_cannot_be_taken_says_why(tmp_path, text, words):
     path = write(tmp_path, text)
-    with pytest.raises(RunError, match=said) as found:
+    with pytest.raises(RunError, match=words) as found:
         user.load([path])
     assert found.value.hint
 

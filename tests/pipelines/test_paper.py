@@ -24,8 +24,8 @@ def store(tmp_path_factory):
 @pytest.fixture(scope="module")
 def experiment(store, tmp_path_factory):
     out = tmp_path_factory.mktemp("paper") / "out"
-    said = [word for name in DATA for word in ("--data", name)]
-    code, text, _ = call("paper", "--store", store.path, "--out", out, *FEW, *said,
+    options = [word for name in DATA for word in ("--data", name)]
+    code, text, _ = call("paper", "--store", store.path, "--out", out, *FEW, *options,
                          "--json", out.parent / "answer.json")  # fmt: skip
     assert code == 0
     return out, text, json.loads((out.parent / "answer.json").read_text(encoding="utf-8"))
@@ -74,18 +74,18 @@ def test_given_again_it_trains_nothing_and_says_the_same(experiment, store, monk
         monkeypatch.setattr(figures, name, lambda *_: None)  # they are there, and take the longest
     weights = out / "runs" / "ref" / "seed0" / "model.safetensors"
     before = weights.stat().st_mtime_ns
-    said = [word for name in DATA for word in ("--data", name)]
-    code, again, _ = call("paper", "--store", store.path, "--out", out, *FEW, *said)
+    options = [word for name in DATA for word in ("--data", name)]
+    code, again, _ = call("paper", "--store", store.path, "--out", out, *FEW, *options)
     assert (code, again) == (0, text)
     assert weights.stat().st_mtime_ns == before
 
 
-def test_a_folder_of_other_settings_is_said_and_not_touched(experiment, store):
+def test_a_folder_of_other_settings_is_reported_and_not_touched(experiment, store):
     out, _, _ = experiment
-    code, _, said = call("paper", "--store", store.path, "--out", out, "--window", 20, "--width", 9,
-                         "--seeds", 2, "--epochs", 2, "--data", "ref")  # fmt: skip
+    code, _, output = call("paper", "--store", store.path, "--out", out, "--window", 20,
+                           "--width", 9, "--seeds", 2, "--epochs", 2, "--data", "ref")  # fmt: skip
     assert code == 1
-    assert "is a finished run of other settings" in said
+    assert "is a finished run of other settings" in output
 
 
 def test_without_a_test_voyage_there_is_no_experiment(tmp_path):
@@ -105,9 +105,9 @@ def test_one_long_voyage_is_halved_for_the_reference_set(tmp_path):
 def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path):
     """Its parts train, validate and test; the reference set is half of the training part."""
     store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
-    code, _, said = call("paper", "--store", store.path, "--out", tmp_path / "out", *FEW,
+    code, _, output = call("paper", "--store", store.path, "--out", tmp_path / "out", *FEW,
                          "--data", "ref", "--data", "d-ref")  # fmt: skip
-    assert code == 0, said
+    assert code == 0, output
     losses = pl.read_parquet(tmp_path / "out" / "tables" / "test_losses.parquet")
     assert losses.select("set", "seed").rows() == [
         ("ref", 0), ("ref", 1), ("d-ref", 0), ("d-ref", 1),

@@ -1,6 +1,5 @@
-"""`shiplog train --model mmg` and `hybrid` as a user types them, on short voyages."""
+"""`shiplog train --model mmg` as a user types it, on short voyages."""
 
-import json
 import math
 import shutil
 import tomllib
@@ -10,47 +9,12 @@ from importlib import resources
 import numpy as np
 import polars as pl
 import pytest
-import sailing
 from commands import call
-from own_causes import GOOD
-from safetensors.numpy import load_file, save_file
+from short_voyages import BOTH, HULL, answer, scored, train
 
 from pipelines.experiments import simulated_ship
-from pipelines.identify import identify_run
-from shiplog.exceptions import RunError
-from shiplog.models.causes import CATALOGUE, user
-from shiplog.training import extension_file, load_model, regularisation
+from shiplog.training import load_model, regularisation
 from shiplog.training import output_error as identification
-from shiplog.training.run_config import Config
-from shiplog.voyages.ingest import ingest
-from shiplog.voyages.split import choose_physical_split
-from shiplog.voyages.split_settings import Split
-from shiplog.voyages.store import Store
-
-HULL = ("--without", "propeller", "--without", "rudder")  # a hull in the wind compiles quickly
-WINDOW = ("--window", 25)
-BOTH = ("--voyages", "trip_1", "--voyages", "trip_2")
-STATES = ["x0", "surge", "y0", "sway", "heading", "yaw_rate"]
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    """Three short voyages of the simulated ship, all on one day."""
-    folder = tmp_path_factory.mktemp("logs")
-    for number in range(1, 4):
-        voyage = simulated_ship.sail(80.0, seed=number, wind=simulated_ship.Wind(3.0, number))
-        start = datetime(2026, 5, 1, 10 + number, 0, tzinfo=UTC)
-        simulated_ship.write_voyage(
-            folder / f"trip_{number}.mcap", voyage, seed=number, start=start
-        )
-    return folder
-
-
-@pytest.fixture(scope="module")
-def store(logs, tmp_path_factory):
-    path = tmp_path_factory.mktemp("work") / "store"
-    assert call("ingest", logs, "--store", path)[0] == 0
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -65,28 +29,6 @@ def calm(logs, tmp_path_factory):
     return folder / "store"
 
 
-def train(store, out, *arguments):
-    return call("train", "--store", store, "--out", out, *WINDOW, *arguments)
-
-
-def answer(path):
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def scored(run, store, to) -> dict:
-    assert call("evaluate", run, "--store", store, "--voyages", "trip_3", "--json", to)[0] == 0
-    return answer(to)
-
-
-@pytest.fixture(scope="module")
-def published(store):
-    """Nothing fitted: run folder and what was reported of it."""
-    out = store.parent / "published"
-    code, reported, _ = train(store, out, "--model", "mmg", "--no-fit", *BOTH, *HULL)
-    assert code == 0
-    return out, reported
-
-
 @pytest.fixture(scope="module")
 def fitted(store):
     """All of hull and wind identified, three seeds asked for: run folder, text and JSON."""
@@ -96,101 +38,6 @@ def fitted(store):
     )
     assert code == 0
     return out, reported, answer(to)
-
-
-# ---------------------------------------------------------------- as published
-
-
-def test_an_unfitted_model_is_evaluated_like_any_other(published, store, tmp_path):
-    run, reported = published
-    assert "mmg as given, without propeller, rudder" in reported
-    assert "over the 6 windows named, with nothing fitted" in reported
-    content = scored(run, store, tmp_path / "e.json")
-    assert math.isfinite(content["loss"]) and content["loss"] > 0.0
-    assert len(content["seeds"]) == 1 and content["windows"] == 3
-    assert sorted(content["band_90"]) == sorted(STATES)
-    assert all(0.0 <= share <= 1.0 for share in content["band_90"].values())
-
-
-def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
-    """A run may be anybody's: a cause of its owner's comes from --cause FILE, given again."""
-    ran = tmp_path / "ran"
-    mine = tmp_path / "mine.py"
-    mine.write_text(f"{GOOD}\nwith open({str(ran)!r}, 'a') as f:\n    f.write('x')\n")
-    causes = user.load([mine])
-    run = load_model.load(published[0])
-    after = run.extended(0).with_causes(
-        causes, {"tide_gate": np.array([3.0])}, {"tide_gate": np.array([[0.01]])}
-    )
-    kept = extension_file.extend(run, tmp_path / "extended", after, [mine])
-    assert load_model.load(kept, causes).label == "mmg with tide_gate"
-    was = ran.read_text()
-    for command in ("evaluate", "compare"):
-        code, _, reported = call(command, kept, "--store", store, "--voyages", "trip_3")
-        assert code == 1 and "'tide_gate'" not in reported and "tide_gate" in reported
-        assert f"--cause FILE; a copy to look over first: {kept / 'extension-0.py'}" in reported
-    assert ran.read_text() == was
-    with pytest.raises(RunError, match="--cause"):
-        load_model.load(kept).models()
-    again = load_model.load(kept, user.load([mine])).models()[0]
-    assert again.theta == pytest.approx(after.theta)
-    code, reported, _ = call("evaluate", kept, "--store", store, "--voyages", "trip_3",
-                         "--cause", mine)  # fmt: skip
-    assert code == 0 and "mmg with tide_gate" in reported
-    assert ran.read_text() == was + "xx"
-
-
-def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_path):
-    """Also where the owner's causes were tested and not named: nothing of theirs is in it."""
-    mine = tmp_path / "mine.py"
-    mine.write_text(GOOD)
-    run = load_model.load(published[0])
-    (current,) = [c for c in CATALOGUE if c.label == "current"]
-    numbers = {"current": np.array([0.1, -0.05])}
-    after = run.extended(0).with_causes([current], numbers, {"current": 1e-4 * np.eye(2)})
-    kept = extension_file.extend(run, tmp_path / "extended", after, [mine])
-    assert load_model.load(kept).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
-    assert not list(kept.glob("*.py"))
-
-
-def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
-    """Its folder holds neither names nor numbers of the five coefficients."""
-    old = tmp_path / "old"
-    shutil.copytree(published[0], old)
-    table = load_model.load(old).identified()
-    late = table["name"].is_in([f"hull.{key}" for key in ("x_u", "y_vl", "y_rl", "n_vl", "n_rl")])
-    assert late.sum() == 5
-    table.filter(~late).write_parquet(old / "seed0" / "identified.parquet")
-    arrays = load_file(old / "seed0" / "model.safetensors")
-    had = ~late.to_numpy()
-    arrays |= {"theta": arrays["theta"][had], "covariance": arrays["covariance"][had][:, had]}
-    save_file(
-        {k: np.ascontiguousarray(v) for k, v in arrays.items()}, old / "seed0" / "model.safetensors"
-    )
-    now, was = load_model.load(published[0]), load_model.load(old)
-    assert was.simulator(0).theta.tolist() == now.simulator(0).theta.tolist()
-    start = was.base()[1]
-    assert start.spread[late.to_numpy()].tolist() == [1e-9] * 5
-    assert start.spread[had].tolist() == now.base()[1].spread[had].tolist()
-
-
-def test_nothing_fitted_is_the_start_and_sure_of_nothing(published):
-    run = load_model.load(published[0])
-    identified = run.identified()
-    assert (identified["value"] == identified["start"]).all()
-    assert not identified["free"].any() and (identified["standard_error"] == 0.0).all()
-    assert not (run.path / "cross_validation.parquet").exists()
-    assert not run.simulator(0).covariance.any()
-    assert run.config.physics.parameters == "empirical formulas from the particulars"
-
-
-def test_a_force_left_out_is_reported_and_gone(store, tmp_path):
-    code, reported, _ = train(
-        store, tmp_path / "r", "--model", "mmg", "--no-fit", *BOTH, *HULL, "--without", "wind"
-    )
-    assert code == 0 and "mmg as given, without propeller, rudder, wind in" in reported
-    names = load_model.load(tmp_path / "r").identified()["name"]
-    assert {name.split(".")[0] for name in names} == {"body", "hull"}
 
 
 # ---------------------------------------------------------------- identified
@@ -383,45 +230,6 @@ def test_a_validation_voyage_without_a_window_is_refused(logs, tmp_path):
 # ---------------------------------------------------------------- what is refused
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--free", "wind.y_1"), ["No parameter is called 'wind.y_1'", "did you mean 'wind.y1'"]),
-        (("--free", "nonsense"), ["No parameter is called 'nonsense'", "hull.y_v", "'wind.*'"]),
-        (("--free", "rudder.*"), ["No parameter is called 'rudder.*'"]),  # it was left out
-        (("--without", "wing"), ["no force 'wing'", "did you mean 'wind'"]),
-        (("--without", "hull"), ["no force 'hull'"]),
-        (("--parameters", "nowhere.toml"), ["nowhere.toml cannot be read"]),
-    ],
-)
-def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, words):
-    code, _, reported = train(store, tmp_path / "r", "--model", "mmg", *BOTH, *HULL, *arguments)
-    assert code == 1
-    for word in words:
-        assert word in reported
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_window_longer_than_every_voyage_is_refused(store, tmp_path):
-    code, _, reported = call("train", "--store", store, "--out", tmp_path / "r", "--model", "mmg",
-                         "--window", 400, *BOTH, *HULL)  # fmt: skip
-    assert code == 1 and "longer than every" in reported
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_hybrid_has_to_be_fitted(store, tmp_path):
-    code, _, reported = train(store, tmp_path / "r", "--model", "hybrid", "--no-fit", *BOTH)
-    assert code == 2 and "has to be fitted" in reported and "--model mmg" in reported
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_hybrid_needs_a_second_voyage(store, tmp_path):
-    code, _, reported = train(store, tmp_path / "r", "--model", "hybrid", "--voyages", "trip_1",
-                          "--free", "wind.*", *HULL)  # fmt: skip
-    assert code == 1 and "needs a voyage to hold out" in reported and "--validation" in reported
-    assert not (tmp_path / "r").exists()
-
-
 def test_wind_coefficients_need_a_wind_sensor(fitted, calm, tmp_path):
     toml = fitted[0] / "seed0" / "parameters.toml"
     given = ("--model", "mmg", "--no-fit", "--parameters", toml, *BOTH, *HULL)
@@ -430,105 +238,3 @@ def test_wind_coefficients_need_a_wind_sensor(fitted, calm, tmp_path):
     assert not list(tmp_path.iterdir())
     code, reported, _ = train(calm, tmp_path / "r", *given, "--without", "wind")
     assert code == 0 and "without propeller, rudder, wind" in reported
-
-
-# ---------------------------------------------------------------- the hybrid
-
-
-@pytest.fixture(scope="module")
-def hybrid(store):
-    """A network of two units, one strength to choose; only one parameter of the physics free."""
-    physics = {"without": ("propeller", "rudder", "wind"), "free": ("hull.x_0f",),
-               "width": 2, "strengths": (1.0,)}  # fmt: skip
-    config = Config.model_validate(
-        {
-            "model": "hybrid", "window": 25, "physics": physics,
-            "split": Split(training=("trip_1", "trip_2"), validation=()),
-        }
-    )  # fmt: skip
-    return identify_run(config, Store(store), store.parent / "hybrid")
-
-
-def test_a_hybrid_is_judged_on_held_out_voyages_and_says_so(hybrid):
-    run, reported = hybrid
-    assert run.label == "hybrid identified on ref, without propeller, rudder, wind"
-    (sentence,) = [s for s in reported if s.startswith("Seed 0")]
-    assert "adds nothing that survives" in sentence or "on 6 held-out windows" in sentence
-    assert run.band() is not None
-
-
-def test_a_hybrid_is_opened_as_it_was_fitted(hybrid, store, tmp_path):
-    run, _ = hybrid
-    model = run.simulator(0).model
-    assert model.residual.width == 2
-    assert len(model.names) == 3 + 15 + model.residual.count == len(run.simulator(0).theta)
-    assert model.residual.anchors.shape == (150, 6)  # two voyages of three windows of 25 s
-    found = run.identified()
-    assert found.height == 18 and not any("network" in name for name in found["name"])
-    assert found.filter(pl.col("free"))["name"].to_list() == ["hull.x_0f"]
-    held = found.filter(~pl.col("free"))
-    assert (held["value"] == held["start"]).all()
-    toml = tomllib.loads((run.path / "seed0" / "parameters.toml").read_text(encoding="utf-8"))
-    assert set(toml) == {"source", "body", "hull"}
-    content = scored(run.path, store, tmp_path / "e.json")
-    assert math.isfinite(content["loss"]) and sorted(content["band_90"]) == sorted(STATES)
-
-
-def test_a_damaged_model_is_named(hybrid, tmp_path):
-    copy = tmp_path / "copy"
-    shutil.copytree(hybrid[0].path, copy)
-    path = copy / "seed0" / "model.safetensors"
-    path.write_bytes(path.read_bytes()[:50])
-    with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):
-        load_model.load(copy).simulator(0)
-
-
-# ---------------------------------------------------------------- the split
-
-
-@pytest.fixture(scope="module")
-def seven(tmp_path_factory):
-    """The names of the sample logs, and one voyage more."""
-    folder = tmp_path_factory.mktemp("seven")
-    whole = Store(folder / "store")
-    for number in range(1, 8):
-        rng = np.random.default_rng(number)
-        parts = sailing.series(30.0)
-        for one in parts.values():
-            for column, values in one.columns.items():
-                one.columns[column] = values + rng.normal(0, 1e-3, len(values))
-        path = sailing.write(folder / f"voyage_{number}.mcap", parts)
-        whole.add(ingest(path, sailing.profile()))
-    return whole
-
-
-SIX = [f"voyage_{i}" for i in range(1, 7)]
-
-
-def test_named_voyages_are_all_trained_on(seven):
-    for named in (SIX, ["voyage_7", "voyage_2"], ["voyage_[1-6]"]):
-        split = choose_physical_split(seven, named, (), "ref", 20)
-        assert set(split.training) == set(seven.select(named))
-        assert (split.validation, split.test) == ((), ())
-        assert "held out in turn" in split.chosen_by
-
-
-@pytest.mark.parametrize(("data", "count"), [("ref", 2), ("d-ref", 4)])
-def test_the_sample_logs_keep_the_papers_split(seven, data, count):
-    split = choose_physical_split(seven, (), (), data, 20)
-    assert split.training == tuple(SIX[:count])
-    assert (split.validation, split.test) == (("voyage_5",), ("voyage_6",))
-
-
-def test_the_users_validation_is_kept_apart(seven):
-    split = choose_physical_split(seven, ("voyage_[1-3]",), ("voyage_3", "voyage_7"), "ref", 20)
-    assert split.training == ("voyage_1", "voyage_2")
-    assert split.validation == ("voyage_3", "voyage_7") and split.test == ()
-    rest = choose_physical_split(seven, (), ("voyage_7",), "ref", 20)
-    assert rest.training == tuple(SIX) and rest.validation == ("voyage_7",)
-
-
-def test_with_nothing_named_a_share_is_left_for_testing(store):
-    split = choose_physical_split(Store(store), (), (), "ref", 25)
-    assert split.validation == () and len(split.test) == 1
-    assert sorted((*split.training, *split.test)) == ["trip_1", "trip_2", "trip_3"]

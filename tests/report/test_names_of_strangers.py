@@ -65,8 +65,8 @@ def test_the_report_of_a_diagnosis(tmp_path):
 
 def test_a_notebook():
     found = VoyageReport(HTML, 1, 0, 10, 1.0)
-    shown = api.Ingested(Store("store"), [found], {})._repr_markdown_()
-    assert "onerror" in shown and harmless(shown)
+    output = api.Ingested(Store("store"), [found], {})._repr_markdown_()
+    assert "onerror" in output and harmless(output)
 
 
 def test_the_viewers_pages(monkeypatch, tmp_path):

@@ -28,7 +28,7 @@ def test_the_ratio_is_of_pairs_and_its_interval_students():
     other = [r * math.exp(-k) for r, k in zip(ref, (1, 2, 3), strict=True)]
     row = found(losses(ref=ref, sli2=other), "sli2")
     assert row["ratio"] == pytest.approx(math.exp(-2.0))
-    half = 12.590 / math.sqrt(3.0)  # scipy and printed tables agree to the digits shown
+    half = 12.590 / math.sqrt(3.0)  # scipy and printed tables agree to the digits printed
     assert math.log(row["high"]) == pytest.approx(-2.0 + half, abs=0.01)
     assert math.log(row["low"]) == pytest.approx(-2.0 - half, abs=0.01)
     assert row["finding"] == statements.UNCLEAR  # it may well be 1

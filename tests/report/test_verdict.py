@@ -34,11 +34,11 @@ def test_the_largest_part_that_is_not_explained_is_in_the_sentence():
         {"channel": "sway", "share_of_error": 0.6}, {"channel": "yaw_rate", "share_of_error": 0.3},
     ]  # fmt: skip
     assert sentence("named", [sure], None, gained, 1.0, wrong=wrong).endswith(
-        "The rudders lag. The largest part that is not is in yaw rate: 20% of the error."
+        "The rudders lag. The largest unexplained part is in yaw rate: 20% of the error."
     )
 
 
-def test_what_another_fit_brings_alone_is_in_the_sentence():
+def test_the_gain_of_another_fit_alone_is_in_the_sentence():
     sure = {"sentence": "The wind is late.", "indistinguishable_from": [], "probability": 1.0}
     gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
     assert sentence("named", [sure], None, gained, 1.0, 0.32).endswith(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from rerun.chunk import RrdReader
+from recordings import entities, rows, scalars
 
 from shiplog.channels import STATE
 from shiplog.report import viewer
@@ -40,9 +40,9 @@ def forces(voyage, named=True):
     tables = [
         pl.DataFrame({"voyage": [voyage] * len(time), "time": time}).with_columns(
             channel=pl.lit(channel), force=pl.lit(force), sd=pl.lit(sd),
-            named=pl.lit(push if named else None, pl.Float64),
+            named=pl.lit(known if named else None, pl.Float64),
         )
-        for channel, force, sd, push in (
+        for channel, force, sd, known in (
             ("surge", -3.0, 1.0, -2.5), ("sway", 8.0, 2.0, 7.5), ("yaw_rate", 0.5, 0.1, 0.25),
         )
     ]  # fmt: skip
@@ -79,30 +79,12 @@ def saved(exhibit, tmp_path_factory):
     return path
 
 
-def table(path, entity, component):
-    """The rows of a component at an entity, in order of time."""
-    chunks = RrdReader(path).stream().filter(content=entity)
-    batches = [pl.DataFrame(pl.from_arrow(c.to_record_batch())) for c in chunks]
-    tables = [t for t in batches if component in t.columns]
-    assert tables, f"{entity} has no {component}"
-    rows = pl.concat(tables)
-    return rows.sort("sim_time") if "sim_time" in rows.columns else rows
-
-
 def column(path, entity, component):
-    return table(path, entity, component)[component]
-
-
-def scalars(path, entity):
-    return column(path, entity, "Scalars:scalars").explode().to_numpy()
+    return rows(path, entity, component)[component]
 
 
 def colour(path, entity):
     return column(path, entity, "SeriesLines:colors").explode()[0]
-
-
-def entities(path):
-    return RrdReader(path).store().summary()
 
 
 def views(containers):
@@ -161,7 +143,7 @@ def test_charts_show_the_telling_window_and_the_whole_voyage(saved):
 
 
 def test_a_hull_lies_nowhere_before_its_window(saved):
-    hull = table(saved, r"/track/out\,\ 100\ to\ 199\ s/now/measured", "LineStrips2D:strips")
+    hull = rows(saved, r"/track/out\,\ 100\ to\ 199\ s/now/measured", "LineStrips2D:strips")
     assert hull["sim_time"].dt.total_seconds().to_list() == [100]
 
 

@@ -122,7 +122,7 @@ def test_least_squares_goes_no_further_outside_its_range():
 
 
 def test_least_squares_finds_a_quadratic_ship_again():
-    """Data of u̇ = 0.1 n² - 0.2 u|u| + 0.01 U² cos γ, integrated as the floor integrates."""
+    """Data of u̇ = 0.1 n² - 0.2 u|u| + 0.01 U² cos γ, integrated as the baseline is."""
     rng = np.random.default_rng(0)
     count, size = 12, 60
     actuator = (

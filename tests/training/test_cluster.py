@@ -45,8 +45,8 @@ def nodes(tmp_path):
             os.environ.pop(name)
 
 
-def _start(said, *arguments):
-    with open(said, "w", encoding="utf-8") as out:
+def _start(output, *arguments):
+    with open(output, "w", encoding="utf-8") as out:
         return subprocess.Popen(
             [RAY, "start", "--disable-usage-stats", *arguments],
             stdout=out,
@@ -92,20 +92,20 @@ def test_a_node_that_dies_costs_no_training_and_changes_no_number(nodes, tmp_pat
     store = sailing.store_of(tmp_path, [f"v{i}" for i in range(4)], seconds=62.0)
     out = tmp_path / "cluster"
     command = ["paper", "--store", store.path, "--out", out, "--ray", address, *FEW]
-    with open(tmp_path / "said", "w", encoding="utf-8") as said:
+    with open(tmp_path / "output", "w", encoding="utf-8") as output:
         training = subprocess.Popen(
             [sys.executable, "-m", "shiplog.cli", *map(str, command)],
-            stdout=said, stderr=subprocess.STDOUT,
+            stdout=output, stderr=subprocess.STDOUT,
         )  # fmt: skip
     runs = out / "runs"
     try:
         _wait(lambda: training.poll() is not None or [*runs.glob("*/seed*/checkpoint*")], WAITS_S)
-        assert training.poll() is None, _text(tmp_path / "said")
+        assert training.poll() is None, _text(tmp_path / "output")
         _kill(worker)  # with the piece that it is at
         code = training.wait(timeout=WAITS_S)
     finally:
         training.kill()
-    assert code == 0, _text(tmp_path / "said")
+    assert code == 0, _text(tmp_path / "output")
 
     assert call("paper", "--store", store.path, "--out", tmp_path / "local", *FEW)[0] == 0
     local = tmp_path / "local" / "runs"

@@ -1,332 +1,31 @@
-"""The residual network: silent far from its training data, bounded near it, honest about forces."""
+"""The fit of a residual network, and how much of it held-out windows allow."""
 
-import math
-
-import jax.numpy as jnp
 import numpy as np
-import polars as pl
 import pytest
+from hybrid_ship import PHYSICS, SIZE, THETA, WIDTH, flat, sailed
 
-from shiplog import profile_file as profiles
-from shiplog.models.hybrid import Hybrid, anchored, first_weights, weight_spread
-from shiplog.models.mmg import MMG, estimated, geometry_of
-from shiplog.profile import Profile
-from shiplog.simulation import coverage, force_breakdown, sensitivities
-from shiplog.simulation.sensitivities import Simulator, WindowSeries
+from shiplog.models.mmg import MMG
+from shiplog.simulation import sensitivities
+from shiplog.simulation.sensitivities import WindowSeries
 from shiplog.training import hybrid_training
 from shiplog.training.output_error import Identified
 
-SHIP = """
-[ship]
-name = "made up"
-length_m = 4.0
-breadth_m = 1.0
-draught_m = 0.3
-mass_kg = 700.0
-x_g_m = 0.1
-[sensors.position]
-kind = "local"
-topic = "/p"
-fields = ["x", "y"]
-[sensors.velocity]
-kind = "body"
-topic = "/p"
-fields = ["u", "v"]
-[sensors.heading]
-topic = "/p"
-field = "heading"
-[sensors.wind]
-topic = "/w"
-fields = ["speed", "angle"]
-[[actuators]]
-name = "azimuth"
-kind = "azimuth"
-topic = "/a"
-field = "azimuth"
-unit = "deg"
-position_m = [-1.5, 0.0]
-[[actuators]]
-name = "thruster"
-kind = "thruster"
-topic = "/a"
-field = "thruster"
-position_m = [-1.5, 0.0]
-"""
-COUNT, SIZE, WIDTH = 8, 30, 3
 PULL = 0.002  # m/s² to starboard a unit of thrust: the extra force that no physics know of
 
 
-def driven(seed: int) -> WindowSeries:
-    """Windows under way, thrust and azimuth changing every five seconds, in a steady wind."""
-    rng = np.random.default_rng(seed)
-    state = np.zeros((COUNT, SIZE, 6))
-    first = (5.0, 0.1, 5.0, 0.05, 3.0, 0.01)
-    state[:, 0] = rng.normal(size=(COUNT, 6)) * first + (0.0, 0.5, 0.0, 0.0, 0.0, 0.0)
-    command = np.repeat(rng.uniform((-0.5, 0.3), (0.5, 0.9), (COUNT, SIZE // 5, 2)), 5, axis=1)
-    wind = np.broadcast_to(rng.normal(size=(COUNT, 1, 2)) * 2.0, (COUNT, SIZE, 2)).copy()
-    return WindowSeries(state, command, wind, np.ones((COUNT, SIZE - 1)), np.ones(COUNT))
+@pytest.fixture(scope="module")
+def physics() -> MMG:
+    return PHYSICS
 
 
 @pytest.fixture(scope="module")
-def ship() -> Profile:
-    return profiles.parse(SHIP, "ship.toml")
+def theta() -> np.ndarray:
+    return THETA
 
 
 @pytest.fixture(scope="module")
-def physics(ship) -> MMG:
-    return MMG(geometry_of(ship)[0])
-
-
-@pytest.fixture(scope="module")
-def theta(ship) -> np.ndarray:
-    """Estimated; but 10 N of thrust, which 700 kg follow slowly."""
-    g, main, _ = geometry_of(ship)
-    start = estimated(g, main)
-    pushes = [n.endswith(("ahead", "astern")) for n in start.names]
-    return np.where(pushes, 10.0, start.values)
-
-
-@pytest.fixture(scope="module")
-def data(physics, theta) -> WindowSeries:
-    plain = driven(0)
-    return plain._replace(measured=sensitivities.rollout(physics, theta, plain))
-
-
-@pytest.fixture(scope="module")
-def hybrid(physics, data) -> Hybrid:
-    return Hybrid(physics, hybrid_training.residual(physics, data, WIDTH))
-
-
-@pytest.fixture(scope="module")
-def loud(hybrid, theta) -> np.ndarray:
-    """The physics and weights of which every one says something."""
-    weights = np.random.default_rng(1).normal(size=hybrid.residual.count)
-    return np.concatenate((theta, weights))
-
-
-def flat(data: WindowSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return tuple(a.reshape(-1, a.shape[-1]) for a in (data.measured, data.actuator, data.wind))
-
-
-def away(data: WindowSeries) -> WindowSeries:
-    """The same windows, the azimuth turned once more: where no training second was, the same
-    thrust to the physics."""
-    return data._replace(actuator=data.actuator + np.array([2.0 * math.pi, 0.0]))
-
-
-# ---------------------------------------------------------------- what it adds
-
-
-def test_it_begins_as_pure_physics(hybrid, physics, theta, data):
-    """The output layer is zero, whatever the hidden one is."""
-    weights = first_weights(hybrid.residual, np.random.default_rng(0))
-    assert weights.size == hybrid.residual.count == WIDTH * 7 + WIDTH + 3 * WIDTH + 3
-    assert weights[: WIDTH * 8].all() and not weights[WIDTH * 8 :].any()
-    whole = np.concatenate((theta, weights))
-    assert len(hybrid.names) == len(whole) == len(set(hybrid.names))
-    assert hybrid.names[: len(theta)] == physics.names
-    assert hybrid.names[-1] == "network.c2_2"
-    assert Hybrid(MMG(physics.geometry, 4), hybrid.residual).substeps == 4
-    at = flat(data)
-    assert (hybrid.acceleration(whole, *at) == physics.acceleration(theta, *at)).all()
-
-
-def test_the_network_is_worked_by_hand(hybrid, loud, theta, data):
-    """b tanh(W₂ tanh(W₁ z + c₁) + c₂), weights in the order of the shapes."""
-    net, w = hybrid.residual, loud[len(theta) :]
-    w1, c1 = w[: WIDTH * 7].reshape(WIDTH, 7), w[WIDTH * 7 : WIDTH * 8]
-    w2, c2 = w[WIDTH * 8 : -3].reshape(3, WIDTH), w[-3:]
-    z = np.asarray(hybrid.features(*flat(data)))[17]
-    wanted = net.bound * np.tanh(w2 @ np.tanh(w1 @ z + c1) + c2)
-    assert np.asarray(hybrid.network(loud, z)) == pytest.approx(wanted, rel=1e-12)
-    assert hybrid.names[len(theta) + WIDTH * 7 + 1] == "network.c1_1"
-
-
-def test_it_is_added_to_the_physics(hybrid, physics, loud, theta, data):
-    at = flat(data)
-    whole, alone = hybrid.acceleration(loud, *at), physics.acceleration(theta, *at)
-    added = np.asarray(hybrid.added(loud, *at))
-    assert np.asarray(whole - alone) == pytest.approx(added, abs=1e-12)
-    net = hybrid.network(loud, hybrid.features(*at))
-    assert added == pytest.approx(np.asarray(net), abs=1e-12)  # 1 · among its own data
-    assert np.abs(added).max() > 1e-4
-
-
-@pytest.mark.parametrize("size", [1e3, 1e9])
-def test_the_largest_weights_stay_within_the_bound(hybrid, loud, theta, data, size):
-    """A standard deviation of the measured accelerations, each axis its own."""
-    velocity = data.measured[..., [1, 3, 5]]
-    std = ((velocity[:, 5:] - velocity[:, :-5]) / 5.0).reshape(-1, 3).std(0)
-    assert hybrid.residual.bound == pytest.approx(std)
-    for at in (flat(data), flat(away(data))):
-        huge = np.concatenate((theta, size * loud[len(theta) :]))
-        added = np.abs(np.asarray(hybrid.added(huge, *at)))
-        assert (added <= hybrid.residual.bound * (1 + 1e-12)).all()
-    near = np.abs(np.asarray(hybrid.added(huge, *flat(data))))
-    assert near.max(0) == pytest.approx(hybrid.residual.bound)  # and they reach it
-
-
-# ---------------------------------------------------------------- where it is silent
-
-
-def test_it_fades_from_the_training_data_to_nothing(hybrid, data):
-    net = hybrid.residual
-    assert np.asarray(hybrid.fade(net.anchors)) == pytest.approx(np.ones(len(net.anchors)))
-    inside = np.asarray(hybrid.fade(hybrid.features(*flat(data))))
-    assert inside == pytest.approx(np.ones_like(inside), abs=1e-12)
-    far = net.anchors + 100.0
-    assert np.asarray(hybrid.fade(far)).tolist() == [0.0] * len(far)
-
-
-def test_the_fade_falls_smoothly_over_two_limits(hybrid):
-    """1 to the radius, 0 from two limits beyond it; half way s = ½, s²(3 - 2s) = ½."""
-    net = hybrid.residual
-    outmost = net.anchors[np.argmax(net.anchors[:, 0])]  # ahead of it there is nothing
-    distance = np.linspace(0.0, net.radius + 3.0 * net.limit, 400)
-    along = np.asarray(hybrid.fade(outmost + np.outer(distance, np.eye(7)[0])))
-    assert (np.diff(along) <= 1e-12).all()
-    assert (along[distance < net.radius - 1e-6] == 1.0).all()
-    assert (along[distance > net.radius + 2.0 * net.limit + 1e-6] == 0.0).all()
-    for share, wanted in ((0.25, 0.84375), (0.5, 0.5), (0.75, 0.15625)):
-        beyond = net.radius + share * 2.0 * net.limit
-        at = outmost + beyond * np.eye(7)[0]
-        assert float(hybrid.fade(at)) == pytest.approx(wanted, rel=1e-9)
-
-
-def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, loud, theta, data):
-    far = away(data)
-    at = flat(far)
-    assert (hybrid.acceleration(loud, *at) == physics.acceleration(theta, *at)).all()
-    rolled = sensitivities.rollout(hybrid, loud, far)
-    assert rolled == pytest.approx(sensitivities.rollout(physics, theta, far), abs=1e-12)
-    near = sensitivities.rollout(hybrid, loud, data)
-    assert np.abs(near - sensitivities.rollout(physics, theta, data)).max() > 0.01
-
-
-# ---------------------------------------------------------------- what it sees
-
-
-def table(data: WindowSeries) -> pl.DataFrame:
-    """The samples as the 1 Hz table has them, the wind as it was felt on board."""
-    state, actuator, wind = flat(data)
-    felt = sensitivities.apparent_wind(state, wind)
-    names = ("x0", "surge", "y0", "sway", "heading", "yaw_rate")
-    columns = {name: state[:, i] for i, name in enumerate(names)}
-    columns |= {"azimuth": actuator[:, 0], "thruster": actuator[:, 1]}
-    columns |= {"wind_speed": felt[:, 0], "wind_angle": felt[:, 1]}
-    index = {"voyage": ["a"] * len(state), "elapsed": np.arange(float(len(state)))}
-    return pl.DataFrame(index | columns)
-
-
-def test_it_sees_what_coverage_measures(hybrid, ship, data):
-    """The same columns in the same order, standardised alike, the same limit of distance."""
-    observed = coverage.of(table(data), ship.actuator_names, has_wind=True)
-    net = hybrid.residual
-    assert observed.names == ("surge", "sway", "yaw_rate", "azimuth", "thruster",
-                          "wind_ahead", "wind_starboard")  # fmt: skip
-    assert net.mean == pytest.approx(observed.mean) and net.std == pytest.approx(observed.std)
-    assert np.asarray(hybrid.features(*flat(data))) == pytest.approx(observed.tree.data, abs=1e-9)
-    assert net.limit == pytest.approx(observed.limit)
-
-
-def test_without_wind_it_has_five_inputs(ship, data):
-    calm = MMG(geometry_of(ship, without=["wind"])[0])
-    net = hybrid_training.residual(calm, data, WIDTH)
-    assert len(net.mean) == net.anchors.shape[1] == 5
-    z = Hybrid(calm, net).features(*flat(data))
-    assert z.shape == (COUNT * SIZE, 5)
-    assert np.asarray(z).std(0) == pytest.approx(np.ones(5))
-
-
-def test_windows_of_no_weight_teach_it_nothing(physics, data):
-    wrong = data.measured.copy()
-    wrong[5:] = 99.0
-    weight = np.where(np.arange(COUNT) < 5, 1.0, 0.0)
-    some = hybrid_training.residual(physics, data._replace(measured=wrong, weight=weight), WIDTH)
-    alone = hybrid_training.residual(physics, sensitivities.pick(data, slice(0, 5)), WIDTH)
-    for name in ("mean", "std", "bound", "anchors", "radius", "limit"):
-        assert getattr(some, name) == pytest.approx(getattr(alone, name)), name
-
-
-def test_an_input_that_never_changes_does_not_divide_by_nothing(physics, data):
-    steady = data._replace(actuator=np.full_like(data.actuator, 0.5))
-    net = hybrid_training.residual(physics, steady, WIDTH)
-    assert net.std[3:5].tolist() == [1.0, 1.0]
-    assert np.isfinite(net.anchors).all()
-
-
-@pytest.mark.parametrize("most", [1, 10, 200])
-def test_anchors_are_samples_that_cover_all_of_them(most):
-    samples = np.random.default_rng(2).normal(size=(400, 3))
-    chosen, radius = anchored(samples, most)
-    assert chosen.shape == (most, 3)
-    apart = np.linalg.norm(samples[:, None] - chosen, axis=-1)
-    assert (apart.min(0) == 0.0).all()  # each is one of them
-    assert apart.min(1).max() == pytest.approx(radius)
-    between = np.linalg.norm(chosen[:, None] - chosen, axis=-1)[~np.eye(most, dtype=bool)]
-    assert most == 1 or between.min() >= radius - 1e-12  # what makes it twice the best at most
-
-
-def test_few_samples_are_all_of_them_anchors():
-    samples = np.array([[0.0], [1.0], [5.0], [1.0]])
-    chosen, radius = anchored(samples)
-    assert sorted(chosen.ravel().tolist()) == [0.0, 1.0, 5.0] and radius == 0.0
-    assert chosen[0, 0] == 1.0  # the nearest to the middle, 1.75
-
-
-# ---------------------------------------------------------------- forces
-
-
-@pytest.mark.parametrize("part", ["mmg", "hybrid"])
-def test_the_parts_of_the_force_move_the_ship(part, ship, physics, hybrid, theta, loud, data):
-    """Their sum is what the equations of motion, written out, need for the acceleration."""
-    model, numbers = {"mmg": (physics, theta), "hybrid": (hybrid, loud)}[part]
-    seconds = table(data)[::7]
-    simulator = Simulator(model, numbers, np.zeros((len(numbers),) * 2))
-    found = force_breakdown.along(simulator, seconds, ship)
-    assert found.columns == ["voyage", "time", "part", "surge", "sway", "yaw"]
-    named = ["hull", "thruster", "wind", *(["network"] if part == "hybrid" else []), "total"]
-    order = found["part"].unique(maintain_order=True).to_list()
-    assert sorted(order[:-1]) == sorted(named[:-1]) and order[-1] == "total"
-    by = {
-        name: found.filter(pl.col("part") == name).select("surge", "sway", "yaw").to_numpy()
-        for name in named
-    }
-    total = by.pop("total")
-    assert sum(by.values()) == pytest.approx(total, rel=1e-12, abs=1e-12)
-    assert found.filter(pl.col("part") == "hull")["time"].to_list() == seconds["elapsed"].to_list()
-
-    g, p = physics.geometry, dict(zip(physics.names, theta, strict=True))
-    unit = 0.5 * g.density * 16.0 * 0.3
-    m, x_g = 700.0, 0.1
-    m_x, m_y, yaw = p["body.m_x"] * unit, p["body.m_y"] * unit, p["body.i_j"] * unit * 16.0
-    state, actuator, wind = (a[::7] for a in flat(data))
-    moved = np.asarray(model.acceleration(jnp.array(numbers), state, actuator, wind))
-    (du, dv, dr), (u, v, r) = moved.T, state[:, [1, 3, 5]].T
-    x = (m + m_x) * du - (m + m_y) * v * r - x_g * m * r**2
-    y = (m + m_y) * dv + (m + m_x) * u * r + x_g * m * dr
-    n = (yaw + x_g**2 * m) * dr + x_g * m * (dv + u * r)
-    assert total == pytest.approx(np.stack((x, y, n), -1), rel=1e-9, abs=1e-9)
-    if part == "hybrid":
-        du, dv, dr = np.asarray(hybrid.added(loud, state, actuator, wind)).T
-        extra = ((m + m_x) * du, (m + m_y) * dv + x_g * m * dr,
-                 x_g * m * dv + (yaw + x_g**2 * m) * dr)  # fmt: skip
-        assert by["network"] == pytest.approx(np.stack(extra, -1), rel=1e-9, abs=1e-9)
-        assert np.abs(by["network"]).max() > 0.1
-
-
-def test_the_forces_of_a_ship_without_wind_sensor_are_those_of_a_calm(data):
-    text = SHIP.replace('[sensors.wind]\ntopic = "/w"\nfields = ["speed", "angle"]\n', "")
-    ship = profiles.parse(text, "calm.toml")
-    g, main, _ = geometry_of(ship)
-    numbers = estimated(g, main).values
-    seconds = table(data).drop("wind_speed", "wind_angle")[:9]
-    found = force_breakdown.along(Simulator(MMG(g), numbers, np.zeros((2, 2))), seconds, ship)
-    assert found["part"].unique(maintain_order=True).to_list() == ["hull", "thruster", "total"]
-    assert found.height == 3 * 9
-
-
-# ---------------------------------------------------------------- the fit
+def data() -> WindowSeries:
+    return sailed()
 
 
 @pytest.fixture(scope="module")
@@ -398,9 +97,36 @@ def test_less_strength_says_less(taught, physics, known, pulled):
     assert done.loss[1] > strong.loss[1]
 
 
-def test_the_spread_of_a_weight_is_its_layers(hybrid):
-    spread = weight_spread(hybrid.residual, 0.3)
-    assert spread[: WIDTH * 7] == pytest.approx(np.full(WIDTH * 7, 1 / math.sqrt(7)))
-    assert spread[WIDTH * 7 : WIDTH * 8].tolist() == [1.0] * WIDTH
-    assert spread[WIDTH * 8 : -3] == pytest.approx(np.full(3 * WIDTH, 0.3 / math.sqrt(WIDTH)))
-    assert spread[-3:].tolist() == [0.3] * 3
+def judged(**gain: float) -> dict[float, np.ndarray]:
+    """Made-up losses of 50 windows: s03=10 is a mean 10 below the physics, ± 20 a window."""
+    rng = np.random.default_rng(6)
+    physics = rng.gamma(2.0, 50.0, 50) + 200.0
+    table = {"s0": 0.0, "s01": 0.1, "s03": 0.3, "s1": 1.0}
+    losses = {0.0: physics}
+    for name, less in gain.items():
+        noise = rng.normal(size=50)
+        losses[table[name]] = physics - less + 20.0 * (noise - noise.mean())
+    return losses
+
+
+@pytest.mark.parametrize(
+    ("gain", "wanted"),
+    [
+        (dict(s01=0.5, s03=1.0, s1=0.2), 0.0),  # a gain of 1 ± 20/√50 = 2.8 is chance
+        (dict(s01=5.0, s03=60.0, s1=20.0), 0.3),
+        (dict(s01=59.0, s03=60.0, s1=20.0), 0.1),  # as good as the best, and less of it
+        (dict(s01=45.0, s03=60.0, s1=20.0), 0.3),  # 15 ± 28/√50 = 4 is no chance
+        (dict(s01=20.0, s03=59.0, s1=60.0), 0.3),
+        (dict(s01=10.0, s03=20.0, s1=60.0), 1.0),
+        (dict(s01=-50.0, s03=-60.0, s1=-70.0), 0.0),
+    ],
+)
+def test_the_least_strength_within_one_standard_error_is_chosen(gain, wanted):
+    assert hybrid_training.choose(judged(**gain)) == wanted
+
+
+def test_windows_are_compared_in_pairs():
+    """Windows differ by hundreds; a network that takes 5 from every one of them is no chance."""
+    physics = np.linspace(100.0, 900.0, 40)
+    better = physics - 5.0 + 0.1 * np.cos(np.arange(40.0))
+    assert hybrid_training.choose({0.0: physics, 0.1: better}) == 0.1

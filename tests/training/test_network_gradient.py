@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from small_networks import by_autograd, network, windows
 
 from shiplog import channels
-from shiplog.models.feedforward import FeedForward, Scaling, Shape, driven_by, exogenous, scaling
+from shiplog.models.feedforward import FeedForward, Scaling, driven_by, exogenous, scaling
+from shiplog.models.network_shape import Shape
 from shiplog.training import kernel, network_gradient
 from shiplog.voyages.windows import Windows
 

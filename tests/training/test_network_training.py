@@ -6,7 +6,7 @@ import pytest
 import torch
 from small_networks import by_autograd, network, windows
 
-from shiplog.models.feedforward import Shape
+from shiplog.models.network_shape import Shape
 from shiplog.training import network_gradient, random_streams
 from shiplog.training.network_training import fast, paper, shortened
 from shiplog.training.run_config import Config, Fast, Paper

@@ -44,14 +44,14 @@ def test_a_voyage_that_says_nothing_is_not_listened_to():
 
 
 def test_a_voyage_that_misleads_is_held_back():
-    """The screw of the training voyage pushes half more than the unseen one's, which the start
+    """The screw of the training voyage has half more thrust than the unseen one's, which the start
     has right."""
     other = np.array([1.5, 1.0, 1.0]) * START
     data = noisy(measured(Straight(), other, driven(2, seed=1)), seed=2, sigma=0.5)
     unseen = measured(Straight(), START, driven(2, seed=3))
     found, losses = judged(data, unseen, np.full(3, 0.001))
-    pushes = [one.values[0] for one in found.values()]
-    assert START[0] < pushes[0] and (np.diff(pushes) > 0).all() and pushes[-1] < 1.5 * START[0]
+    thrusts = [one.values[0] for one in found.values()]
+    assert START[0] < thrusts[0] and (np.diff(thrusts) > 0).all() and thrusts[-1] < 1.5 * START[0]
     slope = np.concatenate((np.zeros((8, 1)), np.cumsum(unseen.actuator[:, :-1, 0], 1)), 1)
     ahead = ((found[4.0].values[0] - START[0]) * slope * 100.0) ** 2
     assert losses[4.0].mean() > np.trapezoid(ahead, axis=1).mean() > 0.0

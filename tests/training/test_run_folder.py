@@ -8,8 +8,8 @@ from small_networks import network, windows
 
 from shiplog import files
 from shiplog.exceptions import RunError
-from shiplog.models.feedforward import Shape
-from shiplog.training import load_model, network_gradient, run_folder, seed_files
+from shiplog.models.network_shape import Shape
+from shiplog.training import load_model, network_files, network_gradient, run_folder
 from shiplog.training.network_training import paper
 from shiplog.training.run_config import Config, NetworkSettings, Paper
 from shiplog.voyages.split_settings import Split
@@ -35,7 +35,7 @@ def test_a_run_comes_back_as_it_was(begun):
     run, model, batches = begun
     progress = paper(model, *batches, Paper(most_epochs=3), seed=0)
     for seed in CONFIG.seeds:
-        seed_files.save_network(run.seed(seed), progress)
+        network_files.save(run.seed(seed), progress)
     done = run.finish({"shiplog": "test"})
     opened = load_model.load(done.path)
     assert opened.config == CONFIG
@@ -54,21 +54,23 @@ def test_a_checkpoint_on_disk_resumes_bit_by_bit(begun):
     settings = Paper(most_epochs=9)
     whole = paper(model, *batches, settings, seed=0)
     paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
-                checkpoint=lambda p: seed_files.save_checkpoint(run.seed(0), p))  # fmt: skip
+                checkpoint=lambda p: network_files.save_checkpoint(run.seed(0), p))  # fmt: skip
     resumed = paper(
-        model, *batches, settings, seed=0, resume=seed_files.load_checkpoint(run.seed(0))
+        model, *batches, settings, seed=0, resume=network_files.load_checkpoint(run.seed(0))
     )
     assert resumed.history[1:] == whole.history[1:]
     assert all(torch.equal(a, b) for a, b in zip(resumed.weights, whole.weights, strict=True))
-    seed_files.save_network(run.seed(0), resumed)
+    network_files.save(run.seed(0), resumed)
     assert (
-        seed_files.load_checkpoint(run.seed(0)) is None and run.finished(0) and not run.finished(1)
+        network_files.load_checkpoint(run.seed(0)) is None
+        and run.finished(0)
+        and not run.finished(1)
     )
 
 
 def test_the_same_command_goes_on_and_another_is_refused(begun):
     run, model, batches = begun
-    seed_files.save_network(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
+    network_files.save(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
     out = run.path.with_name("run")
     again = run_folder.create(out, CONFIG, PROFILE, model.scaling, ROWS, ROWS, ROWS)
     assert again.finished(0)
@@ -96,7 +98,7 @@ def test_an_unfinished_a_missing_and_a_taken_run_say_what_to_do(begun, tmp_path)
 def test_a_begun_run_that_cannot_be_read_is_begun_anew(begun, caplog, raw):
     """As a power cut or a full disk may leave it."""
     run, model, batches = begun
-    seed_files.save_network(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
+    network_files.save(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
     file = run.path / ("windows.parquet" if raw is None else "config.toml")
     spoilt = run.path / ("training.parquet" if raw is None else "config.toml")
     spoilt.write_bytes(b"x" if raw is None else raw)
@@ -159,19 +161,19 @@ def test_a_resumed_run_holds_no_leavings_of_the_killed_one(begun):
 def test_a_torn_checkpoint_begins_its_seed_anew(begun, caplog):
     run, model, batches = begun
     paper(model, *batches, Paper(most_epochs=4), seed=0, every=4,
-          checkpoint=lambda p: seed_files.save_checkpoint(run.seed(0), p))  # fmt: skip
+          checkpoint=lambda p: network_files.save_checkpoint(run.seed(0), p))  # fmt: skip
     path = run.seed(0) / "checkpoint.safetensors"
     for raw in (b"", path.read_bytes()[:200], path.read_bytes().replace(b"history", b"mystery")):
         path.write_bytes(raw)
         caplog.clear()
-        assert seed_files.load_checkpoint(run.seed(0)) is None
+        assert network_files.load_checkpoint(run.seed(0)) is None
         (message,) = caplog.messages
         assert message.startswith(f"{path} cannot be read, its training begins anew: ")
 
 
 def test_a_torn_weight_file_is_named(begun):
     run, model, batches = begun
-    seed_files.save_network(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
+    network_files.save(run.seed(0), paper(model, *batches, Paper(most_epochs=1), seed=0))
     path = run.path / "seed0" / "model.safetensors"
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RunError, match=r"model\.safetensors cannot be read"):

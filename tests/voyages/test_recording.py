@@ -1,4 +1,4 @@
-"""Voyages as the diagnosis reads them: stretches, what was seen, later values, sights."""
+"""Voyages as the diagnosis reads them: stretches, what was measured, later values, sights."""
 
 import math
 from dataclasses import replace

@@ -35,12 +35,12 @@ def logged(tmp_path_factory):
         voyage = sail(seconds, seed=seed, wind=Wind(2.0, 1.0), effects=Effects(**effects))
         path = folder / f"{next(number)}.mcap"
         write_voyage(path, voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
-        return said(ingest(path, VECTWIN).report)
+        return reported(ingest(path, VECTWIN).report)
 
     return build
 
 
-def said(report):
+def reported(report):
     return {(f.kind, f.channel): f for f in report.findings if f.kind in KINDS}
 
 
@@ -61,23 +61,23 @@ def in_body_axes(seed, late=None, heading_offset=0.0, antenna=(0.0, 0.0), speed_
     voyage = sail(seconds, seed=seed, wind=Wind(2.0, 1.0))
     rng, t, late = np.random.default_rng([seed, 7]), voyage.time, late or {}
 
-    def seen(name, channel, sigma):
+    def measured(name, channel, sigma):
         delay = late.get(channel, 0.0) + late.get("gnss", 0.0) * (
             channel in ("position", "velocity")
         )
         true = np.interp(t - delay, t, getattr(voyage, name))
         return true + sigma * rng.standard_normal(len(t))
 
-    turned = seen("heading", "position", 0.0)
+    turned = measured("heading", "position", 0.0)
     c, s = np.cos(turned), np.sin(turned)
     return pl.DataFrame({
         "time": t,
-        "x0": seen("x0", "position", 0.015) + c * antenna[0] - s * antenna[1],
-        "y0": seen("y0", "position", 0.015) + s * antenna[0] + c * antenna[1],
-        "heading": seen("heading", "heading", 0.1 * DEGREE) + heading_offset * DEGREE,
-        "surge": (1.0 + speed_scale) * seen("surge", "velocity", 0.01),
-        "sway": (1.0 + speed_scale) * seen("sway", "velocity", 0.01),
-        "yaw_rate": seen("yaw_rate", "yaw_rate", 0.1 * DEGREE),
+        "x0": measured("x0", "position", 0.015) + c * antenna[0] - s * antenna[1],
+        "y0": measured("y0", "position", 0.015) + s * antenna[0] + c * antenna[1],
+        "heading": measured("heading", "heading", 0.1 * DEGREE) + heading_offset * DEGREE,
+        "surge": (1.0 + speed_scale) * measured("surge", "velocity", 0.01),
+        "sway": (1.0 + speed_scale) * measured("sway", "velocity", 0.01),
+        "yaw_rate": measured("yaw_rate", "yaw_rate", 0.1 * DEGREE),
         "quality": np.zeros(len(t), np.int32),
     })  # fmt: skip
 
@@ -91,7 +91,7 @@ def found(table):
 
 @pytest.mark.parametrize("number", range(1, 7))
 def test_a_clean_sample_log_has_nothing_to_say(number):
-    assert said(ingest(SAMPLES / f"voyage_{number}.mcap", VECTWIN).report) == {}
+    assert reported(ingest(SAMPLES / f"voyage_{number}.mcap", VECTWIN).report) == {}
 
 
 @pytest.mark.parametrize("seed", [31, 32, 33])
@@ -257,7 +257,9 @@ def test_a_ship_that_hardly_turns_shows_no_scale_and_no_delay():
 
 def test_a_steady_circle_tells_no_bias_from_a_scale(tmp_path):
     def ingested(parts):
-        return said(ingest(sailing.write(tmp_path / "turn.mcap", parts), sailing.profile()).report)
+        return reported(
+            ingest(sailing.write(tmp_path / "turn.mcap", parts), sailing.profile()).report
+        )
 
     parts = sailing.series(400.0)
     assert ingested(parts) == {}

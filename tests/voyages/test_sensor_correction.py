@@ -160,7 +160,7 @@ def test_ingest_corrects_on_demand_says_so_and_takes_it_back(log, tmp_path):
     assert facts["corrected"] == []
     assert not any("Corrected" in f["sentence"] for f in output.values())
 
-    said_then, facts_then, table_then = taken("--correct")
+    findings_then, facts_then, table_then = taken("--correct")
     assert facts_then["fingerprint"] != facts["fingerprint"]
     done = {(c["kind"], c["channel"]): c for c in facts_then["corrected"]}
     assert set(done) == {("clock_offset", "yaw_rate"), ("yaw_rate_bias", "yaw_rate")}
@@ -169,10 +169,10 @@ def test_ingest_corrects_on_demand_says_so_and_takes_it_back(log, tmp_path):
     }  # fmt: skip
     assert done["clock_offset", "yaw_rate"]["value"] == pytest.approx(0.6, abs=0.1)
     assert done["yaw_rate_bias", "yaw_rate"]["value"] == pytest.approx(0.2, abs=0.02)
-    assert {key for key, f in said_then.items() if f["sentence"].endswith(" Corrected.")} == set(
-        done
-    )
-    assert set(said_then) == set(output) == {*done, ("clock_offset", "velocity")}
+    assert {
+        key for key, f in findings_then.items() if f["sentence"].endswith(" Corrected.")
+    } == set(done)
+    assert set(findings_then) == set(output) == {*done, ("clock_offset", "velocity")}
     assert table_then["time"].equals(table["time"])
     assert left(table_then, VECTWIN) == {("clock_offset", "velocity")}
 

@@ -7,7 +7,7 @@ from pipelines.train_networks import train_run
 from shiplog.exceptions import StoreError
 from shiplog.training.run_config import Config
 from shiplog.voyages.parts import overlap, parse
-from shiplog.voyages.split import choose_split
+from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
@@ -126,3 +126,44 @@ def test_a_name_that_looks_like_a_part_is_itself_where_it_is_stored(tmp_path):
     assert hashes["trip[0:60]"] == hashes["trip"] is not None
     with pytest.raises(StoreError):
         store.select(["other[0:60]"])
+
+
+# --- of a physical model: no voyage is needed to stop its training
+
+SIX = [f"voyage_{i}" for i in range(1, 7)]
+
+
+@pytest.fixture(scope="module")
+def seven(tmp_path_factory):
+    """The names of the sample logs, and one voyage more."""
+    return sailing.store_of(tmp_path_factory.mktemp("seven"), [*SIX, "voyage_7"], seconds=30.0)
+
+
+def test_named_voyages_are_all_trained_on(seven):
+    for named in (SIX, ["voyage_7", "voyage_2"], ["voyage_[1-6]"]):
+        split = choose_physical_split(seven, named, (), "ref", 20)
+        assert set(split.training) == set(seven.select(named))
+        assert (split.validation, split.test) == ((), ())
+        assert "held out in turn" in split.chosen_by
+
+
+@pytest.mark.parametrize(("data", "count"), [("ref", 2), ("d-ref", 4)])
+def test_the_sample_logs_keep_the_papers_split(seven, data, count):
+    split = choose_physical_split(seven, (), (), data, 20)
+    assert split.training == tuple(SIX[:count])
+    assert (split.validation, split.test) == (("voyage_5",), ("voyage_6",))
+
+
+def test_the_users_validation_is_kept_apart(seven):
+    split = choose_physical_split(seven, ("voyage_[1-3]",), ("voyage_3", "voyage_7"), "ref", 20)
+    assert split.training == ("voyage_1", "voyage_2")
+    assert split.validation == ("voyage_3", "voyage_7") and split.test == ()
+    rest = choose_physical_split(seven, (), ("voyage_7",), "ref", 20)
+    assert rest.training == tuple(SIX) and rest.validation == ("voyage_7",)
+
+
+def test_with_nothing_named_a_share_is_left_for_testing(tmp_path):
+    store = sailing.store_of(tmp_path, [f"trip_{i}" for i in (1, 2, 3)], seconds=80.0)
+    split = choose_physical_split(store, (), (), "ref", 25)
+    assert split.validation == () and len(split.test) == 1
+    assert sorted((*split.training, *split.test)) == ["trip_1", "trip_2", "trip_3"]

@@ -11,7 +11,7 @@ from shiplog.diagnosis import segments, trial_voyages
 from shiplog.voyages import timescale
 from shiplog.voyages.timescale import NODE_ROWS, Timescale
 
-SEEN = closed.record(profiles.load("esso-osaka"))  # 120 s
+RECORD = closed.record(profiles.load("esso-osaka"))  # 120 s
 
 
 @pytest.mark.parametrize("speed", [0.31, 0.4, 0.5, 0.59])
@@ -41,7 +41,7 @@ def test_every_scale_fits_the_rows(time):
     """Bins and knots lie on nodes, of records at 10 Hz; 15 bins, 16 knots; four ship times, within
     a factor of two where it is not at a bound."""
     found = timescale.of_ship(time, 1.0)
-    g = segments.grid(replace(SEEN, timescale=found))
+    g = segments.grid(replace(RECORD, timescale=found))
     assert (g.bins, g.knots) == (15, 16)
     assert g.rows == round(found.seconds / 0.1) == 15 * round(found.bin / 0.1)
     assert (g.nodes - 1) % 15 == 0 and g.rows % g.every == 0 and g.every % NODE_ROWS == 0
@@ -51,7 +51,7 @@ def test_every_scale_fits_the_rows(time):
 
 
 def test_the_grid_that_nobody_scales_is_todays():
-    g = segments.grid(SEEN)
+    g = segments.grid(RECORD)
     assert (g.seconds, g.bin, g.knot, g.nodes, g.bins, g.knots) == (30.0, 2.0, 2.0, 151, 15, 16)
 
 
@@ -90,7 +90,7 @@ def test_what_drives_a_node_is_the_mean_of_the_rows_about_it():
 @pytest.mark.parametrize("empty", ["trial", "nominal campaign"])
 def test_without_a_row_there_is_no_speed_to_scale_by(empty):
     """The campaigns stay as they are; that they are too short for a verdict is reported later."""
-    none = replace(SEEN, state=SEEN.state[:0], voyage=SEEN.voyage[:0], time=SEEN.time[:0])
-    nominal, recorded = (SEEN, none) if empty == "trial" else (none, SEEN)
+    none = replace(RECORD, state=RECORD.state[:0], voyage=RECORD.voyage[:0], time=RECORD.time[:0])
+    nominal, recorded = (RECORD, none) if empty == "trial" else (none, RECORD)
     given = trial_voyages.in_ship_time(None, nominal, recorded)
     assert given[0] is nominal and given[1] is recorded

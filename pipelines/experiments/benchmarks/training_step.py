@@ -28,7 +28,8 @@ import numpy as np  # noqa: E402 (after the environment is set, as all below)
 import torch  # noqa: E402
 
 from pipelines.experiments.benchmarks.machine import processor  # noqa: E402
-from shiplog.models.feedforward import Scaling, Shape  # noqa: E402
+from shiplog.models.feedforward import Scaling  # noqa: E402
+from shiplog.models.network_shape import Shape  # noqa: E402
 from shiplog.training import kernel, network_gradient  # noqa: E402
 from shiplog.training.network_gradient import Batch  # noqa: E402
 from shiplog.training.queue import cores  # noqa: E402

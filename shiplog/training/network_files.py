@@ -1,8 +1,8 @@
-"""One seed of a run as its folder keeps it: weights, coefficients, checkpoints.
+"""A network as its run folder keeps it: scaling, weights, checkpoints. Torch is needed for these.
 
-<seed>/model.safetensors  training.parquet    a network: weights; epoch, losses; never redone
+scaling.safetensors                           mean and std of inputs and accelerations
+<seed>/model.safetensors  training.parquet    weights; epoch, losses; never redone
 <seed>/checkpoint.safetensors                 while the paper's recipe trains it
-<seed>/model.safetensors  parameters.toml  identified.parquet    a physical model
 """
 
 from __future__ import annotations
@@ -11,24 +11,39 @@ import logging
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
 
 from shiplog import files
 from shiplog.exceptions import UnreadableError
-from shiplog.models.feedforward import FeedForward
-from shiplog.simulation.sensitivities import Simulator
+from shiplog.models.feedforward import FeedForward, Scaling
 from shiplog.training import run_files
 from shiplog.training.network_training import HISTORY, Progress
 
 log = logging.getLogger(__name__)
 
 
-def save_network(folder: Path, progress: Progress) -> None:
+def save_scaling(folder: Path, scaling: Scaling) -> None:
+    tensors = {name: getattr(scaling, name).contiguous() for name in Scaling.__slots__}
+    _save(folder / "scaling.safetensors", tensors)
+
+
+def scaling(folder: Path) -> Scaling:
+    """Raises UnreadableError."""
+    path = folder / "scaling.safetensors"
+    tensors = _tensors(path)
+    try:
+        return Scaling(*(tensors[name] for name in Scaling.__slots__))
+    except KeyError as error:
+        raise run_files.unreadable(path, f"it lacks {error}") from error
+
+
+def save(folder: Path, progress: Progress) -> None:
     """The best weights and the history; the checkpoint has served its purpose."""
     folder.mkdir(exist_ok=True)
-    run_files.save_tensors(folder / "model.safetensors", _named(progress.best_weights))
+    _save(folder / "model.safetensors", _named(progress.best_weights))
     history = pl.DataFrame(progress.history, schema=list(HISTORY), orient="row")
     files.write_frame(folder / "training.parquet", history)  # last: `finished` looks for it
     (folder / "checkpoint.safetensors").unlink(missing_ok=True)
@@ -37,7 +52,7 @@ def save_network(folder: Path, progress: Progress) -> None:
 def fill(model: FeedForward, folder: Path) -> FeedForward:
     """The network with the weights of a seed, in float64. Raises RunError."""
     path = folder / "model.safetensors"
-    tensors = run_files.tensors(path)
+    tensors = _tensors(path)
     try:
         with torch.no_grad():
             for name, parameter in zip(_named(model.weights), model.weights, strict=True):
@@ -62,7 +77,7 @@ def save_checkpoint(folder: Path, progress: Progress) -> None:
     }
     if progress.stream is not None:
         tensors["stream"] = progress.stream
-    run_files.save_tensors(folder / "checkpoint.safetensors", tensors)
+    _save(folder / "checkpoint.safetensors", tensors)
 
 
 def load_checkpoint(folder: Path) -> Progress | None:
@@ -71,7 +86,7 @@ def load_checkpoint(folder: Path) -> Progress | None:
     if not path.is_file():
         return None
     try:
-        return _progress(run_files.tensors(path))
+        return _progress(_tensors(path))
     except (UnreadableError, KeyError, IndexError, ValueError) as error:
         log.warning("%s cannot be read, its training begins anew: %s", path, error)
         return None
@@ -102,21 +117,14 @@ def _named(weights: list[torch.Tensor]) -> dict[str, torch.Tensor]:
     }
 
 
-def save_physics(
-    folder: Path,
-    simulator: Simulator,
-    fixed: Mapping[str, np.ndarray],
-    parameters: str,
-    identified: pl.DataFrame,
-) -> None:
-    """A physical model.
+def _tensors(path: Path) -> dict[str, torch.Tensor]:
+    """Raises UnreadableError."""
+    try:
+        return load_file(path)
+    except (OSError, SafetensorError) as error:
+        raise run_files.unreadable(path, error) from error
 
-    fixed       arrays that are no coefficients (the hybrid's scaling and anchors)
-    parameters  TOML that --parameters takes
-    identified  a row a coefficient: name, value, standard error, start, spread
-    """
-    folder.mkdir(exist_ok=True)
-    arrays = {"theta": simulator.theta, "covariance": simulator.covariance, **fixed}
-    run_files.save_arrays(folder / "model.safetensors", arrays)
-    files.write_text(folder / "parameters.toml", parameters)
-    files.write_frame(folder / "identified.parquet", identified)
+
+def _save(path: Path, values: dict[str, torch.Tensor]) -> None:
+    with files.whole(path) as partial:
+        save_file(values, partial)

@@ -1,0 +1,150 @@
+"""Paths that measurements pull: onto known accelerations, and where they are expected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_ship import GRID, RECORD, ROWS, SETTING, THETA, WIDE, Coasting, Toy, path
+
+from shiplog.diagnosis import linearisation, measurement_correction, segments
+from shiplog.diagnosis.linear_segments import Path
+from shiplog.diagnosis.segments import Cut
+from shiplog.voyages.timescale import KNOT, Timescale
+
+
+def simulated(at: Path, theta: np.ndarray = THETA) -> Cut:
+    """Segments whose measurements are the toy's own."""
+    cut = segments.cut(RECORD, ROWS)
+    y, _ = linearisation.simulated(Toy(), theta, cut, at, GRID)
+    return replace(cut, y=y)
+
+
+def test_nothing_is_left_of_what_the_model_made():
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(at)
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    found = linearisation.linear(Toy(), THETA, cut, GRID, at, *none)
+    assert np.array_equal(found.e, np.zeros_like(found.e))
+    assert found.j.shape[-1] == 4
+    picked = found.pick(np.array([False, True, True, False]))
+    assert np.array_equal(picked.z, found.z[1:3]) and len(picked.cut) == 2
+
+
+def test_slopes_of_a_smooth_model_go_straight_between_seconds():
+    """One in a second serves the toy, whose rudder goes slowly: what it bends by is within 1 % of
+    what every node's slopes say, and what is constant stays exact."""
+    at = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(at)
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    exact, found = (
+        linearisation.linear(Toy(smooth=smooth), THETA, cut, GRID, at, *none)
+        for smooth in (0.0, 1.0)
+    )
+    assert np.array_equal(found.e, exact.e)
+    for one, other in ((found.z, exact.z), (found.j, exact.j)):
+        size = np.abs(other).max((0, 1, 3), keepdims=True)
+        assert 0.0 < np.abs((one - other) / size).max() < 0.01
+    k = np.array([0.3])
+    same = [
+        linearisation.linear(Coasting(smooth=smooth), k, cut, GRID, at, *none).z
+        for smooth in (0.0, 1.0)
+    ]
+    assert same[0] == pytest.approx(same[1], abs=1e-12)
+
+
+def test_a_path_is_pulled_onto_a_known_acceleration():
+    """Smooth accelerations of 0.02 m/s²: the path goes where they went, and finds them."""
+    t = KNOT * np.arange(GRID.knots)
+    acceleration = np.stack(
+        (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
+    )
+    true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
+    cut = simulated(true)
+    found = linearisation.pulled(Toy(), THETA, cut, GRID, replace(WIDE, noise=0.01 * WIDE.noise))
+    y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
+    assert y == pytest.approx(cut.y, abs=1e-4)
+    assert found.start == pytest.approx(true.start, abs=2e-3)
+    # within, where bins on both sides see a knot
+    assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
+
+
+def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
+    """Held to what is expected, it is the true path at once; held to none, it has no acceleration
+    and is off. The same where a linearisation says where it will be."""
+    t = KNOT * np.arange(GRID.knots)
+    acceleration = np.stack(
+        (0.02 * np.sin(0.2 * t), 0.015 * np.cos(0.25 * t), 0.004 * np.sin(0.3 * t))
+    )
+    true = Path(RECORD.state[ROWS], np.tile(acceleration, (4, 1, 1)))
+    cut = simulated(true)
+    about = true.acceleration.reshape(4, -1)
+    firm = replace(WIDE, acceleration=1e-6 * WIDE.acceleration)
+    found = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3, about=about)
+    assert found.acceleration == pytest.approx(true.acceleration, abs=1e-5)
+    assert linearisation.simulated(Toy(), THETA, cut, found, GRID)[0] == pytest.approx(
+        cut.y, abs=1e-3
+    )
+    without = linearisation.pulled(Toy(), THETA, cut, GRID, firm, rounds=3)
+    assert without.acceleration == pytest.approx(0.0, abs=1e-5)
+    off = linearisation.simulated(Toy(), THETA, cut, without, GRID)[0] - cut.y
+    assert np.abs(off).max() > 0.02
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    linear = linearisation.linear(Toy(), THETA, cut, GRID, without, *none)
+    ahead = linearisation.ahead(linear, np.zeros(4), firm, about)
+    assert ahead.acceleration == pytest.approx(true.acceleration, abs=1e-5)
+
+
+def test_a_path_is_pulled_on_a_longer_grid_too():
+    """Segments of 60 s with nodes of 4 s: accelerations found from the record on."""
+    viewed = replace(RECORD, timescale=Timescale(60.0, 4.0, 4.0))
+    g, rows = segments.grid(viewed), segments.begins(viewed)
+    t = g.knot * np.arange(g.knots)
+    acceleration = np.stack(
+        (0.02 * np.sin(0.1 * t), 0.015 * np.cos(0.12 * t), 0.002 * np.sin(0.15 * t))
+    )
+    true = Path(RECORD.state[rows], np.tile(acceleration, (2, 1, 1)))
+    cut, moved, observed = measurement_correction.read(Toy(), SETTING, viewed, rows)
+    assert cut.y.shape == observed.shape[:3] == (2, 15, 6) and moved.shape[1] == 151
+    y, _ = linearisation.simulated(Toy(), THETA, cut, true, g)
+    cut = replace(cut, y=y)
+    tight = replace(WIDE, noise=0.01 * WIDE.noise)
+    found = linearisation.pulled(Toy(), THETA, cut, g, tight, rounds=3)
+    assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
+    assert not linearisation.linear(Toy(), THETA, cut, g, found, moved, observed, WIDE).lost.any()
+
+
+def test_what_was_not_used_does_not_pull():
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    used = cut.used.copy()
+    used[:, 6:8] = False
+    wrong = np.where(used, cut.y, 1e3)
+    bad = replace(cut, y=wrong, used=used)
+    found = linearisation.pulled(Toy(), THETA, bad, GRID, WIDE, true)
+    y, _ = linearisation.simulated(Toy(), THETA, bad, found, GRID)
+    assert y == pytest.approx(cut.y, abs=1e-6)
+
+
+def test_a_linearisation_expects_where_its_path_will_be_pulled():
+    """There is no acceleration but the rudder's, a tenth less than the model's: pulled, the path
+    has one that makes up for it. Once the model has it right there is none, and what is expected
+    before that is linearised there is off by what is not linear: a tenth of the tenth."""
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    wrong, tight = THETA * np.array([1.0, 1.1, 1.0, 1.0]), replace(WIDE, noise=0.01 * WIDE.noise)
+    stood = linearisation.pulled(Toy(), wrong, cut, GRID, tight)
+    size = np.abs(stood.acceleration[:, 2]).max()
+    assert size > 1e-4
+    nothing = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    linear = linearisation.linear(Toy(), wrong, cut, GRID, stood, *nothing)
+    found = linearisation.ahead(linear, THETA - wrong, tight)
+    assert np.abs(found.acceleration[:, 2]).max() < 0.1 * size
+    assert found.start == pytest.approx(true.start, abs=1e-3)
+    stays = linearisation.ahead(linear, np.zeros(4), tight)
+    assert stays.acceleration == pytest.approx(stood.acceleration, abs=0.1 * size)
+    firm = linearisation.ahead(
+        linear, np.zeros(4), replace(tight, acceleration=1e-6 * WIDE.acceleration)
+    )
+    assert (
+        np.abs(firm.acceleration[:, 2]).max() < 0.1 * size
+    )  # held about none, not about where it stood

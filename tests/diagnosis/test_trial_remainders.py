@@ -1,0 +1,170 @@
+"""Families of change and levels of process noise, against dense Gaussians."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import straight
+from dense_trial import SHARE, gaussian, level, nats, of_noise
+from scipy.stats import multivariate_normal, norm
+from straight import CAUSES, PROCESS_NOISE
+
+from shiplog.diagnosis import evidence, fits, remainder
+from shiplog.diagnosis.discrepancy import EVEN
+from shiplog.diagnosis.fitted import Fit
+from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
+
+# --- changes
+
+
+@pytest.mark.parametrize("family", ("motion", "position", "heading", "time"))
+@pytest.mark.parametrize("included", ((), ("drag",)))
+def test_the_factor_of_a_change_is_the_difference_of_two_evidences(trial, family, included):
+    point = trial.at({})
+    base = level(trial, point, 1.4, included)
+    gained, size = fits.changed(trial, point, base, included, family, Remainder())
+    each = [level(trial, point, 1.4, included, family, s).value for s in remainder.CHANGE_SIZES]
+    assert gained == pytest.approx(max(each) - base.value, abs=1e-6)
+    assert size == remainder.CHANGE_SIZES[int(np.argmax(each))]
+    with_it = nats(trial, point, 1.4, included, (family,), size)
+    assert gained == pytest.approx(with_it - nats(trial, point, 1.4, included), abs=1e-3)
+
+
+def test_a_change_that_is_there_is_found_at_its_size(made):
+    """In the trial alone, an acceleration by place, three times the process noise."""
+    nominal, record, _ = made
+    plain = straight.trial(*made)
+    family = next(f for f in plain.unseen.families if f.name == "position")
+    rng = np.random.default_rng(5)
+    weights = np.zeros(plain.unseen.count)
+    first = plain.unseen.families[0].columns[0]
+    weights[family.columns - first] = 9.0 * rng.standard_normal(len(family.columns))
+    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    columns = straight.columns_of(CAUSES)
+    given = straight.passed(record, columns, seed=2, sensitivity=0.3, accelerations=accelerations)
+    trial = straight.trial(nominal, record, given)
+    point = trial.at({})
+    base = level(trial, point, 1.0)
+    gained = {
+        name: fits.changed(trial, point, base, (), name, Remainder()) for name in trial.families
+    }
+    best = max(gained, key=lambda name: gained[name][0])
+    assert best == "position"
+    assert gained[best][0] > 50.0
+    assert gained[best][1] == 9.0
+
+
+def test_a_change_acts_on_the_channels_of_its_acceleration(made):
+    nominal, record, _ = made
+    plain = straight.trial(*made)
+    family = next(f for f in plain.unseen.families if f.name == "time")
+    weights = np.zeros(plain.unseen.count)
+    at = (family.columns - plain.unseen.families[0].columns[0])[3 * EVEN["time"] :]
+    each = len(at) // 3  # channel by channel: sway's are in the middle
+    weights[at[each : 2 * each]] = 20.0
+    accelerations = plain.unseen.accelerations(plain.at({}).linear.cut, plain.grid) @ weights
+    given = straight.passed(
+        record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=accelerations
+    )
+    trial = straight.trial(nominal, record, given)
+    point = trial.at({})
+    base, _ = evidence.scan(trial, point, (), (), 1.0)
+    assert fits.acts_on(trial, Fit(point, base, Remainder(RAISED)), "time") == ("sway",)
+
+
+@pytest.mark.parametrize(
+    ("own", "low", "high"), [(0.0, 0.98, 1.0), (0.045, 0.3, 0.7), (1.0, 0.0, 0.01)]
+)
+def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, own, low, high):
+    """A cause that acts as a function of time does, and in addition as nothing else does. What does
+    not act at the nodes, as process noise does, weighs far more."""
+    nominal, record, given = made
+    plain = straight.trial(*made)
+    family = next(f for f in plain.unseen.families if f.name == "time")
+    at = family.columns - plain.unseen.families[0].columns[0]
+    accelerations = plain.unseen.accelerations(given.cut, plain.grid)[..., at[3 * EVEN["time"]]]
+    does = np.einsum("sbcz,sz->sbc", given.z[..., 6:], accelerations)
+    weight = does.std((0, 1)) + 1e-12
+    rest = np.random.default_rng(11).standard_normal(does.shape) * weight
+    j, columns = given.j.copy(), straight.columns_of(CAUSES)
+    j[..., columns.of["drag"][0]] = 30.0 * (does + own * rest)
+    trial = straight.trial(nominal, record, replace(given, j=j))
+    point = trial.at({})
+    base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
+    base.numbers["drag"] = np.ones(1)
+    share = fits.imitated(trial, Fit(point, base, Remainder("time", 1e4)), "drag")
+    assert low <= share <= high
+    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag") == 0.0
+
+
+# --- levels of process noise
+
+
+def test_what_is_expected_of_the_process_noise_is_a_log_density_ratio(trial):
+    nominal = max(trial.campaign.noise, remainder.LEAST_SPREAD)
+    top = norm(0.0, nominal).logpdf(0.0)
+    for noise in (0.5, 1.0, 1.3, 4.0):
+        at = math.log(noise)
+        wanted = norm(0.0, nominal).logpdf(at) - top
+        for remaining in (Remainder(), Remainder("wind", 3.0)):
+            assert of_noise(trial, noise, remaining) == pytest.approx(wanted)
+        wanted = norm(0.0, remainder.RAISED_SPREAD).logpdf(at) - top
+        for remaining in (Remainder(RAISED), Remainder(INTERMITTENT), Remainder("wind", 3.0, True)):
+            assert of_noise(trial, noise, remaining) == pytest.approx(wanted)
+
+
+def test_campaigns_are_never_quite_alike(made):
+    nominal, record, given = made
+    trial = straight.trial(replace(nominal, noise=0.0), record, given)
+    wanted = -0.5 * (math.log(1.2) / remainder.LEAST_SPREAD) ** 2
+    assert of_noise(trial, 1.2) == pytest.approx(wanted)
+
+
+def test_levels_of_noise_differ_as_dense_gaussians_do(made):
+    """With starts that are known, since what a start is felt by is restricted likelihood."""
+    nominal, record, given = made
+    sure = replace(PROCESS_NOISE, start=np.full(6, 1e-5))
+    ref = replace(nominal.reference, process_noise=sure)
+    trial = straight.trial(replace(nominal, reference=ref), record, given)
+    point = trial.at({})
+    found, wanted = [], []
+    for noise in (1.0, 1.4):
+        one = level(trial, point, noise)
+        found.append(one.value - of_noise(trial, noise))
+        e, j, _, _, c, mean, nominal_covariance, *_ = gaussian_of(trial, point, noise, sure)
+        # of a power of the likelihood log|C| counts for its share, log|C + share·JUJᵀ| whole
+        whole = c / SHARE + j @ nominal_covariance @ j.T
+        power = 0.5 * (1.0 - SHARE) * np.linalg.slogdet(c)[1]
+        wanted.append(multivariate_normal(j @ mean, whole).logpdf(e) + power)
+    assert abs(wanted[1] - wanted[0]) > 5.0
+    assert found[1] - found[0] == pytest.approx(wanted[1] - wanted[0], abs=0.05)
+
+
+def gaussian_of(trial, point, noise, process_noise):
+    kept = straight.dense
+    try:
+        straight.dense = lambda linear, _: kept(linear, process_noise.times(noise))
+        return gaussian(trial, point, noise)
+    finally:
+        straight.dense = kept
+
+
+def test_the_best_level_is_the_one_that_was_drawn(made):
+    """Twice the process noise in the trial: found under a raised remainder, between the steps."""
+    nominal, record, _ = made
+    rng = np.random.default_rng(8)
+    plain = straight.trial(*made)
+    kernel = np.linalg.cholesky(PROCESS_NOISE.kernel(plain.grid.knots))
+    more = math.sqrt(3.0) * rng.standard_normal((8, 3 * plain.grid.knots)) @ kernel.T
+    given = straight.passed(
+        record, straight.columns_of(CAUSES), seed=2, sensitivity=0.3, accelerations=more
+    )
+    trial = straight.trial(nominal, record, given)
+    raised = Remainder(RAISED)
+    levels = evidence.levels(trial, trial.at({}), remainder=raised)
+    best = max(levels, key=lambda one: one.value)
+    assert best.noise_factor == pytest.approx(2.0, rel=0.12)
+    again = evidence.levels(trial, trial.at({}), (), best.noise_factor, raised)
+    near = max(again, key=lambda one: one.value)
+    assert near.noise_factor == pytest.approx(best.noise_factor, rel=0.02)

@@ -1,0 +1,54 @@
+"""An unrecorded thruster, placed between the places that are tried first."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import afloat
+import numpy as np
+import pytest
+
+from shiplog.diagnosis import (
+    likelihood,
+    linear_segments,
+    raised_noise,
+    segments,
+    unrecorded_thruster,
+)
+
+
+def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
+    """Its place [m ahead of midship] and force between those that are tried first, from products
+    drawn with it: sway and yaw rate accelerated together."""
+    rng = np.random.default_rng(5)
+    ship, coefficients = afloat.MODEL, dict(zip(afloat.MODEL.names, afloat.THETA, strict=True))
+    unit = unrecorded_thruster.accelerations(ship, coefficients, np.array([[0.0, 1.0, 1.1]]))[0]
+    knots, count = 16, 300
+    process_noise = replace(afloat.PROCESS_NOISE, intermittent=1.7 * unit)
+    z = np.eye(6 + 3 * knots)[None].repeat(count, 0)  # all of it measured, as well as a node can be
+    drawn = np.zeros((count, 6 + 3 * knots, 1))
+    drawn[:, 6:, 0] = rng.multivariate_normal(
+        np.zeros(3 * knots), process_noise.kernel(knots), count
+    )
+    sure = 1e12
+    weighed = likelihood.Weighed(
+        sure * np.swapaxes(drawn, 1, 2) @ drawn, sure * drawn, sure * z, 0.0, knots
+    )
+    reference = SimpleNamespace(
+        model=SimpleNamespace(stand_in=ship), coefficients=coefficients,
+        setting=SimpleNamespace(scale={"length": 3.0}), counts=1.0,
+    )  # fmt: skip
+    cut = segments.Cut(
+        np.arange(count), np.zeros((count, 1, 6)), np.ones((count, 1, 6), dtype=bool),
+        np.zeros((count, 1, 1)), np.zeros(count), 0.2,
+    )  # fmt: skip
+    path = linear_segments.Path(np.zeros((count, 6)), np.zeros((count, 3, knots)))
+    linear = linear_segments.Linear(
+        cut, path, np.zeros((count, 1, 6)), np.zeros((count, 1, 6, 6 + 3 * knots)),
+        np.zeros((count, 1, 6, 0)),
+    )  # fmt: skip
+    monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
+    left = raised_noise.left_by(linear, np.zeros(0), afloat.PROCESS_NOISE, np.ones(count), 1.0)
+    found = unrecorded_thruster.estimate_side_force(left, reference)
+    assert found.lever == pytest.approx(1.1, abs=0.05)
+    assert found.force == pytest.approx(1.7, rel=0.1)
+    assert found.gain > 1000.0

@@ -1,0 +1,127 @@
+"""Recordings are written whole, and the viewer shows them, on this machine only."""
+
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import psutil
+import pytest
+
+from shiplog.exceptions import ShiplogError
+from shiplog.report import viewer
+from shiplog.report.viewer import (
+    histogram,
+    native,
+)
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_what_cannot_be_written_whole_is_not_there(compared, tmp_path, monkeypatch):
+    def fails(recording, comparison):
+        raise RuntimeError("the disk is full")
+
+    monkeypatch.setattr(histogram, "send", fails)
+    with pytest.raises(RuntimeError, match="disk"):
+        viewer.save(compared, tmp_path / "compare.rrd")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_is_full_is_reported_and_leaves_no_half_a_recording(compared, tmp_path):
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        with pytest.raises(ShiplogError, match="could not be written"):
+            viewer.save(compared, tmp_path / "compare.rrd")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_display_the_viewer_says_what_to_do(saved, monkeypatch):
+    monkeypatch.setattr(native.sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ShiplogError, match="No display") as output:
+        viewer.open_viewer(saved)
+    assert "--save" in output.value.hint and "--web" in output.value.hint
+
+
+def test_a_recording_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ShiplogError, match=r"missing\.rrd"):
+        viewer.serve(tmp_path / "missing.rrd")
+
+
+@pytest.mark.parametrize("how", ["window", "web"])
+def test_every_program_is_made_to_listen_on_this_machine_only(saved, monkeypatch, how):
+    started = []
+
+    class Program:
+        def __init__(self, command, **_settings):
+            started.append(command)
+            raise OSError("not started")
+
+    monkeypatch.setattr(native.subprocess, "Popen", Program)
+    monkeypatch.setenv("DISPLAY", ":0")
+    with pytest.raises(OSError, match="not started"):
+        viewer.open_viewer(saved) if how == "window" else viewer.serve(saved, port=0)
+    ((*_, option, address),) = started
+    assert (option, address) == ("--bind", "127.0.0.1")
+
+
+@pytest.mark.viewer
+def test_the_web_viewer_listens_on_this_machine_only(saved):
+    with viewer.serve(saved, port=0) as served:
+        (server,) = psutil.Process(served.process.pid).children()
+        listening = server.net_connections("inet")
+        hosts = {c.laddr.ip for c in listening if c.status == psutil.CONN_LISTEN}
+        assert hosts == {"127.0.0.1"}
+        with urllib.request.urlopen(served.address, timeout=10) as page:
+            assert page.status == 200 and b"<html" in page.read()[:2000]
+    assert served.process.poll() is not None and not server.is_running()
+
+
+@pytest.mark.viewer
+def test_a_server_ends_with_the_command_whatever_ends_that(saved):
+    program = (
+        "import sys; from shiplog.report import viewer\n"
+        "with viewer.serve(sys.argv[1], port=0) as served:\n"
+        "    print('ready', flush=True); served.wait()\n"
+    )
+    command = subprocess.Popen(
+        [sys.executable, "-c", program, str(saved)], stdout=subprocess.PIPE, cwd=ROOT
+    )
+    with command:
+        assert command.stdout.readline() == b"ready\n"
+        started = psutil.Process(command.pid).children(recursive=True)
+        assert len(started) == 2  # the server and who watches over it
+        command.kill()
+    _, alive = psutil.wait_procs(started, timeout=30)
+    assert alive == []
+
+
+@pytest.mark.viewer
+def test_the_viewer_shows_every_view_without_complaint(saved, tmp_path, no_viewer):
+    from shiplog.report.viewer.screenshot import screenshot
+
+    try:
+        state = screenshot(saved, tmp_path / "viewer.png", time_s=100.0)
+    except ShiplogError as error:
+        no_viewer(f"no headless viewer here: {error.message}")
+    names = {view.name for view in state.views}
+    for name in (
+        "error: log10(1 + d), dots where a window starts", "surge u [m/s]", "sway v_m [m/s]",
+        "yaw rate r [deg/s]", "heading ψ [deg]", "north x₀ [m]", "east y₀ [m]", "rudders [deg]",
+        "propellers [rev/s]", "apparent wind speed U_A [m/s]", "Report",
+        "Apparent wind, training [rows, log scale]", "Apparent wind, test [rows, log scale]",
+        "surge u [m/s]: log10(1 + rows)",
+    ):  # fmt: skip
+        assert name in names, name
+    assert any(name.startswith("Track, north up, metres") for name in names)
+    assert not [report for view in state.views for report in view.reports]
+    (recording,) = [r for r in state.recordings if r.timelines]
+    (time,) = [t for t in recording.timelines if t.name == "sim_time"]
+    assert (time.start, time.end) == (0, 200_000_000_000)
+    assert (tmp_path / "viewer.png").stat().st_size > 50_000
