@@ -55,6 +55,11 @@ class Hypotheses:
     def nothing(self) -> Hypothesis:
         return self.found[(), NOMINAL]
 
+    def best_of(self, kind: str) -> Hypothesis | None:
+        """The most probable one so far with this kind of remainder."""
+        same = (h for (_, other), h in self.found.items() if other == kind)
+        return max(same, key=lambda h: h.score, default=None)
+
     def ranked(self, without: Collection[str] = ()) -> list[Hypothesis]:
         """Best first; without those that contain a cause of these names."""
         kept = (h for h in self.found.values() if not set(without) & set(map(name_of, h.causes)))

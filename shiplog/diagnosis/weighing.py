@@ -98,22 +98,35 @@ def weigh(
 
 def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
     """Raised noise with a factor of its own in each channel, where that is more probable than one
-    for all. Factors and numbers are fitted in turn: each is off where the other one is."""
+    for all. Factors and numbers are fitted in turn: each is off where the other one is. They start
+    from the factors that were most probable so far, and stay there where the set is far behind."""
     if plain.best.noise_factor <= RAISED_FROM:
         return plain
     trial, included = table.trial, table.included(labels)
     fit = plain.fit(trial, labels, included, plain.best)
-    for _ in range(NOISE_ROUNDS):
-        remainder = table.raised_by_channel(fit)
-        point, found = converge(
-            trial, included, fit.found.numbers, fit.point.path, remainder=remainder
-        )
-        if not math.isfinite(found.evidence):
-            return plain
-        fit = Fit(point, found, remainder)
-    levels = evidence.levels(trial, point, included, found.noise_factor, remainder)
-    shaped = Rough(point, remainder, levels)
+    before, rounds = table.best_of(RAISED), NOISE_ROUNDS
+    if before is not None and before.remainder.shaped:
+        fit = _fitted_with(table, labels, fit, before.remainder)
+        near = table.score(fit.found.evidence, labels, RAISED) > before.score - SEARCH_NATS
+        rounds = 1 if near else 0
+    for _ in range(rounds):
+        fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
+    if not math.isfinite(fit.found.evidence):
+        return plain
+    at, remainder = fit.point, fit.remainder
+    levels = evidence.levels(trial, at, included, fit.found.noise_factor, remainder)
+    shaped = Rough(at, remainder, levels)
     return shaped if shaped.best.value > plain.best.value else plain
+
+
+def _fitted_with(table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder) -> Fit:
+    """The same causes with another remainder; as it is, where an earlier fit of them failed."""
+    if not math.isfinite(fit.found.evidence):
+        return fit
+    point, found = converge(
+        table.trial, table.included(labels), fit.found.numbers, fit.point.path, remainder=remainder
+    )
+    return Fit(point, found, remainder)
 
 
 def nominal_levels(
@@ -206,21 +219,23 @@ def _weigh_change(
 def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> Rough | None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
-    is raised in each channel by itself it is that noise, and is not counted twice: None."""
-    raised = table.found[labels, RAISED]
-    fit = table.fit(raised)
-    for _ in range(FORCE_ROUNDS):
+    is raised in each channel by itself it is that noise, and is not counted twice: None. Nor is a
+    set asked that is far behind another one with raised noise."""
+    raised, most = table.found[labels, RAISED], table.best_of(RAISED)
+    assert most is not None
+    if raised.score < most.score - SEARCH_NATS:
+        return None
+    fit, before, rounds = table.fit(raised), table.best_of(INTERMITTENT), FORCE_ROUNDS
+    if before is not None:
+        fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
+    for _ in range(rounds):
         tried = table.intermittent(fit)
-        point, found = converge(
-            table.trial, table.included(labels), fit.found.numbers, fit.point.path,
-            remainder=tried.remainder,
-        )  # fmt: skip
-        if not math.isfinite(found.evidence):
-            return None
-        fit = Fit(point, found, tried.remainder)
-    if tried.gain <= 0.0 or found.evidence <= raised.evidence:
+        fit = _fitted_with(table, labels, fit, tried.remainder)
+    found = fit.found
+    if tried.gain <= 0.0 or not found.evidence > raised.evidence:  # nor where it is no number
         return None
     table.put(labels, found.evidence, fit, tried)
-    included, at = table.included(labels), found.noise_factor
-    return Rough(point, fit.remainder, evidence.levels(table.trial, point, included, at,
-                                                       fit.remainder))  # fmt: skip
+    levels = evidence.levels(
+        table.trial, fit.point, table.included(labels), found.noise_factor, fit.remainder
+    )
+    return Rough(fit.point, fit.remainder, levels)
