@@ -21,7 +21,7 @@ FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without eff
 RAISED_FROM = 1.2  # times the nominal process noise, from which an intermittent force is tested
 RAISING = Remainder(RAISED)
 NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
-FORCE_ROUNDS = 3  # of fitting an intermittent force and numbers in turn
+FORCE_ROUNDS = 2  # of fitting an intermittent force and numbers in turn
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,6 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> Rough | N
     if tried.gain <= 0.0 or not found.evidence > raised.evidence:  # nor where it is no number
         return None
     table.put(labels, found.evidence, fit, tried)
-    levels = evidence.levels(
-        table.trial, fit.point, table.included(labels), found.noise_factor, fit.remainder
-    )
-    return Rough(fit.point, fit.remainder, levels)
+    included, at = table.included(labels), found.noise_factor
+    one = evidence.level(table.trial, fit.point, at, included, fit.remainder)
+    return Rough(fit.point, fit.remainder, [one])
