@@ -53,6 +53,7 @@ class Search:
         """Evaluate hypotheses until no further one is promising."""
         if () not in self._tried:
             self._weigh((), {}, self.table.first)
+            self._scan_each_alone()
         while len(self._tried) < self._most:
             ranked = self.table.ranked(self.banned)
             near = [h for h in ranked if h.score > ranked[0].score - SEARCH_NATS]
@@ -112,14 +113,6 @@ class Search:
             table.trial, fit.point, candidates, table.included(one.causes),
             one.found.noise_factor, one.remainder,
         )  # fmt: skip
-        if not one.causes and one.kind == NOMINAL:
-            table.alone |= {f.name: f.evidence for f in found}
-            self.scanned |= {
-                f.name: table.score(one.evidence + f.evidence, (f.name,), NOMINAL) for f in found
-            }
-            if not self.expected:
-                self.expected = {f.name: f.expected for f in found if f.expected is not None}
-                self._say_what_would_not_show()
         additions = []
         for f in found:
             if f.evidence <= 0.0 or f.evidence < LIKELY * found[0].evidence:
@@ -129,6 +122,20 @@ class Search:
             score = table.score(one.evidence + f.evidence, labels, one.kind)
             additions.append((labels, numbers, score))
         return additions[:CONTENDERS]
+
+    def _scan_each_alone(self) -> None:
+        """What each cause explains by itself, and what would show of it, whatever is searched."""
+        table, nothing = self.table, self.table.nothing
+        _, found = evidence.scan(
+            table.trial, table.fit(nothing).point, table.catalogue, table.included(()),
+            nothing.found.noise_factor,
+        )  # fmt: skip
+        table.alone |= {f.name: f.evidence for f in found}
+        self.scanned = {
+            f.name: table.score(nothing.evidence + f.evidence, (f.name,), NOMINAL) for f in found
+        }
+        self.expected = {f.name: f.expected for f in found if f.expected is not None}
+        self._say_what_would_not_show()
 
     def _say_what_would_not_show(self) -> None:
         """Log the causes that these voyages cannot reveal, before any is searched for."""
