@@ -10,6 +10,7 @@ from pathlib import Path
 from pipelines.bars import tracked
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ShiplogError
+from shiplog.logs import reading_limits
 from shiplog.logs.check import expected_s, health_of
 from shiplog.logs.health_report import Finding, VoyageReport
 from shiplog.logs.read import contents, read
@@ -55,6 +56,7 @@ def ingest_logs(
     store.mend()  # else it would wait for the next voyage that is new
     for path in tracked(paths, "ingesting"):
         try:
+            reading_limits.begin(path)
             found = contents(path)
             profile_of = chosen or fitting_profile(found)
             if profile_of.source not in reported:
@@ -72,11 +74,12 @@ def ingest_logs(
         except ShiplogError as error:
             refused[str(path)] = error
             continue
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
         log.info("%s: %s", voyage.name, state)
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 
@@ -95,11 +98,13 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
     refused: dict[str, ShiplogError] = {}
     for path in tracked(expand(paths), "checking", expected_s):
         try:
+            reading_limits.begin(path)
             reports.append(_checked(path, chosen))
         except ShiplogError as error:
             refused[str(path)] = error
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 
@@ -117,7 +122,7 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
     try:
         if profile is not None:
             consistency = consistency_of(reading, profile)
-    except Exception as error:  # what ingest would refuse has its health all the same
+    except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
     if why is not None:
         log.info("%s: sensors not held against each other: %s", path.stem, why.message)

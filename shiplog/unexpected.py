@@ -26,13 +26,22 @@ class Unexpected(ShiplogError):
 
 def unexpected(error: BaseException, doing: str = "") -> ShiplogError:
     """What to tell of an exception. That of the program leaves its trace in a file, and says where.
+    One that asks to end is raised again.
 
     doing   what the program was doing, such as the name of a log; empty for the command itself
     """
+    if isinstance(error, (KeyboardInterrupt, SystemExit, GeneratorExit)):
+        raise error
     if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
         return ShiplogError(
             f"{os.fsdecode(error.filename)}: {error.strerror}.",
             hint="look whether that path is what you meant, may be used, and has room on its disk.",
+        )
+    if isinstance(error, MemoryError):
+        return Unexpected(
+            f"{doing + ': ' if doing else ''}more memory was needed than there is, or than a file "
+            "of its size may take.",
+            hint="if the file is sound, it is too large for this computer: cut it into parts.",
         )
     import traceback  # as below: seldom needed, and every command would wait for it
 

@@ -16,6 +16,7 @@ from typing import NoReturn
 import typer
 
 from shiplog import disk_cache
+from shiplog.cli import guard
 from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
 
@@ -39,7 +40,8 @@ def main() -> None:
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stopped)
-    sys.exit(run())
+    ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
+    sys.exit(run() if ended is None else ended)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -58,14 +60,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message
             typer.echo(STOPPED_SENTENCE, err=True)
         return code
-    except Exception as error:
+    except BaseException as error:  # a panic of polars is no Exception
         fault = _fault(error)
         typer.echo(str(fault), err=True)
         return fault.exit_code
     return 0
 
 
-def _fault(error: Exception) -> ShiplogError:
+def _fault(error: BaseException) -> ShiplogError:
     """The message for a user."""
     if isinstance(error, ShiplogError):
         return error

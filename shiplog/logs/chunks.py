@@ -13,6 +13,7 @@ import zlib
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import lz4.frame
 import zstandard
@@ -21,6 +22,7 @@ from mcap.records import Chunk, McapRecord
 
 from . import records
 from .container import Alone
+from .records import places
 
 log = logging.getLogger(__name__)
 
@@ -99,31 +101,39 @@ def contents(
     if size <= AT_ONCE:  # a larger one was checked when it was opened
         for _ in records.split(_unpacked(sound), size):
             pass
-    for data, places in records.split(_unpacked(sound), size):
-        for first in range(0, len(places), BATCH_RECORDS):
-            batch = places[first : first + BATCH_RECORDS]
-            bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in batch)
-            yield list(_made(bodies, counts, only))
+    for data, runs in records.split(_unpacked(sound), size):
+        if counts is not None:
+            runs = records.count_messages(data, runs, counts)
+        bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in places(runs))
+        made = _made(bodies, only)
+        while batch := list(islice(made, BATCH_RECORDS)):
+            yield batch
+
+
+def message_counts(sound: Chunk) -> Counter[int]:
+    """How many messages each channel has in an opened chunk. Raises ValueError as `contents`."""
+    counts: Counter[int] = Counter()
+    for data, runs in records.split(_unpacked(sound), sound.uncompressed_size):
+        records.count_messages(data, runs, counts)
+    return counts
 
 
 def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
     """The same of a record that stands in no chunk."""
-    return _made([(item.opcode, memoryview(item.body), item.whole)], counts)
+    body = memoryview(item.body)
+    if item.opcode == Opcode.MESSAGE and counts is not None:
+        records.count_messages(body, [(item.opcode, 0, len(body), 1)], counts)
+        return iter(())
+    return _made([(item.opcode, body, item.whole)])
 
 
 def _made(
-    bodies: Iterable[tuple[int, memoryview, bool]],
-    counts: Counter[int] | None,
-    only: Container[int] | None = None,
+    bodies: Iterable[tuple[int, memoryview, bool]], only: Container[int] | None = None
 ) -> Iterator[McapRecord]:
     for opcode, body, whole in bodies:
-        if opcode == Opcode.MESSAGE and len(body) >= records.MESSAGE.size:
-            channel = body[0] + 256 * body[1]
-            if counts is not None:
-                counts[channel] += 1
-                continue
-            if only is not None and channel not in only:
-                continue
+        message = opcode == Opcode.MESSAGE and len(body) >= records.MESSAGE.size
+        if only is not None and message and body[0] + 256 * body[1] not in only:
+            continue
         made = records.record(opcode, body, whole) or records.unnamed(opcode, body)
         if made is not None:
             yield made

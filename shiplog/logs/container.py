@@ -206,8 +206,8 @@ def _tiled(section: bytes) -> list[McapRecord] | None:
     """The records that fill a summary to its last byte; None where they do not."""
     met = []
     try:
-        for data, places in records.split([section], len(section)):
-            for opcode, begin, stop in places:
+        for data, runs in records.split([section], len(section)):
+            for opcode, begin, stop in records.places(runs):
                 if opcode in SUMMARY:
                     met.append(parsed(SUMMARY[opcode], bytes(data[begin:stop])))
     except ValueError:

@@ -10,6 +10,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import Finding
 from shiplog.units import SECOND_NS
 
+from . import dates
 from .container import Loss
 from .records import LARGEST_MESSAGE
 from .tables import Order, Tables
@@ -128,6 +129,8 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
     for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}
         for topic, frame in frames.items():
+            if len({ahead, behind} & dates.wrong(frame)) == 1:
+                continue  # `dates` says so
             median, low, high = spread(frame, ahead, behind)
             if median is not None and abs(median) > OFFSET and high - low <= abs(median):
                 steady[topic] = median
@@ -137,7 +140,8 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
                 continue
             side = "ahead of" if median > 0 else "behind"
             channel = topics[0] if len(topics) == 1 else "log"
-            sentence = f"{one} is {abs(median):.3g} s {side} {other} on {_topics(topics)}."
+            far = dates.how_far(abs(median) * SECOND_NS)
+            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}."
             findings.append(
                 Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
             )

@@ -10,7 +10,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from .messages import Messages, leaves_of
+from .messages import Fields, Messages, leaves_of
 from .protobuf_layout import FlatMessages, flat, repeated
 
 F = FieldDescriptor
@@ -30,7 +30,7 @@ class ProtobufMessages(Messages):
     """Messages of a schema that can also be decoded many at once."""
 
     def __init__(self, descriptor: Descriptor, parse: Callable[[bytes], Any]) -> None:
-        kind = _struct(descriptor, (descriptor.full_name,))
+        kind = _struct(descriptor, (descriptor.full_name,), Fields())
         bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
         super().__init__(kind, parse, _getter(), bulk)
         self._descriptor = descriptor
@@ -48,12 +48,13 @@ def messages(schema: Schema) -> ProtobufMessages:
     return ProtobufMessages(parse(b"").DESCRIPTOR, parse)
 
 
-def _struct(kind: Descriptor, inside: tuple[str, ...]) -> pl.Struct:
-    types = {field.name: _dtype(field, inside) for field in kind.fields}
+def _struct(kind: Descriptor, inside: tuple[str, ...], met: Fields) -> pl.Struct:
+    met.more(len(kind.fields))
+    types = {field.name: _dtype(field, inside, met) for field in kind.fields}
     return pl.Struct({name: dtype for name, dtype in types.items() if dtype is not None})
 
 
-def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | None:
+def _dtype(field: FieldDescriptor, inside: tuple[str, ...], met: Fields) -> pl.DataType | None:
     """The type of a field; None for what holds nothing, or would contain itself."""
     single = SCALAR_TYPES.get(field.type)
     if single is None:
@@ -62,7 +63,7 @@ def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | Non
             return None
         if len(inside) > DEEPEST:
             return None
-        single = _struct(kind, (*inside, kind.full_name))
+        single = _struct(kind, (*inside, kind.full_name), met)
         if not single.fields:
             return None
     return pl.List(single) if repeated(field) else single

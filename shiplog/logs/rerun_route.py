@@ -25,6 +25,7 @@ import polars as pl
 
 from shiplog import files
 
+from . import reading_limits
 from .tables import Tables, Tally
 
 log = logging.getLogger(__name__)
@@ -65,7 +66,8 @@ def read_most(tables: Tables, tally: Tally, filled: Collection[str] = ()) -> set
     with files.temporary_folder() as folder:
         seconds = START_TIMEOUT_S + sum(expected.values()) / PACE
         request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
-        rows = worker().ask(request | {"seconds": seconds}, seconds).get("rows", [])
+        limits = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
+        rows = worker().ask(request | limits, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):
             if got == expected[topic] and _take(tables, topic, folder / f"{number}.arrow"):
                 done.add(topic)
@@ -184,14 +186,20 @@ class Worker:
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None or not self.runs:
             self._stop()
-            self._process = subprocess.Popen(  # without its folder on the path: no name to clash
-                [sys.executable, "-P", str(WORKER)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                text=True,
-                encoding="utf-8",
-            )
+            alone = [
+                sys.executable,
+                "-P",
+                str(WORKER),
+            ]  # its folder not on the path: no name to clash
+            with reading_limits.lifted():
+                self._process = subprocess.Popen(
+                    alone,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    text=True,
+                    encoding="utf-8",
+                )
         return self._process
 
     def _stop(self) -> None:

@@ -7,6 +7,7 @@ ten times slower.
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
@@ -15,20 +16,22 @@ import polars as pl
 from mcap.records import Channel, Message
 
 from . import chunks, scan
-from .container import Alone, Index, Sound, Survey
+from .container import SECTION, Alone, Index, Sound, Survey
 from .messages import Decoder
-from .records import TooLarge
-from .tables import Tables, Tally
+from .records import HEAD, MESSAGE, TooLarge
+from .tables import Tables, Tally, room
 
 BATCH_BYTES = 4 << 20  # bytes of payloads decoded at once: enough to make per-topic work cheap
+SMALLEST_MESSAGE = HEAD.size + MESSAGE.size  # bytes of one without a payload
 OVERHEAD = 64  # bytes that a message takes without its payload: empty ones are not for nothing
 LARGE_TEXT = 4096  # bytes on average: an image or a video in base64, left out unless asked for
 
 
 def messages(found: Survey) -> Iterator[list[Message]]:
-    """The messages of each sound chunk in batches, or each message that stands alone."""
+    """The messages of each sound chunk in batches, or each message that stands alone; none of a
+    chunk that holds more than the whole log can."""
     for item in scan.walk(found):
-        if not isinstance(item, Index):
+        if not isinstance(item, Index) and not _beyond(item, room(found)):
             yield from filter(None, scan.contents_of(found, item))
 
 
@@ -37,15 +40,51 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
     tally = Tally()
     batch: dict[int, list[Message]] = {}
     held = 0
-    for chunk in messages(tables.found):
-        for message in chunk:
-            batch.setdefault(message.channel_id, []).append(message)
-            held += len(message.data) + OVERHEAD
-        if held >= BATCH_BYTES:
-            _take(tables, topics, batch, tally)
-            batch, held = {}, 0
+    for item in scan.walk(tables.found):
+        if isinstance(item, Index):
+            continue
+        if left_out := _beyond(item, tables.room):
+            _count(tables, topics, left_out, tally)
+            continue
+        for met in scan.contents_of(tables.found, item):
+            for message in met:
+                batch.setdefault(message.channel_id, []).append(message)
+                held += len(message.data) + OVERHEAD
+            if held >= BATCH_BYTES:
+                _take(tables, topics, batch, tally)
+                batch, held = {}, 0
     _take(tables, topics, batch, tally)
     return tally
+
+
+def _beyond(item: Sound | Alone, most: int) -> Counter[int]:
+    """The messages by channel of a chunk that holds more than so many; else nothing.
+
+    They are counted and not made; every description of a channel is known by now.
+    """
+    if isinstance(item, Alone) or item.chunk.uncompressed_size // SMALLEST_MESSAGE <= most:
+        return Counter()
+    try:
+        counts = chunks.message_counts(item.chunk)
+    except ValueError:  # `contents_of` says what is wrong with it
+        return Counter()
+    first = item.section * SECTION
+    return Counter({n + first: c for n, c in counts.items()} if counts.total() > most else {})
+
+
+def _count(
+    tables: Tables, topics: Collection[str] | None, counts: Mapping[int, int], tally: Tally
+) -> None:
+    for number, count in counts.items():
+        channel = tables.found.channels.get(number)
+        tally.add(number, count, known=channel is not None)
+        if channel is not None and (topics is None or channel.topic in topics):
+            _too_many(tables, channel, count)
+
+
+def _too_many(tables: Tables, channel: Channel, count: int) -> None:
+    if tables.decoder(channel) is not None:
+        tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + count
 
 
 def _take(
@@ -69,7 +108,7 @@ def decode(tables: Tables, channel: Channel, met: list[Message], logged: np.ndar
         return
     tables.room -= len(met)
     if tables.room < 0:
-        tables.too_many[channel.topic] = tables.too_many.get(channel.topic, 0) + len(met)
+        _too_many(tables, channel, len(met))
     else:
         _decode(tables, channel, reader, met, logged)
 

@@ -21,6 +21,12 @@ LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
 
 log = logging.getLogger(__name__)
 
+
+def room(found: Survey) -> int:
+    """Rows that a log of this size can have."""
+    return LEAST_ROWS + int(ROWS_PER_BYTE * found.size)
+
+
 TIME_COLUMNS = ("log_time", "publish_time", "stamp")
 
 
@@ -74,6 +80,13 @@ class Tally:
         order.largest = max(order.largest, -int(steps.min()))
         order.last = int(times[-1])
 
+    def add(self, channel: int, count: int, known: bool) -> None:
+        """Count messages of which nothing else is known."""
+        if known:
+            self.counts[channel] = self.counts.get(channel, 0) + count
+        else:
+            self.orphans += count
+
 
 class Tables:
     """What is wanted of a log, how its topics are decoded, and the rows that there are."""
@@ -86,7 +99,7 @@ class Tables:
         self.failed: dict[str, int] = {}  # messages by topic whose payload did not decode
         self.too_large: dict[str, int] = {}  # messages by topic that were not kept
         self.too_many: dict[str, int] = {}  # likewise, for being more than a log of this size holds
-        self.room = LEAST_ROWS + int(ROWS_PER_BYTE * found.size)  # rows
+        self.room = room(found)  # rows that may still come
         self.undecodable: dict[str, str] = {}
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}

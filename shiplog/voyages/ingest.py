@@ -18,20 +18,10 @@ from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import fault_detection, resampling, sensor_consistency
+from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
-
-CLOCK_COLUMNS = {  # of a source: its column, and the one that it is held against
-    "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
-    "publish": ("publish_time", "log_time"),
-}  # fmt: skip
-
-CLOCK_NAMES = {
-    "stamp": "the messages' own stamps", "log_time": "the recorder's clock",
-    "publish_time": "the publisher's clock",
-}  # fmt: skip
 
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has
     "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
@@ -106,7 +96,8 @@ class _Aligned:
 
 def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
-    reading, left_out = _without_strays(reading, profile)
+    reading, left_out = clocks.without_strays(reading, profile)
+    reading, moved = clocks.on_one_date(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -116,7 +107,9 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="check the topic and the `clock` in the profile; `shiplog check` lists topics.",
         )
     driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
-    start, end = _span(base, [*sampled.values(), *driven.values()])
+    every = {**sampled, **driven}
+    start, end = _span(base, list(every.values()))
+    moved += clocks.no_common_time(every, start, end)
     if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
@@ -142,7 +135,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    return _Aligned(table, grid, [*sampled.items(), *driven.items()], left_out, datum)
+    return _Aligned(table, grid, [*every.items()], [*left_out, *moved], datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -193,44 +186,12 @@ def _require(reading: Reading, profile: Profile) -> None:
                 )
 
 
-def _clock(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
-    """The column that says when a source measured, and the one to hold it against."""
-    if source.clock == "message" and frame["stamp"].null_count() == frame.height:
-        return CLOCK_COLUMNS["log"]  # the message carries no time: the recorder's is all there is
-    return CLOCK_COLUMNS[source.clock]
-
-
-def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
-    """The log without the messages whose stamps cannot be of this voyage, and what they are."""
-    frames, findings = dict(reading.frames), []
-    for source in (*(s for _, s in profile.sensors.items()), *profile.actuators):
-        frame = frames.get(source.topic)
-        if frame is None or frame.height == 0:
-            continue
-        clock, other = _clock(frame, source)
-        known = frame.filter(pl.col(clock).is_not_null())
-        times = known[clock].to_numpy()
-        stray = resampling.strays(times, known[other].to_numpy())
-        if not stray.any():
-            continue
-        frames[source.topic] = known.filter(~stray)
-        off = np.median(times[~stray]) - times[stray].astype(float)
-        far = float(np.abs(off).max()) * 1e-9
-        how = f"{far / resampling.DAY_S:.3g} days" if far > resampling.DAY_S else f"{far:.0f} s"
-        sentence = (
-            f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
-            f"cannot be of this voyage, being up to {how} away by {CLOCK_NAMES[clock]}."
-        )
-        findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
-    return replace(reading, frames=frames), findings
-
-
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     """Time [n] ns by the source's clock and SI values [n, k]."""
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
-    times = frame[_clock(frame, source)[0]]
+    times = frame[clocks.of(frame, source)[0]]
     values = [
         (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)

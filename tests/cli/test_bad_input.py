@@ -150,7 +150,7 @@ PROFILES = {
     "unknown field": (1, ["did you mean 'heading_deg'"],
                       lambda d: d.through('"heading_deg"', '"heading_dge"')),
     "unknown topic": (1, ["has no topic"], lambda d: d.through('"/rudder"', '"../../etc/passwd"')),
-    "negative length": (1, ["greater than 0"],
+    "negative length": (1, ["ship.length_m has to be greater than or equal to 0.1"],
         lambda d: d.through("length_m = 3.0", "length_m = -3")),
     "length inf": (1, ["finite"], lambda d: d.through("length_m = 3.0", "length_m = inf")),
     "length in words": (1, ["ship.length_m"], lambda d: d.through("= 3.0", "= 'three'")),
@@ -161,8 +161,8 @@ PROFILES = {
                            lambda d: d.through("= [0.7, -0.2]", "= [1e4, 0.0]")),
     "sign 0": (1, ["`sign` is 0"], lambda d: d.through(
         'field = "heading_deg"', 'sign = 0.0\nfield = "heading_deg"')),
-    "scale 1e308": (1, ["sensors.heading.sign"], lambda d: d.through(
-        'field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
+    "scale 1e308": (1, ["sensors.heading: `sign` is -1e+308", "between 1e-12 and 1e+06"],
+        lambda d: d.through('field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
     "offset 1e308": (1, ["sensors.heading.offset"], lambda d: d.through(
         'field = "heading_deg"', 'offset = 1e308\nfield = "heading_deg"')),
     "water of 1 kg/m³, 3 m above ground": (1, ["site.density", "site.depth_m", "site.datum.0"],

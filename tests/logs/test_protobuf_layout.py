@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2 as pb
+from made_logs import DESCRIPTORS, KIND, Kind, sample
 from mcap.records import Schema
 from polars.testing import assert_frame_equal
-from test_read import DESCRIPTORS, KIND, Kind, sample
 
 from shiplog.logs import protobuf
 from shiplog.logs.protobuf_layout import FlatMessages

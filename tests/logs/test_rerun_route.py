@@ -74,6 +74,17 @@ def test_rerun_is_not_waited_for_longer_than_it_may_take(tmp_path, by_rerun, mon
     assert set(by_rerun) == {"/a", "/b", "/c"}
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_a_reader_without_memory_leaves_the_log_to_the_other(tmp_path, by_rerun, monkeypatch):
+    """It may take no more than it has when it has just started."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    rerun_route.worker().stop()
+    monkeypatch.setattr(rerun_route.reading_limits, "memory", lambda size: 0)
+    assert_same(path)
+    assert by_rerun == []
+    rerun_route.worker().stop()  # it may have survived, with that limit
+
+
 def test_a_killed_worker_is_replaced(tmp_path, by_rerun):
     path = known_colours(tmp_path / "log.mcap", count=90)
     read(path)
