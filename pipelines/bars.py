@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
 LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
-BYTES_PER_S = 1.5e6  # of a log, ingested or checked; a first guess that the finished logs correct
+BYTES_PER_S = (
+    1.5e6  # of a log ingested or a table converted; a first guess that the finished logs correct
+)
 
 
 class Bars:
@@ -88,11 +90,15 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def tracked(paths: Sequence[Path], title: str) -> Iterator[Path]:
-    """The paths in turn, with a bar in which each counts by its size."""
+def tracked(
+    paths: Sequence[Path], title: str, expected_s: Callable[[Path], float] | None = None
+) -> Iterator[Path]:
+    """The paths in turn, with a bar in which each counts by the seconds that it is expected to
+    take, or else by its size."""
     if not paths:
         return
-    seconds = {f"{i + 1} of {len(paths)}": _bytes(p) / BYTES_PER_S for i, p in enumerate(paths)}
+    expected = expected_s or _expected_s
+    seconds = {f"{i + 1} of {len(paths)}": expected(p) for i, p in enumerate(paths)}
     with _stages(title, seconds):
         for stage, path in zip(seconds, paths, strict=True):
             reach(stage)
@@ -219,9 +225,10 @@ def _columns() -> Progress:
     )  # fmt: skip
 
 
-def _bytes(path: Path) -> int:
+def _expected_s(path: Path) -> float:
     try:
         files = [path] if path.is_file() else [p for p in path.rglob("*") if p.is_file()]
-        return max(sum(one.stat().st_size for one in files), 1)
+        size = sum(one.stat().st_size for one in files)
     except OSError:  # the reader says what is wrong with it
-        return 1
+        size = 0
+    return max(size, 1) / BYTES_PER_S

@@ -11,6 +11,7 @@ from pathlib import Path
 from pipelines.bars import drawable, tracked
 from shiplog import files
 from shiplog.exceptions import ShiplogError
+from shiplog.logs import reading_limits
 from shiplog.logs.bags import bag_to_log, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
@@ -44,18 +45,21 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     done = Converted()
     for path in tracked(sources, "converting"):
         try:
+            reading_limits.begin(path)
             with nullcontext() if drawable() else saying(f"{path.name}: converting"):
                 for target in _each(path, profile, out, done):
                     done.logs.append(target)
         except ShiplogError as error:
             done.refused[str(path)] = str(error)
-        except Exception as error:  # one bad source never ends the others
+        except BaseException as error:  # one bad source never ends the others; a panic, too
             done.refused[str(path)] = str(unexpected(error, path.name))
+    reading_limits.end()
     return done
 
 
 def draft(path: Path, vessel: str | None = None) -> str:
     """TOML text of a profile for a log, a table, or what first has to become a log."""
+    reading_limits.begin(path)
     with saying(f"{path.name}: drafting"):
         if not path.exists() or path.suffix.lower() == ".mcap":
             return draft_log(path, vessel)

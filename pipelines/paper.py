@@ -35,6 +35,7 @@ from shiplog.voyages.store import Store
 log = logging.getLogger(__name__)
 
 BASELINES = {"hold": "holds the velocity", "least_squares": "quadratic least squares"}
+SHOWN_VOYAGES = 4  # of a set, in the report
 HALF = 0.5  # of the training seconds that the reference set has at most, d-ref having all
 
 
@@ -248,7 +249,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
     figures.validation(results.histories, path("validation loss"))
     baselines = {BASELINES.get(name, name): loss for name, loss in results.evaluation.means.items()}
     figures.test(results.losses, baselines, path("test loss"))
-    voyage = results.evaluation.errors["voyage"][0]
+    voyage = _longest(results.evaluation.errors)
     measured = results.evaluation.rows.filter(pl.col("voyage") == voyage)
     figures.inputs(measured, _units(profile), path("inputs"))
     own = rollouts.filter(pl.col("voyage") == voyage)
@@ -262,6 +263,20 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
     title = f"{profile.ship.name}: {len(results.runs)} window sets"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
     return text
+
+
+def _longest(errors: pl.DataFrame) -> str:
+    """The test voyage with the most windows; the first of several."""
+    count = errors.group_by("voyage", maintain_order=True).len()
+    return str(count["voyage"][int(count["len"].arg_max())])  # type: ignore[arg-type]
+
+
+def _sizes(sizes: pl.DataFrame) -> list[tuple]:
+    """Rows of the report's table of sets: of many voyages a few."""
+    short = pl.col("voyages").str.split(", ").map_elements(
+        lambda names: listed(names, SHOWN_VOYAGES), return_dtype=pl.String
+    )  # fmt: skip
+    return sizes.with_columns(voyages=short).rows()
 
 
 def _angles(profile: Profile) -> frozenset[str]:
@@ -306,7 +321,7 @@ def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
         f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
         f"{listed(results.evaluation.voyages)}, {count} windows. Split by {chosen.chosen_by}.",
         "",
-        tables.table(tuple(sizes.columns), [tuple(row) for row in sizes.iter_rows()]),
+        tables.table(tuple(sizes.columns), _sizes(sizes)),
         "",
         "L of the test windows; a baseline that holds the velocity has "
         f"{baselines['hold']:.0f}, quadratic least squares on the reference set "

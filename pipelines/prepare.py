@@ -10,15 +10,15 @@ from pathlib import Path
 from pipelines.bars import tracked
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ShiplogError
-from shiplog.logs.check import check
+from shiplog.logs import reading_limits
+from shiplog.logs.check import expected_s, health_of
 from shiplog.logs.health_report import Finding, VoyageReport
-from shiplog.logs.read import contents
+from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
-from shiplog.voyages import sensor_consistency
 from shiplog.voyages.fitting_profile import fitting_profile
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest import consistency_of, ingest
 from shiplog.voyages.sensor_correction import corrected
 from shiplog.voyages.store import Store
 
@@ -56,6 +56,7 @@ def ingest_logs(
     store.mend()  # else it would wait for the next voyage that is new
     for path in tracked(paths, "ingesting"):
         try:
+            reading_limits.begin(path)
             found = contents(path)
             profile_of = chosen or fitting_profile(found)
             if profile_of.source not in reported:
@@ -73,11 +74,12 @@ def ingest_logs(
         except ShiplogError as error:
             refused[str(path)] = error
             continue
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
             continue
         reports.append(voyage.report)
         log.info("%s: %s", voyage.name, state)
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 
@@ -94,25 +96,34 @@ def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLog
     chosen = profiles.load(profile) if profile else None
     reports: list[VoyageReport] = []
     refused: dict[str, ShiplogError] = {}
-    for path in tracked(expand(paths), "checking"):
+    for path in tracked(expand(paths), "checking", expected_s):
         try:
-            health = check(path)
+            reading_limits.begin(path)
+            reports.append(_checked(path, chosen))
         except ShiplogError as error:
             refused[str(path)] = error
-            continue
-        except Exception as error:  # one bad log never ends the others
+        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
             refused[str(path)] = unexpected(error, path.name)
-            continue
-        reports.append(replace(health, findings=(*health.findings, *_parity(path, chosen))))
+    reading_limits.end()
     return IngestedLogs(reports, refused)
 
 
-def _parity(path: Path, chosen: Profile | None) -> list[Finding]:
-    """What ingest would say of the sensors against each other; nothing where it would refuse."""
+def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
+    """A log's health; where a profile fits it, also what its sensors say of each other."""
+    found = contents(path)
+    profile, why = chosen, None
     try:
-        voyage = ingest(path, chosen or fitting_profile(contents(path)))
-    except Exception as error:
+        profile = chosen or fitting_profile(found)
+    except ShiplogError as error:
+        why = error
+    reading = read(path, profile.wanted() if profile else {}, others=True)
+    report = health_of(reading)
+    consistency: list[Finding] = []
+    try:
+        if profile is not None:
+            consistency = consistency_of(reading, profile)
+    except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
+    if why is not None:
         log.info("%s: sensors not held against each other: %s", path.stem, why.message)
-        return []
-    return sensor_consistency.findings(voyage.estimates, voyage.table.height, voyage.profile)
+    return replace(report, findings=(*report.findings, *consistency))

@@ -16,31 +16,47 @@ from shiplog.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
 Accuracy = Annotated[float, Field(ge=0, le=1e6)]
+FINEST = 1e-9  # in `unit`: a smaller accuracy than this, but for 0, is a slip
+FACTORS = (1e-12, 1e6)  # of a raw value: from 1e-7 deg of a receiver to a count of thousands
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
 
 # What can be at all, so that a slip of the decimal point or of the unit is reported, not computed
 # with. The largest ship has 460 m and 660 000 t; models of ships begin at half a metre.
-LONGEST_M, HEAVIEST_KG = 1_000.0, 2e9
-Length = Annotated[float, Field(gt=0, le=LONGEST_M)]
+SHORTEST_M, LONGEST_M, LIGHTEST_KG, HEAVIEST_KG = 0.1, 1_000.0, 0.01, 2e9
+Length = Annotated[float, Field(ge=1e-3, le=LONGEST_M)]
 Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]  # of a ship's part, from midship
-Area = Annotated[float, Field(gt=0, le=LONGEST_M * 100.0)]  # nothing on a ship is 100 m high
+Area = Annotated[float, Field(ge=1e-6, le=LONGEST_M * 100.0)]  # nothing on a ship is 100 m high
 Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=360.0)]
 Chart = Annotated[float, Field(ge=-1e7, le=1e7)]  # m, a quarter of the Earth's girth
+
+
+def _require_factor(sign: float) -> None:
+    least, most = FACTORS
+    if sign == 0.0:
+        raise ValueError("`sign` is 0, and every value would be; it is 1, -1 or another factor")
+    if not least <= abs(sign) <= most:
+        raise ValueError(
+            f"`sign` is {sign:g}; it is 1, -1 or another factor between {least:g} and {most:g}"
+        )
 
 
 class Ship(Section):
     """Particulars. Missing values are estimated where they are needed, and reported."""
 
     name: str = Field(description="identifies the ship")
-    length_m: Length = Field(description="between perpendiculars, m")
+    length_m: float = Field(
+        ge=SHORTEST_M, le=LONGEST_M, description="between perpendiculars, m"
+    )  # fmt: skip
     breadth_m: Length | None = Field(default=None, description="m")
     draught_m: Length | None = Field(default=None, description="m")
-    mass_kg: float | None = Field(default=None, gt=0, le=HEAVIEST_KG, description="kg")
+    mass_kg: float | None = Field(
+        default=None, ge=LIGHTEST_KG, le=HEAVIEST_KG, description="kg"
+    )  # fmt: skip
     x_g_m: Place | None = Field(
         default=None, description="centre of gravity ahead of midship, m; negative where astern"
     )
-    block_coefficient: float | None = Field(default=None, gt=0, le=1, description="1")
+    block_coefficient: float | None = Field(default=None, ge=0.01, le=1, description="1")
     frontal_area_m2: Area | None = Field(default=None, description="above water, m²")
     lateral_area_m2: Area | None = Field(default=None, description="above water, m²")
     outline: tuple[tuple[Place, Place], ...] | None = Field(
@@ -64,7 +80,7 @@ class Source(Section):
     field: str | None = Field(default=None, description="the same where there is one value")
     unit: str | None = Field(default=None, description="of all values; SI where left out")
     units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
-    sign: Number | tuple[Number, ...] = Field(
+    sign: float | tuple[float, ...] = Field(
         default=1.0, description="-1 turns the values round; one number, or one for each field"
     )
     offset: Number | tuple[Number, ...] = Field(
@@ -75,7 +91,7 @@ class Source(Section):
         "stamp, the recorder's, or the publisher's"
     )  # fmt: skip
     tolerance_s: float | None = Field(
-        default=None, gt=0, le=86_400.0, description="the longest time between two samples that "
+        default=None, ge=1e-3, le=86_400.0, description="the longest time between two samples that "
         "are interpolated, s; one and a half periods where left out"
     )  # fmt: skip
 
@@ -103,8 +119,8 @@ class Source(Section):
             raise ValueError("neither `field` nor `fields` is given")
         if self.field and self.fields:
             raise ValueError("both `field` and `fields` are given; keep one")
-        if 0.0 in self._each(self.sign):
-            raise ValueError("`sign` is 0, and every value would be; it is 1, -1 or another factor")
+        for sign in self._each(self.sign):
+            _require_factor(sign)
         for name in ("units", "sign", "offset"):
             value = getattr(self, name)
             if isinstance(value, tuple) and value and len(value) != len(self.paths):
@@ -122,6 +138,14 @@ class Sensor(Source):
     sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = Field(
         default=None, description="accuracy, one standard deviation, in `unit`; of a position in m"
     )
+
+    @model_validator(mode="after")
+    def _accurate(self) -> Sensor:
+        given = self.sigma if isinstance(self.sigma, tuple) else (self.sigma or 0.0,)
+        for sigma in given:
+            if 0.0 < sigma < FINEST:
+                raise ValueError(f"`sigma` is {sigma:g}; it is 0 or at least {FINEST:g}")
+        return self
 
 
 SENSOR_KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
@@ -264,7 +288,7 @@ class Site(Section):
     banks: tuple[tuple[tuple[Chart, Chart], ...], ...] = Field(
         default=(), description="vertical walls: lines of points [x0, y0], m"
     )
-    depth_m: float | None = Field(default=None, gt=0, le=12_000.0, description="of the water, m")
+    depth_m: float | None = Field(default=None, ge=0.01, le=12_000.0, description="of the water, m")
     density: float | None = Field(
         default=None, ge=900.0, le=1_300.0, description="of the water, kg/m³"
     )
@@ -283,7 +307,7 @@ class Column(Section):
         '"s", "ms", "us" or "ns"; without one it is Unix time by its size, or else seconds from '
         "any start"
     )  # fmt: skip
-    sign: Number = Field(default=1.0, description="-1 turns the column round")
+    sign: float = Field(default=1.0, description="-1 turns the column round")
     offset: Number = Field(
         default=0.0, description="the value that stands for zero, in the column's unit"
     )
@@ -294,6 +318,11 @@ class Column(Section):
     only: str | int | None = Field(
         default=None, description="of a `vessel` column: the one value whose rows are this ship's"
     )
+
+    @model_validator(mode="after")
+    def _scaled(self) -> Column:
+        _require_factor(self.sign)
+        return self
 
 
 class Profile(Section):

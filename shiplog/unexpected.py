@@ -1,7 +1,11 @@
-"""Exceptions that nobody foresaw: one sentence for the user, the trace in a file for developers."""
+"""Exceptions that nobody foresaw: one sentence for the user, the trace in a file for developers.
+
+What the system says of a path is no fault of the program: the sentence is all there is.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from pathlib import Path
@@ -9,6 +13,10 @@ from pathlib import Path
 from shiplog import disk_cache
 from shiplog.exceptions import ShiplogError
 
+MENDABLE = (  # what the system says of a path that the user can mend
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
+    errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
+)  # fmt: skip
 QUOTED_LETTERS = 300  # letters of an exception's own words; some libraries quote whole files
 
 
@@ -16,11 +24,25 @@ class Unexpected(ShiplogError):
     """A fault of the program. The message names its kind and the file that holds its trace."""
 
 
-def unexpected(error: BaseException, doing: str = "") -> Unexpected:
-    """Write the trace of an exception and say where it is.
+def unexpected(error: BaseException, doing: str = "") -> ShiplogError:
+    """What to tell of an exception. That of the program leaves its trace in a file, and says where.
+    One that asks to end is raised again.
 
     doing   what the program was doing, such as the name of a log; empty for the command itself
     """
+    if isinstance(error, (KeyboardInterrupt, SystemExit, GeneratorExit)):
+        raise error
+    if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
+        return ShiplogError(
+            f"{os.fsdecode(error.filename)}: {error.strerror}.",
+            hint="look whether that path is what you meant, may be used, and has room on its disk.",
+        )
+    if isinstance(error, MemoryError):
+        return Unexpected(
+            f"{doing + ': ' if doing else ''}more memory was needed than there is, or than a file "
+            "of its size may take.",
+            hint="if the file is sound, it is too large for this computer: cut it into parts.",
+        )
     import traceback  # as below: seldom needed, and every command would wait for it
 
     words = " ".join(str(error).split())

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shiplog import frames
 
@@ -48,3 +50,49 @@ def test_a_quaternion_pointing_north_in_both_conventions():
 )
 def test_wrap_is_half_open(angle, wrapped):
     assert frames.wrap(np.array([angle]))[0] == pytest.approx(wrapped)
+
+
+ANGLE = st.floats(-50.0, 50.0)
+METRES = st.floats(-100.0, 100.0)
+MANY = settings(max_examples=100, deadline=None)
+
+
+@given(degrees=st.integers(-(10**6), 10**6))
+@MANY
+def test_wrapped_degrees_are_what_is_left_of_whole_turns(degrees):
+    """Against whole numbers, where 540 deg is 180 deg to the last digit."""
+    left = (degrees + 179) % 360 - 179  # -179 ... 180
+    found = float(frames.wrap(np.radians([float(degrees)]))[0])
+    assert -np.pi <= found <= np.pi
+    assert abs(found) == pytest.approx(np.radians(abs(left)), abs=1e-9)
+    assert abs(left) == 180 or found == pytest.approx(np.radians(left), abs=1e-9)
+
+
+@given(north=METRES, east=METRES, heading=ANGLE)
+@MANY
+def test_body_axes_are_those_of_a_complex_number_turned_back(north, east, heading):
+    body = frames.to_body(np.array([[north, east]]), np.array([heading]))[0]
+    turned = complex(north, east) * np.exp(-1j * heading)  # x ahead is real, starboard imaginary
+    assert body == pytest.approx([turned.real, turned.imag], abs=1e-9)
+    back = frames.in_earth_axes(*body, np.cos(heading), np.sin(heading))
+    assert back == pytest.approx((north, east), abs=1e-9)
+
+
+@given(ahead=METRES, starboard=METRES, heading=ANGLE, rate=st.floats(-1.0, 1.0))
+@MANY
+def test_an_antenna_is_moved_to_midship_as_its_path_says(ahead, starboard, heading, rate):
+    """Midship stays at the origin; the antenna circles it, and its velocity is its derivative."""
+    arm = (ahead, starboard)
+
+    def antenna(time):
+        return complex(ahead, starboard) * np.exp(1j * (heading + rate * time))
+
+    place, velocity = antenna(0.0), 1j * rate * antenna(0.0)
+    position = np.array([[place.real, place.imag]])
+    assert frames.position_at_midship(position, np.array([heading]), arm) == pytest.approx(
+        np.zeros((1, 2)), abs=1e-9
+    )
+    body = frames.to_body(np.array([[velocity.real, velocity.imag]]), np.array([heading]))
+    assert frames.velocity_at_midship(body, np.array([rate]), arm) == pytest.approx(
+        np.zeros((1, 2)), abs=1e-9
+    )

@@ -1,10 +1,12 @@
 """Profiles that say what cannot be: refused in a user's words, with the key."""
 
 import textwrap
+import tomllib
 from pathlib import Path
 
 import pytest
 import sailing
+import tomli_w
 
 from pipelines.experiments import profile_reference
 from shiplog import profile, profile_file, units
@@ -25,13 +27,17 @@ def test_every_shipped_profile_is_taken(name):
         (ARM, "lever_arm_m = [nan, 0.0]", f"sensors.position.lever_arm_m.0 {FINITE}"),
         (ARM, "lever_arm_m = [0.0, 1e999]", f"sensors.position.lever_arm_m.1 {FINITE}"),
         ("length_m = 3.0", "length_m = inf", f"ship.length_m {FINITE}"),
-        ("length_m = 3.0", "length_m = -3.0", "ship.length_m has to be greater than 0"),
+        ("length_m = 3.0", "length_m = -3.0", "ship.length_m has to be greater than or equal to"),
         (SIGMA, "sigma = -5", "sensors.position.sigma has to be greater than or equal to 0"),
         (SIGMA, "sigma = [0.1, -0.1]", "sensors.position.sigma.1 has to be greater than or equal"),
         (SIGMA, "sigma = nan", f"sensors.position.sigma {FINITE}"),
         (SIGMA, "sigma = []", "sensors.position.sigma is missing"),
         (SIGMA, "sigma = 'a'", "sensors.position.sigma has to be a number"),
         ("sign = -1.0", "sign = inf", f"actuators.0.sign {FINITE}"),
+        ("sign = -1.0", "sign = 0", "`sign` is 0, and every value would be"),
+        ("sign = -1.0", "sign = -1e308", "`sign` is -1e+308; it is 1, -1 or another factor"),
+        ("sign = -1.0", "sign = 1e-300", "`sign` is 1e-300; it is 1, -1 or another factor"),
+        (SIGMA, "sigma = 1e-200", "`sigma` is 1e-200; it is 0 or at least 1e-09"),
         ("[-35.0, 35.0]", "[35.0, -35.0]", "the lower one stands first"),
         ("[-35.0, 35.0]", "[-inf, inf]", f"actuators.0.limits.0 {FINITE}"),
         ('name = "rudder"\n', 'name = "../../x"\n', "letters, digits and underscores only"),
@@ -48,6 +54,79 @@ def test_what_cannot_be_is_refused_with_its_key(old, new, words):
         sailing.profile(sailing.PROFILE.replace(old, new))
     assert words in found.value.message and found.value.hint
     assert "constrained" not in found.value.message and "tuple[" not in found.value.message
+
+
+def numbers(content, place=()):
+    """The place of every number in a TOML's content."""
+    if isinstance(content, dict):
+        inside = content.items()
+    elif isinstance(content, list):
+        inside = enumerate(content)
+    else:
+        return [place] if isinstance(content, (int, float)) else []
+    return [found for key, value in inside for found in numbers(value, (*place, key))]
+
+
+def with_number(content, place, number):
+    """The content with another number at a place."""
+    if not place:
+        return number
+    changed = dict(content) if isinstance(content, dict) else list(content)
+    changed[place[0]] = with_number(content[place[0]], place[1:], number)
+    return changed
+
+
+EVERY_NUMBER = tomllib.loads(
+    """
+ship = { name = "s", length_m = 3.0, breadth_m = 0.5, draught_m = 0.2, mass_kg = 250.0, \
+x_g_m = 0.1, block_coefficient = 0.8, frontal_area_m2 = 0.1, lateral_area_m2 = 0.5, \
+outline = [[1.5, 0.0], [-1.5, 0.2], [-1.5, -0.2]] }
+site = { banks = [[[0.0, 0.0], [10.0, 0.0]]], depth_m = 5.0, density = 1e3, datum = [35.0, 139.0] }
+[sensors]
+position = { topic = "/p", fields = ["a", "o"], unit = "deg", lever_arm_m = [1.0, 0.1], \
+sigma = 0.1 }
+velocity = { topic = "/v", fields = ["s", "c"], sign = [1.0, -1.0], offset = [0.0, 1.0], \
+sigma = [0.1, 0.2] }
+heading = { topic = "/h", field = "h", sign = -1.0, offset = 3.0, tolerance_s = 0.5 }
+[[actuators]]
+name = "rudder"
+kind = "rudder"
+topic = "/r"
+field = "angle"
+limits = [-35.0, 35.0]
+position_m = [-1.5, 0.0]
+direction_deg = 10.0
+diameter_m = 0.1
+area_m2 = 0.01
+span_m = 0.1
+[table]
+v = { channel = "sog", sign = 2.0, offset = 1.0 }
+"""
+)
+NUMBERS = numbers(EVERY_NUMBER)
+KEYS = {place[-1] if isinstance(place[-1], str) else place[-2] for place in NUMBERS}
+KEYS |= {"banks", "outline"}  # lists of points
+
+
+def test_every_key_that_takes_a_number_is_tried():
+    sections = (profile.Ship, profile.Sensor, profile.Actuator, profile.Site, profile.Column)
+    numeric = {
+        key for section in sections for key, field in section.model_fields.items()
+        if "float" in str(field.annotation)
+    }  # fmt: skip
+    assert numeric - KEYS == set() and len(numeric) > 20
+    profile_file.parse(tomli_w.dumps(EVERY_NUMBER), "every.toml")
+
+
+@pytest.mark.parametrize("number", [1e308, -1e308, 10**400], ids=["1e308", "-1e308", "400 digits"])
+@pytest.mark.parametrize("place", NUMBERS, ids=lambda place: ".".join(map(str, place)))
+def test_no_number_is_taken_that_no_ship_has(place, number):
+    text = tomli_w.dumps(with_number(EVERY_NUMBER, place, number))
+    with pytest.raises(ProfileError) as found:
+        profile_file.parse(text, "every.toml")
+    key = place[-1] if isinstance(place[-1], str) else place[-2]
+    assert str(key) in found.value.message or {"banks", "outline"} & set(place)
+    assert "\n" not in found.value.message and found.value.hint
 
 
 def test_a_profile_that_is_no_text_or_no_file(tmp_path):

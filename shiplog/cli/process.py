@@ -6,10 +6,8 @@ Results on stdout, progress on stderr. Exit codes: 0 done, 1 the input is at fau
 
 from __future__ import annotations
 
-import errno
 import io
 import logging
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -18,15 +16,12 @@ from typing import NoReturn
 import typer
 
 from shiplog import disk_cache
+from shiplog.cli import guard
 from shiplog.cli.app import app
 from shiplog.exceptions import ShiplogError
 
 STOPPED = 130  # by Ctrl-C, as shells have it
 STOPPED_SENTENCE = "stopped; what was finished is kept"
-MENDABLE = (  # what the system says of a path that the user can mend
-    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.ENOENT,
-    errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EFBIG,
-)  # fmt: skip
 
 
 class _Lines(logging.Handler):
@@ -45,7 +40,8 @@ def main() -> None:
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
             signal.signal(number, _stopped)
-    sys.exit(run())
+    ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
+    sys.exit(run() if ended is None else ended)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -64,22 +60,17 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if code == STOPPED:  # of Ctrl-C, as typer returns it; SIGTERM has its own message
             typer.echo(STOPPED_SENTENCE, err=True)
         return code
-    except Exception as error:
+    except BaseException as error:  # a panic of polars is no Exception
         fault = _fault(error)
         typer.echo(str(fault), err=True)
         return fault.exit_code
     return 0
 
 
-def _fault(error: Exception) -> ShiplogError:
+def _fault(error: BaseException) -> ShiplogError:
     """The message for a user."""
     if isinstance(error, ShiplogError):
         return error
-    if isinstance(error, OSError) and error.filename is not None and error.errno in MENDABLE:
-        return ShiplogError(
-            f"{os.fsdecode(error.filename)}: {error.strerror}.",
-            hint="look whether that path is what you meant, may be used, and has room on its disk.",
-        )
     from shiplog.unexpected import unexpected
 
     return unexpected(error)

@@ -89,9 +89,7 @@ def weigh(
         gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
         table.noted_alone(labels[0], gained)
     if plain.best.noise_factor > RAISED_FROM:
-        pushed = _weigh_intermittent(table, labels)
-        if pushed is not None and pushed.best.value > rough.best.value:
-            rough = pushed
+        _weigh_intermittent(table, labels)
     _weigh_families(table, labels, plain, rough)
     table.forget(banned)
 
@@ -216,25 +214,20 @@ def _weigh_change(
     table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
 
 
-def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> Rough | None:
+def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
     """An intermittent side force instead of raised process noise, with the causes fitted together
     with it: fitted to raised noise alone they would make up for it. Less probable than noise that
-    is raised in each channel by itself it is that noise, and is not counted twice: None. Nor is a
-    set asked that is far behind another one with raised noise."""
+    is raised in each channel by itself it is that noise, and is not counted twice. Nor is a set
+    asked that is far behind another one with raised noise."""
     raised, most = table.found[labels, RAISED], table.best_of(RAISED)
     assert most is not None
     if raised.score < most.score - SEARCH_NATS:
-        return None
+        return
     fit, before, rounds = table.fit(raised), table.best_of(INTERMITTENT), FORCE_ROUNDS
     if before is not None:
         fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
     for _ in range(rounds):
         tried = table.intermittent(fit)
         fit = _fitted_with(table, labels, fit, tried.remainder)
-    found = fit.found
-    if tried.gain <= 0.0 or not found.evidence > raised.evidence:  # nor where it is no number
-        return None
-    table.put(labels, found.evidence, fit, tried)
-    included, at = table.included(labels), found.noise_factor
-    one = evidence.level(table.trial, fit.point, at, included, fit.remainder)
-    return Rough(fit.point, fit.remainder, [one])
+    if tried.gain > 0.0 and fit.found.evidence > raised.evidence:
+        table.put(labels, fit.found.evidence, fit, tried)

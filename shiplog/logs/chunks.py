@@ -11,8 +11,9 @@ import logging
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 
 import lz4.frame
 import zstandard
@@ -21,6 +22,7 @@ from mcap.records import Chunk, McapRecord
 
 from . import records
 from .container import Alone
+from .records import places
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +61,8 @@ def chunk(body: bytes) -> Chunk | None:
     begin = where[0]
     (packed,) = LENGTH.unpack_from(body, begin - LENGTH.size)
     compression = body[FIXED.size : FIXED.size + name].decode("utf-8", "backslashreplace")
-    return Chunk(compression, body[begin : begin + packed], end, start, crc, size)
+    data = memoryview(body)[begin : begin + packed]  # no copy: it may be megabytes
+    return Chunk(compression, data, end, start, crc, size)  # type: ignore[arg-type]
 
 
 def opened(packed: Chunk) -> Chunk:
@@ -85,35 +88,51 @@ def opened(packed: Chunk) -> Chunk:
         raise ValueError("cannot be decompressed") from error
 
 
-def contents(sound: Chunk, counts: Counter[int] | None = None) -> Iterator[list[McapRecord]]:
+def contents(
+    sound: Chunk, counts: Counter[int] | None = None, only: Container[int] | None = None
+) -> Iterator[list[McapRecord]]:
     """Schemas, channels and messages of an opened chunk, in batches; all of them or none.
 
     counts  messages by channel so far: they are then counted here, and not handed on
+    only    channels whose messages are handed on, if not all
     Raises ValueError where the bytes are no records, before any is handed on.
     """
     size = sound.uncompressed_size
     if size <= AT_ONCE:  # a larger one was checked when it was opened
         for _ in records.split(_unpacked(sound), size):
             pass
-    for data, places in records.split(_unpacked(sound), size):
-        for first in range(0, len(places), BATCH_RECORDS):
-            batch = places[first : first + BATCH_RECORDS]
-            bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in batch)
-            yield list(_made(bodies, counts))
+    for data, runs in records.split(_unpacked(sound), size):
+        if counts is not None:
+            runs = records.count_messages(data, runs, counts)
+        bodies = ((opcode, data[at:to], to <= len(data)) for opcode, at, to in places(runs))
+        made = _made(bodies, only)
+        while batch := list(islice(made, BATCH_RECORDS)):
+            yield batch
+
+
+def message_counts(sound: Chunk) -> Counter[int]:
+    """How many messages each channel has in an opened chunk. Raises ValueError as `contents`."""
+    counts: Counter[int] = Counter()
+    for data, runs in records.split(_unpacked(sound), sound.uncompressed_size):
+        records.count_messages(data, runs, counts)
+    return counts
 
 
 def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
     """The same of a record that stands in no chunk."""
-    return _made([(item.opcode, memoryview(item.body), item.whole)], counts)
+    body = memoryview(item.body)
+    if item.opcode == Opcode.MESSAGE and counts is not None:
+        records.count_messages(body, [(item.opcode, 0, len(body), 1)], counts)
+        return iter(())
+    return _made([(item.opcode, body, item.whole)])
 
 
 def _made(
-    bodies: Iterable[tuple[int, memoryview, bool]], counts: Counter[int] | None
+    bodies: Iterable[tuple[int, memoryview, bool]], only: Container[int] | None = None
 ) -> Iterator[McapRecord]:
     for opcode, body, whole in bodies:
-        if opcode == Opcode.MESSAGE and counts is not None:
-            if len(body) >= records.MESSAGE.size:
-                counts[body[0] + 256 * body[1]] += 1
+        message = opcode == Opcode.MESSAGE and len(body) >= records.MESSAGE.size
+        if only is not None and message and body[0] + 256 * body[1] not in only:
             continue
         made = records.record(opcode, body, whole) or records.unnamed(opcode, body)
         if made is not None:
@@ -123,6 +142,8 @@ def _made(
 def _at_once(packed: Chunk) -> bytes:
     """Never more than the chunk states, and that only when the frame agrees."""
     size = packed.uncompressed_size
+    if packed.compression == "":
+        return packed.data
     if packed.compression == "zstd":
         framed = zstandard.get_frame_parameters(packed.data).content_size
         if framed == size:
@@ -156,7 +177,9 @@ def _unpacked(packed: Chunk) -> Iterator[bytes]:
 
 def _pieces(packed: Chunk, most: int) -> Iterator[bytes]:
     """A chunk's bytes, never more than `most` of them at once."""
-    if packed.compression == "":
+    if packed.compression == "" and len(packed.data) <= AT_ONCE:
+        yield packed.data
+    elif packed.compression == "":
         for at in range(0, len(packed.data), most):
             yield packed.data[at : at + most]
     elif packed.compression == "lz4":

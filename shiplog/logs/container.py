@@ -86,10 +86,15 @@ class Alone:
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """What follows a chunk: the log times of one channel's messages in it [n] ns, in file order."""
+    """What follows a chunk: one channel's messages in it, in file order.
+
+    times   [n] ns, log times
+    places  [n] bytes, where the records begin in the unpacked chunk
+    """
 
     channel: int
     times: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(slots=True)
@@ -201,8 +206,8 @@ def _tiled(section: bytes) -> list[McapRecord] | None:
     """The records that fill a summary to its last byte; None where they do not."""
     met = []
     try:
-        for data, places in records.split([section], len(section)):
-            for opcode, begin, stop in places:
+        for data, runs in records.split([section], len(section)):
+            for opcode, begin, stop in records.places(runs):
                 if opcode in SUMMARY:
                     met.append(parsed(SUMMARY[opcode], bytes(data[begin:stop])))
     except ValueError:
@@ -243,4 +248,4 @@ def index_of(body: bytes, section: int) -> Iterator[Index]:
         return
     pairs = np.frombuffer(body, "<i8", length // 8, begin.size).reshape(-1, 2)
     in_file = pairs[np.argsort(pairs[:, 1], kind="stable")]
-    yield Index(channel + section * SECTION, in_file[:, 0])
+    yield Index(channel + section * SECTION, in_file[:, 0], in_file[:, 1])

@@ -10,6 +10,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import Finding
 from shiplog.units import SECOND_NS
 
+from . import dates
 from .container import Loss
 from .records import LARGEST_MESSAGE
 from .tables import Order, Tables
@@ -35,7 +36,10 @@ def losses(
             sentence = f"The log is cut off: at byte {loss.offset} it {loss.reason}"
         names = sorted({topics[number] for number in loss.held if number in topics})
         if start is not None and end is not None:
-            sentence += f"; {_what(loss, names)} from {start:.1f} s to {end:.1f} s"
+            when = f"from {start:.1f} s to {end:.1f} s"
+            if start < end <= 0.0:
+                when = f"of {-start:.1f} s before the first message that can be read"
+            sentence += f"; {_what(loss, names)} {when}"
             sentence += " are lost" if loss.chunk else " may be lost"
         channel = names[0] if len(names) == 1 else "log"
         findings.append(Finding(loss.kind, channel, sentence + ".", start, end))
@@ -93,6 +97,8 @@ def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
 
 def twice(frame: pl.DataFrame) -> set[int]:
     """Log times of the messages that share their stamp with another, and may be the same one."""
+    if (frame["stamp"].drop_nulls().diff().drop_nulls() > 0).all():
+        return set()
     stamp = pl.col("stamp")
     shared = frame.filter(stamp.is_not_null()).filter(stamp.is_duplicated())
     return set(shared["log_time"].to_list())
@@ -123,6 +129,8 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
     for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}
         for topic, frame in frames.items():
+            if len({ahead, behind} & dates.wrong(frame)) == 1:
+                continue  # `dates` says so
             median, low, high = spread(frame, ahead, behind)
             if median is not None and abs(median) > OFFSET and high - low <= abs(median):
                 steady[topic] = median
@@ -132,7 +140,8 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
                 continue
             side = "ahead of" if median > 0 else "behind"
             channel = topics[0] if len(topics) == 1 else "log"
-            sentence = f"{one} is {abs(median):.3g} s {side} {other} on {_topics(topics)}."
+            far = dates.how_far(abs(median) * SECOND_NS)
+            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}."
             findings.append(
                 Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
             )

@@ -13,7 +13,11 @@ import numpy as np
 import polars as pl
 from mcap.records import Schema
 
+from .messages import MOST_FIELDS
+
 log = logging.getLogger(__name__)
+
+DEEPEST = 64  # further down no message goes; polars' reader takes seconds for a few that do
 
 
 class Json:
@@ -28,6 +32,8 @@ class Json:
         self, payloads: Sequence[bytes], leaves: Collection[str] | None
     ) -> tuple[pl.DataFrame, np.ndarray]:
         bad = np.zeros(len(payloads), np.bool_)
+        if any(len(payload) > 2 * DEEPEST for payload in payloads):  # as one so deep has to be
+            payloads = [b"" if _beyond(payload) else payload for payload in payloads]
         text = b"\n".join(
             p.replace(b"\n", b" ").replace(b"\r", b" ") if b"\n" in p or b"\r" in p else p
             for p in payloads
@@ -64,6 +70,30 @@ class Json:
                 bad[i] = True
         names = dict.fromkeys(name for row in rows for name in row)
         return pl.DataFrame([_column(name, [row.get(name) for row in rows]) for name in names])
+
+
+def _beyond(payload: bytes) -> bool:
+    """Whether a message goes deeper, or has more fields, than any does."""
+    if len(payload) <= 2 * DEEPEST:
+        return False
+    brackets = payload.count(b"{") + payload.count(b"[")
+    if brackets <= DEEPEST and payload.count(b":") <= MOST_FIELDS:
+        return False
+    try:
+        parts = [json.loads(payload)]
+    except ValueError:
+        return False  # no JSON at all, as will be found
+    except RecursionError:
+        return True
+    names: set[str] = set()
+    for _ in range(DEEPEST):
+        for part in parts:
+            names.update(part if isinstance(part, dict) else ())
+        inside = [part.values() if isinstance(part, dict) else part for part in parts]
+        parts = [one for part in inside for one in part if isinstance(one, (dict, list))]
+        if not parts or len(names) > MOST_FIELDS:
+            break
+    return bool(parts) or len(names) > MOST_FIELDS
 
 
 def _leaves(message: dict, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:

@@ -13,9 +13,24 @@ from typing import Any, Protocol
 import numpy as np
 import polars as pl
 
+MOST_FIELDS = 10_000  # of a message, in all its parts: an autopilot's state has some hundred
+
 
 class Undecodable(Exception):
     """Why a topic is left out; it never leaves this package."""
+
+
+class Fields:
+    """How many fields a schema has had so far: ten types of eight parts each make 8^10 of them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def more(self, count: int) -> None:
+        """Raises ValueError where that is more than a message has."""
+        self.count += count
+        if self.count > MOST_FIELDS:
+            raise ValueError(f"it has more than {MOST_FIELDS} fields")
 
 
 class Decoder(Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import polars as pl
@@ -10,7 +10,8 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from .messages import Messages, leaves_of
+from .messages import Fields, Messages, leaves_of
+from .protobuf_layout import FlatMessages, flat, repeated
 
 F = FieldDescriptor
 DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read
@@ -25,23 +26,35 @@ SCALAR_TYPES: dict[int, pl.DataType] = {
 }  # fmt: skip
 
 
-def messages(schema: Schema) -> Messages:
+class ProtobufMessages(Messages):
+    """Messages of a schema that can also be decoded many at once."""
+
+    def __init__(self, descriptor: Descriptor, parse: Callable[[bytes], Any]) -> None:
+        kind = _struct(descriptor, (descriptor.full_name,), Fields())
+        bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
+        super().__init__(kind, parse, _getter(), bulk)
+        self._descriptor = descriptor
+
+    def flat(self, leaves: Sequence[str]) -> FlatMessages | None:
+        """The decoder of these leaves alone, where they are numbers."""
+        return flat(self, self._descriptor, leaves)
+
+
+def messages(schema: Schema) -> ProtobufMessages:
     """The decoder of one schema; any exception says that its descriptors are broken."""
     parse = DecoderFactory().decoder_for("protobuf", schema)
     if parse is None:
         raise ValueError("no protobuf descriptors")
-    descriptor = parse(b"").DESCRIPTOR
-    kind = _struct(descriptor, (descriptor.full_name,))
-    bulk = [name for name, dtype in leaves_of(kind) if dtype == pl.Binary]
-    return Messages(kind, parse, _getter(), bulk)
+    return ProtobufMessages(parse(b"").DESCRIPTOR, parse)
 
 
-def _struct(kind: Descriptor, inside: tuple[str, ...]) -> pl.Struct:
-    types = {field.name: _dtype(field, inside) for field in kind.fields}
+def _struct(kind: Descriptor, inside: tuple[str, ...], met: Fields) -> pl.Struct:
+    met.more(len(kind.fields))
+    types = {field.name: _dtype(field, inside, met) for field in kind.fields}
     return pl.Struct({name: dtype for name, dtype in types.items() if dtype is not None})
 
 
-def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | None:
+def _dtype(field: FieldDescriptor, inside: tuple[str, ...], met: Fields) -> pl.DataType | None:
     """The type of a field; None for what holds nothing, or would contain itself."""
     single = SCALAR_TYPES.get(field.type)
     if single is None:
@@ -50,16 +63,10 @@ def _dtype(field: FieldDescriptor, inside: tuple[str, ...]) -> pl.DataType | Non
             return None
         if len(inside) > DEEPEST:
             return None
-        single = _struct(kind, (*inside, kind.full_name))
+        single = _struct(kind, (*inside, kind.full_name), met)
         if not single.fields:
             return None
-    return pl.List(single) if _repeated(field) else single
-
-
-def _repeated(field: FieldDescriptor) -> bool:
-    if hasattr(field, "is_repeated"):  # protobuf 6 and later; `label` is on its way out
-        return bool(field.is_repeated)
-    return getattr(field, "label", None) == F.LABEL_REPEATED
+    return pl.List(single) if repeated(field) else single
 
 
 def _getter() -> Callable[[Any, str], Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import polars as pl
@@ -16,10 +17,12 @@ import polars as pl
 from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding
 
-from . import faults, rerun_route, salvage, scan
+from . import dates, faults, preflight, rerun_route, salvage, scan
 from .container import Survey
 from .sample import sample
 from .tables import Tables, Tally
+
+HASHED_BYTES = 4 << 20  # bytes of a log that are read at a time for its hash
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +37,25 @@ class Topic:
     metadata: dict[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Contents:
     """What a log holds, without its messages."""
 
     path: Path
-    sha256: str
     size: int
     topics: dict[str, Topic]
     metadata: dict[str, dict[str, str]]  # metadata records by name, such as "voyage"
     library: str
     profile: str
+
+    @cached_property
+    def sha256(self) -> str:
+        """Of the bytes that were there when the log was opened; 0.6 s a gigabyte."""
+        digest = hashlib.sha256()
+        with self.path.open("rb") as stream:
+            for begin in range(0, self.size, HASHED_BYTES):
+                digest.update(stream.read(min(HASHED_BYTES, self.size - begin)))
+        return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,26 +87,32 @@ def contents(path: str | Path) -> Contents:
     return _contents(found, stated.channel_message_counts if stated else found.counts)
 
 
-def read(path: str | Path, wanted: Mapping[str, Collection[str]] | None = None) -> Reading:
+def read(
+    path: str | Path, wanted: Mapping[str, Collection[str]] | None = None, others: bool = False
+) -> Reading:
     """Everything that can be read of a log, and what cannot.
 
     wanted  topic -> field paths; None is every topic and every field but bytes. A path may index
             a list (`position_covariance[0]`) and step into JSON inside a text (`value.lon`).
+    others  the topics that are not in `wanted` are read as well, for their times alone
     """
     path = Path(path)
-    tables = Tables(scan.survey(path), wanted)
-    done: set[str] = set()
-    tally = None
-    quickly = rerun_route.worth_it(tables)
-    if quickly:
-        tally = rerun_route.preflight(tables.found)
-        if tally is not None:
-            done = rerun_route.read_most(tables, tally)
-    if tally is None or (left := tables.topics(tally) - done):
-        if quickly:  # the check has walked through it
-            tables.found = scan.survey(path)
-        tally = salvage.read_all(tables, None if tally is None else left)
-    frames = tables.finish()
+    tables = Tables(scan.survey(path), wanted, others)
+    tally = left = None
+    quick: set[str] = set()
+    if rerun_route.worth_it(tables):
+        sound = preflight.checked(tables)
+        if sound is None:  # not for Rerun: all of it, from the beginning
+            tables = Tables(scan.survey(path), wanted, others)
+        else:
+            tally, quick = sound
+            quick = quick | rerun_route.read_most(tables, tally, quick)
+            left = tables.topics(tally) - quick
+            if left:  # the check has walked through it
+                tables.found = scan.survey(path)
+    if tally is None or left:
+        tally = salvage.read_all(tables, left)
+    frames = tables.finish(first=quick)
     _refuse_nothing(tables, tally, frames)
     health = _health(tables, tally, frames)
     return Reading(_contents(tables.found, tally.counts), health, frames)
@@ -122,12 +139,9 @@ def _contents(found: Survey, counts: Mapping[int, int]) -> Contents:
         )
         known = topics.get(channel.topic)
         topics[channel.topic] = here if known is None else _merged(known, here)
-    with found.path.open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
     return Contents(
-        found.path, digest, found.size, topics, found.metadata,
-        found.header.library, found.header.profile,
-    )  # fmt: skip
+        found.path, found.size, topics, found.metadata, found.header.library, found.header.profile
+    )
 
 
 def _merged(one: Topic, other: Topic) -> Topic:
@@ -162,6 +176,8 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     for topic, frame in frames.items():
         findings += faults.repeats(topic, frame, tally.first or 0, again.get(topic, []))
     findings += faults.clocks(frames)
+    noted = {channel.topic: channel.metadata for channel in found.channels.values()}
+    findings += dates.impossible(frames, noted)
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,

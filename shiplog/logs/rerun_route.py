@@ -17,6 +17,7 @@ import subprocess
 import sys
 import threading
 from collections import Counter
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,7 @@ import polars as pl
 
 from shiplog import files
 
-from . import scan
-from .container import Index, Survey
+from . import reading_limits
 from .tables import Tables, Tally
 
 log = logging.getLogger(__name__)
@@ -45,41 +45,29 @@ class Mismatch(Exception):
     """Rerun gave another type than the schema states."""
 
 
-def preflight(found: Survey) -> Tally | None:
-    """Check every chunk of a log and count its messages; None when it is not for Rerun.
-
-    The counts are those of the message indexes, and must be those of the statistics.
-    """
-    tally = Tally()
-    for item in scan.walk(found):
-        if isinstance(item, Index):
-            tally.note(item.channel, item.times, known=item.channel in found.channels)
-    stated = found.statistics and found.statistics.channel_message_counts
-    counted = stated and {number: count for number, count in stated.items() if count}
-    damaged = found.losses or found.unvouched or tally.orphans
-    return tally if counted == tally.counts and not damaged else None
-
-
 def worth_it(tables: Tables) -> bool:
     """Whether a log says that it has enough wanted messages of the right kind, and not too many."""
     counts = tables.found.statistics.channel_message_counts if tables.found.statistics else {}
     least = LEAST_WARM if worker().runs else LEAST_MESSAGES
-    return least <= sum(counts[number] for number in _suitable(tables)) <= tables.room
+    return least <= sum(counts[number] for number in suitable(tables)) <= tables.room
 
 
-def read_most(tables: Tables, tally: Tally) -> set[str]:
-    """Fill the tables that Rerun gives whole, and name their topics."""
+def read_most(tables: Tables, tally: Tally, filled: Collection[str] = ()) -> set[str]:
+    """Fill the tables that Rerun gives whole, but for those already `filled`; name their topics."""
     asked: dict[str, list[str]] = {}
     expected: dict[str, int] = {}
-    for number, leaves in _suitable(tables).items():
-        if tally.counts.get(number):
-            topic = tables.found.channels[number].topic
+    for number, leaves in suitable(tables).items():
+        topic = tables.found.channels[number].topic
+        if tally.counts.get(number) and topic not in filled:
             asked[topic], expected[topic] = leaves, tally.counts[number]
     done: set[str] = set()
+    if not asked:
+        return done
     with files.temporary_folder() as folder:
         seconds = START_TIMEOUT_S + sum(expected.values()) / PACE
         request = {"log": str(tables.found.path.resolve()), "folder": str(folder), "topics": asked}
-        rows = worker().ask(request | {"seconds": seconds}, seconds).get("rows", [])
+        limits = {"seconds": seconds, "bytes": reading_limits.memory(tables.found.size)}
+        rows = worker().ask(request | limits, seconds).get("rows", [])
         for number, (topic, got) in enumerate(zip(asked, rows, strict=False)):
             if got == expected[topic] and _take(tables, topic, folder / f"{number}.arrow"):
                 done.add(topic)
@@ -88,7 +76,7 @@ def read_most(tables: Tables, tally: Tally) -> set[str]:
     return done
 
 
-def _suitable(tables: Tables) -> dict[int, list[str]]:
+def suitable(tables: Tables) -> dict[int, list[str]]:
     """Leaves to ask Rerun for, by channel: those with a schema, alone on their topic."""
     found = tables.found
     alone = Counter(channel.topic for channel in found.channels.values())
@@ -186,6 +174,11 @@ class Worker:
             log.info("Rerun: %s", reply["error"])
         return reply
 
+    def start(self) -> None:
+        """Begin to load Rerun, so that the first request need not wait for it."""
+        with self._lock, contextlib.suppress(OSError):
+            self._running()
+
     def stop(self) -> None:
         with self._lock:
             self._stop()
@@ -193,14 +186,20 @@ class Worker:
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None or not self.runs:
             self._stop()
-            self._process = subprocess.Popen(  # without its folder on the path: no name to clash
-                [sys.executable, "-P", str(WORKER)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                text=True,
-                encoding="utf-8",
-            )
+            alone = [
+                sys.executable,
+                "-P",
+                str(WORKER),
+            ]  # its folder not on the path: no name to clash
+            with reading_limits.lifted():
+                self._process = subprocess.Popen(
+                    alone,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    text=True,
+                    encoding="utf-8",
+                )
         return self._process
 
     def _stop(self) -> None:

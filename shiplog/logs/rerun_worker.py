@@ -1,9 +1,10 @@
 """The other end of `rerun_route`: Rerun's MCAP reader in a process of its own, one line a log.
 
 Rerun ends its whole process on some payloads and never returns from some damage, so nothing else
-lives here. A request is a line of JSON on stdin: the log, an empty folder, seconds to take, and the
-wanted fields of each topic. The answer is a line of JSON on stdout: the rows of each topic, whose
-columns then stand in the folder as `<number>.arrow`. The end of stdin ends the process.
+lives here. A request is a line of JSON on stdin: the log, an empty folder, seconds and bytes of
+memory to take, and the wanted fields of each topic. The answer is a line of JSON on stdout: the
+rows of each topic, whose columns then stand in the folder as `<number>.arrow`. The end of stdin
+ends the process.
 """
 
 from __future__ import annotations
@@ -70,12 +71,28 @@ def columns(batch: pa.RecordBatch, fields: Sequence[str]) -> pa.RecordBatch | No
     return pa.RecordBatch.from_pydict(made)
 
 
+def limit(memory: int) -> None:
+    """Bytes beyond what Rerun has reserved already, 2 GB on two cores."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    pages = int(Path("/proc/self/statm").read_text().split()[5])  # of data and stacks
+    most, hard = (
+        pages * resource.getpagesize() + memory,
+        resource.getrlimit(resource.RLIMIT_DATA)[1],
+    )
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+
 def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # whatever else prints must not stand between the answers
     for line in sys.stdin:
         asked = json.loads(line)
         faulthandler.dump_traceback_later(asked["seconds"], exit=True)  # also when nobody waits
+        limit(asked["bytes"])
         try:
             reply = {"rows": extract(asked["log"], Path(asked["folder"]), asked["topics"])}
         except Exception as error:

@@ -10,7 +10,7 @@ from mcap.records import Schema
 from mcap_ros2._dynamic import TimeDefinition, _for_each_msgdef
 from mcap_ros2.decoder import DecoderFactory
 
-from .messages import Messages
+from .messages import Fields, Messages
 
 SCALAR_TYPES: dict[str, pl.DataType] = {
     "bool": pl.Boolean(), "byte": pl.UInt8(), "char": pl.UInt8(),  # `char` is unsigned in ROS 2
@@ -23,12 +23,13 @@ BYTES = ("byte", "char", "uint8")
 
 def messages(schema: Schema) -> Messages:
     """The decoder of one schema; any exception says that its definition is broken."""
+    kinds = _Kinds(schema)
+    kind = kinds.struct(kinds.root)  # first: the package follows parts of parts without end
     with contextlib.redirect_stderr(io.StringIO()):  # it prints what it is about to raise
         parse = DecoderFactory().decoder_for("cdr", schema)
     if parse is None:
         raise ValueError("no ros2msg definition")
-    kinds = _Kinds(schema)
-    return Messages(kinds.struct(kinds.root), parse, getattr, kinds.bulk)
+    return Messages(kind, parse, getattr, kinds.bulk)
 
 
 class _Kinds:
@@ -40,6 +41,7 @@ class _Kinds:
             f"builtin_interfaces/{kind}": TimeDefinition.fields for kind in ("Time", "Duration")
         }
         self.bulk: list[str] = []
+        self._met = Fields()
 
         def keep(name, short, definition):
             self._fields[short] = definition.fields
@@ -50,6 +52,7 @@ class _Kinds:
 
     def struct(self, kind: str, prefix: str = "") -> pl.Struct:
         types: dict[str, pl.DataType] = {}
+        self._met.more(len(self._fields[kind]))
         for field in self._fields[kind]:
             one = field.type
             if one.is_primitive_type():

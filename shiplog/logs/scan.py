@@ -37,6 +37,7 @@ from .container import (
     read_at,
     read_summary,
 )  # fmt: skip
+from .read_ahead import ReadAhead
 from .records import HEAD, MESSAGE, parsed
 from .refusals import MAGIC, check_file, refusal
 
@@ -82,7 +83,7 @@ def _first_sound(stream: IO[bytes], found: Survey) -> int | None:
     """Where the first thing that can be read stands in a file without a log's magic."""
     found.end = found.size
     try:
-        return _Walk(stream, found).next_sound(0)
+        return _Walk(stream, found, ReadAhead(stream, found.path, {})).next_sound(0)
     except _Enough:
         return None
 
@@ -148,8 +149,8 @@ def _noted(found: Survey, batch: Iterable[McapRecord], belief: int, section: int
 
 def walk(found: Survey) -> Iterator[Item]:
     """All that is sound, in file order; `found` is brought up to date on the way."""
-    with found.path.open("rb") as stream:
-        yield from _Walk(stream, found).items()
+    with found.path.open("rb") as stream, ReadAhead(stream, found.path, found.indexed) as ahead:
+        yield from _Walk(stream, found, ahead).items()
 
 
 class _Enough(Exception):
@@ -157,12 +158,11 @@ class _Enough(Exception):
 
 
 class _Walk:
-    def __init__(self, stream: IO[bytes], found: Survey) -> None:
-        self.stream, self.found = stream, found
+    def __init__(self, stream: IO[bytes], found: Survey, ahead: ReadAhead) -> None:
+        self.stream, self.found, self.ahead = stream, found, ahead
         self.anchor = found.begin  # what stands before has been handed on, or its loss is known
-        self.section, self.closed, self.begun = 0, False, False
+        self.section, self.closed, self.begun, self.chunked = 0, False, False, False
         self.past_data = False  # behind a DATA_END: what is broken there is no message
-        self.chunked = False
         self.visited: set[int] = set()
         self.starts = sorted(found.indexed)
         self.low: int | None = None  # ns, log times of the messages so far
@@ -277,7 +277,7 @@ class _Walk:
         start = read_at(self.stream, position + HEAD.size, most)
         if chunks.stated(start[: max(length, 0)], length) is None:
             return Loss("crc", position, "states a size that cannot be", chunk=True)
-        packed = chunks.chunk(self._body(position, length))
+        packed = chunks.chunk(self.ahead.body(position, length))
         if packed is None:
             return Loss("crc", position, "ends in the middle of its data", chunk=True)
         if packed.uncompressed_size <= chunks.MOST_IN_A_CHUNK:  # else it is not unpacked
@@ -285,7 +285,7 @@ class _Walk:
         if self.work < 0:
             raise _Enough
         try:
-            opened = chunks.opened(packed)
+            opened = self.ahead.opened(position, packed)
         except ValueError as error:
             return lost(position, str(error), packed)
         begin = chunks.FIXED_BYTES + len(packed.compression.encode())

@@ -21,6 +21,12 @@ LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
 
 log = logging.getLogger(__name__)
 
+
+def room(found: Survey) -> int:
+    """Rows that a log of this size can have."""
+    return LEAST_ROWS + int(ROWS_PER_BYTE * found.size)
+
+
 TIME_COLUMNS = ("log_time", "publish_time", "stamp")
 
 
@@ -74,27 +80,42 @@ class Tally:
         order.largest = max(order.largest, -int(steps.min()))
         order.last = int(times[-1])
 
+    def add(self, channel: int, count: int, known: bool) -> None:
+        """Count messages of which nothing else is known."""
+        if known:
+            self.counts[channel] = self.counts.get(channel, 0) + count
+        else:
+            self.orphans += count
+
 
 class Tables:
     """What is wanted of a log, how its topics are decoded, and the rows that there are."""
 
-    def __init__(self, found: Survey, wanted: Mapping[str, Collection[str]] | None) -> None:
-        self.found, self.wanted = found, wanted
+    def __init__(
+        self, found: Survey, wanted: Mapping[str, Collection[str]] | None, others: bool = False
+    ) -> None:
+        """wanted, others   as `read` has them"""
+        self.found, self.wanted, self.others = found, wanted, others
         self.failed: dict[str, int] = {}  # messages by topic whose payload did not decode
         self.too_large: dict[str, int] = {}  # messages by topic that were not kept
         self.too_many: dict[str, int] = {}  # likewise, for being more than a log of this size holds
-        self.room = LEAST_ROWS + int(ROWS_PER_BYTE * found.size)  # rows
+        self.room = room(found)  # rows that may still come
         self.undecodable: dict[str, str] = {}
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}
         self._shared: dict[tuple, Decoder | Undecodable] = {}
 
-    def finish(self) -> dict[str, pl.DataFrame]:
-        return {topic: t.finish() for topic, t in self._tables.items() if t.parts}
+    def finish(self, first: Collection[str] = ()) -> dict[str, pl.DataFrame]:
+        """The tables by topic; those in `first` before the others, in the order of the log's
+        channels, whichever reader was the first to end."""
+        named = [channel.topic for channel in self.found.channels.values()]
+        order = dict.fromkeys([*(topic for topic in named if topic in first), *self._tables])
+        tables = {topic: self._tables[topic] for topic in order if topic in self._tables}
+        return {topic: table.finish() for topic, table in tables.items() if table.parts}
 
     def decoder(self, channel: Channel) -> Decoder | None:
         """The decoder of a wanted topic; None for what is not wanted or cannot be decoded."""
-        if self.wanted is not None and channel.topic not in self.wanted:
+        if self.wanted is not None and not self.others and channel.topic not in self.wanted:
             return None
         if channel.id not in self._decoders:
             schema = self.found.schemas.get(channel.schema_id)
@@ -121,7 +142,7 @@ class Tables:
             return None
         if self.wanted is None:
             return [leaf for leaf in reader.layout if leaf not in reader.bulk]
-        asked = (*self.wanted[topic], *stamp_leaves(reader.layout))
+        asked = (*self.wanted.get(topic, ()), *stamp_leaves(reader.layout))
         found = [locate(path, reader.layout) for path in asked]
         return list(dict.fromkeys(at[0] for at in found if at))
 
@@ -140,7 +161,7 @@ class Tables:
             table.parts.append(pl.DataFrame(columns))
             return
         expressions = []
-        for path in self.wanted[topic]:
+        for path in self.wanted.get(topic, ()):
             at = locate(path, frame.schema)
             if at is not None and path not in TIME_COLUMNS:
                 expressions.append(value(*at, frame.schema[at[0]]).alias(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -79,7 +80,7 @@ def read(path: Path, of: str) -> tuple[dict[str, Any], str]:
             f"{path} cannot be read: {error.strerror}.",
             hint=f"give --parameters the path of a TOML of {of} coefficients.",
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # also of a number of thousands of digits
         raise ProfileError(f"{path} is not valid TOML: {error}.", hint="mend that line.") from error
     return content, str(content.pop("source", path.name))
 
@@ -118,7 +119,7 @@ def parameters(
             hint=f"add them{off if parts else ''}.",
         )
     entries = tuple(wanted.values())
-    array = np.array(values, dtype=float)
+    array = np.array([_number(value) for value in values])
     for (name, entry), value in zip(wanted.items(), array, strict=True):
         if not entry.low <= value <= entry.high:
             raise ProfileError(
@@ -131,3 +132,10 @@ def parameters(
     )
     low, high = (np.array([getattr(e, side) for e in entries]) for side in ("low", "high"))
     return Parameters(tuple(wanted), array, spread, low, high, source, entries)
+
+
+def _number(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return math.inf

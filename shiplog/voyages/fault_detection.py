@@ -37,12 +37,20 @@ def spikes(value: np.ndarray, sigma: float) -> np.ndarray:
     """
     if len(value) < 5:
         return np.zeros(len(value), bool)
-    around = np.lib.stride_tricks.sliding_window_view(value, 5, axis=0)
     off = np.zeros(len(value))
-    off[2:-2] = np.linalg.norm(value[2:-2] - np.median(around, axis=-1), axis=1)
+    off[2:-2] = np.linalg.norm(value[2:-2] - _medians_of_five(value), axis=1)
     typical = 1.4826 * float(np.median(off[2:-2]))
     step = float(np.median(np.linalg.norm(np.diff(value, axis=0), axis=1)))  # of a free-run motion
     return off > max(10.0 * typical, 10.0 * sigma, 5.0 * step, 1e-9)
+
+
+def _medians_of_five(value: np.ndarray) -> np.ndarray:
+    """Of each value [n, k] and the two before and after it [n - 4, k]: by comparisons alone, a
+    tenth of the time and memory of sorting."""
+    a, b, c, d, e = (value[i : len(value) - 4 + i] for i in range(5))
+    lower = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    upper = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.maximum(np.minimum(e, lower), np.minimum(np.maximum(e, lower), upper))
 
 
 def repeats(value: np.ndarray) -> list[tuple[int, int]]:

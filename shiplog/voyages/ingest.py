@@ -18,20 +18,10 @@ from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import fault_detection, resampling, sensor_consistency
+from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
-
-CLOCK_COLUMNS = {  # of a source: its column, and the one that it is held against
-    "message": ("stamp", "log_time"), "log": ("log_time", "publish_time"),
-    "publish": ("publish_time", "log_time"),
-}  # fmt: skip
-
-CLOCK_NAMES = {
-    "stamp": "the messages' own stamps", "log_time": "the recorder's clock",
-    "publish_time": "the publisher's clock",
-}  # fmt: skip
 
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has
     "position": channels.X0, "velocity": channels.SURGE, "heading": channels.HEADING,
@@ -65,8 +55,49 @@ def ingest(path, profile: Profile) -> Voyage:
 
 def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
+    aligned = _aligned(reading, profile)
+    table, grid = aligned.table, aligned.grid
+    estimates = tuple(sensor_consistency.estimates(table, profile))
+    consistency = sensor_consistency.findings(estimates, table.height, profile)
+    named = table.lazy().with_columns(voyage=pl.lit(""))
+    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    report = VoyageReport(
+        name=reading.contents.path.stem,
+        messages_read=reading.health.messages_read,
+        messages_lost=reading.health.messages_lost,
+        rows=table.height,
+        seconds=round(grid.seconds, 3),
+        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
+        usable_s=usable_s,
+        windows=windows,
+        instruments=tuple(_instrument(*one) for one in aligned.samples),
+    )
+    return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
+
+
+def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
+    """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
+    table = _aligned(reading, profile).table
+    return sensor_consistency.findings(
+        sensor_consistency.estimates(table, profile), table.height, profile
+    )
+
+
+@dataclass(frozen=True)
+class _Aligned:
+    """A log on its 10 Hz grid, reduced to midship and marked."""
+
+    table: pl.DataFrame  # as a Voyage has it
+    grid: VoyageGrid
+    samples: list[tuple[str, resampling.Samples]]  # of each sensor and actuator
+    left_out: list[Finding]
+    datum: tuple[float, float] | None
+
+
+def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
-    reading, left_out = _without_strays(reading, profile)
+    reading, left_out = clocks.without_strays(reading, profile)
+    reading, moved = clocks.on_one_date(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -76,7 +107,9 @@ def build(reading: Reading, profile: Profile) -> Voyage:
             hint="check the topic and the `clock` in the profile; `shiplog check` lists topics.",
         )
     driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
-    start, end = _span(base, [*sampled.values(), *driven.values()])
+    every = {**sampled, **driven}
+    start, end = _span(base, list(every.values()))
+    moved += clocks.no_common_time(every, start, end)
     if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
@@ -102,22 +135,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    estimates = tuple(sensor_consistency.estimates(table, profile))
-    consistency = sensor_consistency.findings(estimates, table.height, profile)
-    named = table.lazy().with_columns(voyage=pl.lit(""))
-    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
-    report = VoyageReport(
-        name=reading.contents.path.stem,
-        messages_read=reading.health.messages_read,
-        messages_lost=reading.health.messages_lost,
-        rows=table.height,
-        seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *left_out, *grid.findings, *consistency),
-        usable_s=usable_s,
-        windows=windows,
-        instruments=tuple(_instrument(*one) for one in [*sampled.items(), *driven.items()]),
-    )
-    return Voyage(report.name, profile, reading.contents, table, report, datum, estimates)
+    return _Aligned(table, grid, [*every.items()], [*left_out, *moved], datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -168,44 +186,12 @@ def _require(reading: Reading, profile: Profile) -> None:
                 )
 
 
-def _clock(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
-    """The column that says when a source measured, and the one to hold it against."""
-    if source.clock == "message" and frame["stamp"].null_count() == frame.height:
-        return CLOCK_COLUMNS["log"]  # the message carries no time: the recorder's is all there is
-    return CLOCK_COLUMNS[source.clock]
-
-
-def _without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
-    """The log without the messages whose stamps cannot be of this voyage, and what they are."""
-    frames, findings = dict(reading.frames), []
-    for source in (*(s for _, s in profile.sensors.items()), *profile.actuators):
-        frame = frames.get(source.topic)
-        if frame is None or frame.height == 0:
-            continue
-        clock, other = _clock(frame, source)
-        known = frame.filter(pl.col(clock).is_not_null())
-        times = known[clock].to_numpy()
-        stray = resampling.strays(times, known[other].to_numpy())
-        if not stray.any():
-            continue
-        frames[source.topic] = known.filter(~stray)
-        off = np.median(times[~stray]) - times[stray].astype(float)
-        far = float(np.abs(off).max()) * 1e-9
-        how = f"{far / resampling.DAY_S:.3g} days" if far > resampling.DAY_S else f"{far:.0f} s"
-        sentence = (
-            f"{stray.sum()} of {len(times)} messages on {source.topic} are left out: their times "
-            f"cannot be of this voyage, being up to {how} away by {CLOCK_NAMES[clock]}."
-        )
-        findings.append(Finding("jump", source.topic, sentence, value=round(far, 3), unit="s"))
-    return replace(reading, frames=frames), findings
-
-
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     """Time [n] ns by the source's clock and SI values [n, k]."""
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
-    times = frame[_clock(frame, source)[0]]
+    times = frame[clocks.of(frame, source)[0]]
     values = [
         (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)

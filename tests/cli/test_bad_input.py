@@ -9,8 +9,11 @@ import os
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from command_desk import TABLE, Desk, judge
+import sailing
+from command_desk import PROFILE, TABLE, Desk, judge
+from mcap.reader import make_reader
 
 from shiplog import cli
 
@@ -18,6 +21,48 @@ from shiplog import cli
 def halves(desk: Desk) -> bytes:
     raw = desk.log.read_bytes()
     return raw[: len(raw) // 2]
+
+
+def flipped(desk: Desk, place: str) -> Path:
+    """A log of two chunks with one byte changed in the first, or in the index behind it."""
+    path = sailing.write(desk.path("a.mcap"), sailing.series(600.0))
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary and len(summary.chunk_indexes) > 1
+    first = min(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
+    end = first.chunk_start_offset + first.chunk_length
+    raw = bytearray(path.read_bytes())
+    raw[end - first.compressed_size // 2 if place == "chunk" else end + 40] ^= 0xFF
+    return desk.file("a.mcap", bytes(raw))
+
+
+def short(desk: Desk, seconds: float) -> Path:
+    return sailing.write(desk.path("short.mcap"), sailing.series(seconds))
+
+
+def without(desk: Desk, value: float) -> Path:
+    """The good voyage whose velocity is `value` all along."""
+    parts = sailing.series(30.0)
+    parts["/velocity"].columns["sog_kn"][:] = value
+    return sailing.write(desk.path("empty.mcap"), parts)
+
+
+def two_ships(desk: Desk) -> Path:
+    """A store in which a second ship has a voyage of the first one's name scheme."""
+    store = desk.path("both")
+    for log, name in ((desk.log, "circle"), (desk.log.with_name("two.mcap"), "square")):
+        profile = desk.profile('name = "circle"', f'name = "{name}"')
+        assert cli.run([str(a) for a in (
+            "ingest", log, "--profile", profile, "--store", store)]) == 0  # fmt: skip
+    return store
+
+
+def undriven(desk: Desk) -> Path:
+    """A store whose profile has no actuator."""
+    profile = desk.file("p.toml", PROFILE[: PROFILE.index("[[actuators]]")])
+    arguments = ("ingest", desk.log, "--profile", profile, "--store", desk.path("drift"))
+    assert cli.run([str(a) for a in arguments]) == 0
+    return desk.path("drift")
 
 
 LOGS = {
@@ -37,6 +82,19 @@ LOGS = {
     "cut in half": (3, ["cut off"], lambda d: d.ingest(
         d.file("a.mcap", halves(d)), "--profile", d.profile())),
     "check: cut in half": (3, ["cut off"], lambda d: ["check", d.file("a.mcap", halves(d))]),
+    "a byte in a chunk": (3, ["before the first message that can be read are lost"],
+        lambda d: d.ingest(flipped(d, "chunk"), "--profile", d.profile())),
+    "check: a byte in a chunk": (3, ["lost"], lambda d: ["check", flipped(d, "chunk")]),
+    "a byte in an index": (0, ["36000 messages read, 0 lost"], lambda d: d.ingest(
+        flipped(d, "index"), "--profile", d.profile())),
+    "one sample": (1, ["usable heading sample(s)"], lambda d: d.ingest(
+        short(d, 0.1), "--profile", d.profile())),
+    "one second": (0, ["of which 1 s can be used"], lambda d: d.ingest(
+        short(d, 1.0), "--profile", d.profile())),
+    "a velocity of NaN": (0, ["velocity is blank", "of which 0 s can be used"],
+        lambda d: d.ingest(without(d, np.nan), "--profile", d.profile())),
+    "a velocity of inf": (0, ["velocity is blank", "of which 0 s can be used"],
+        lambda d: d.ingest(without(d, np.inf), "--profile", d.profile())),
     "profile: text": (1, ["is no MCAP log"], lambda d: ["profile", d.file("a.mcap", "hello you")]),
     "profile: a folder": (1, ["holds no table"], lambda d: ["profile", d.dir("logs")]),
     "an empty folder": (1, ["is a folder without MCAP logs"], lambda d: d.ingest(d.dir("logs"))),
@@ -74,6 +132,8 @@ PROFILES = {
     "20 000 brackets": (1, ["not valid TOML"], lambda d: d.through(
         "[ship]", f"x = {'[' * 20_000}{']' * 20_000}\n[ship]")),
     "unknown key": (1, ["did you mean 'length_m'"], lambda d: d.through("length_m", "lenght_m")),
+    "no position": (1, ["sensors.position is missing"],
+                    lambda d: d.through("[sensors.position]", "[sensors.positn]")),
     "unknown section": (1, ["did you mean 'sensors'"],
                         lambda d: d.through("[sensors.wind]", "[sensor.wind]")),
     "no heading": (1, ["sensors.heading is missing"],
@@ -90,7 +150,7 @@ PROFILES = {
     "unknown field": (1, ["did you mean 'heading_deg'"],
                       lambda d: d.through('"heading_deg"', '"heading_dge"')),
     "unknown topic": (1, ["has no topic"], lambda d: d.through('"/rudder"', '"../../etc/passwd"')),
-    "negative length": (1, ["greater than 0"],
+    "negative length": (1, ["ship.length_m has to be greater than or equal to 0.1"],
         lambda d: d.through("length_m = 3.0", "length_m = -3")),
     "length inf": (1, ["finite"], lambda d: d.through("length_m = 3.0", "length_m = inf")),
     "length in words": (1, ["ship.length_m"], lambda d: d.through("= 3.0", "= 'three'")),
@@ -101,8 +161,8 @@ PROFILES = {
                            lambda d: d.through("= [0.7, -0.2]", "= [1e4, 0.0]")),
     "sign 0": (1, ["`sign` is 0"], lambda d: d.through(
         'field = "heading_deg"', 'sign = 0.0\nfield = "heading_deg"')),
-    "scale 1e308": (1, ["sensors.heading.sign"], lambda d: d.through(
-        'field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
+    "scale 1e308": (1, ["sensors.heading: `sign` is -1e+308", "between 1e-12 and 1e+06"],
+        lambda d: d.through('field = "heading_deg"', 'sign = -1e308\nfield = "heading_deg"')),
     "offset 1e308": (1, ["sensors.heading.offset"], lambda d: d.through(
         'field = "heading_deg"', 'offset = 1e308\nfield = "heading_deg"')),
     "water of 1 kg/m³, 3 m above ground": (1, ["site.density", "site.depth_m", "site.datum.0"],
@@ -171,12 +231,26 @@ OPTIONS = {
     "one voyage for both": (1, ["also a validation voyage"], lambda d: d.train(
         "--voyages", "one", "--validation", "one", "--window", "20")),
     "a window longer than the voyages": (1, ["--window"], lambda d: d.train("--window", "900")),
+    "one voyage, too short to be split": (1, ["the only voyage", "choose --window 9 or shorter"],
+        lambda d: d.train("--voyages", "one", "--window", "40")),
+    "a profile without actuators": (1, ["actuator"], lambda d: [
+        "train", "--store", undriven(d), "--out", d.path("run")]),
+    "two ships": (1, ["different ships"], lambda d: ["train", "--store", two_ships(d), "--out",
+        d.path("run")]),
 }  # fmt: skip
 FOLDERS = {
     "ingest: the store is a file": (1, ["is a file"], lambda d: [
         "ingest", d.log, "--profile", d.profile(), "--store", d.file("s")]),
     "ingest: the store in a file": (1, ["is a file"], lambda d: [
         "ingest", d.log, "--profile", d.profile(), "--store", d.file("s") / "store"]),
+    "ingest: the store cannot be made": (1, ["/proc/shiplog"], lambda d: [
+        "ingest", d.log, "--profile", d.profile(), "--store", "/proc/shiplog"]),
+    "train: --out cannot be made": (1, ["/proc/"], lambda d: [
+        "train", "--store", d.store, "--out", "/proc/shiplog", "--window", "5"]),
+    "convert: --out cannot be made": (1, ["/proc/shiplog"], lambda d: [
+        "convert", d.table(), "--profile", "kvlcc2", "--out", "/proc/shiplog"]),
+    "--json cannot be written": (1, ["/proc/a.json"], lambda d: [
+        "voyages", "--store", d.store, "--json", "/proc/a.json"]),
     "voyages: the store is a file": (1, ["is a file"],
         lambda d: ["voyages", "--store", d.file("s")]),
     "voyages: no store": (1, ["no store"], lambda d: ["voyages", "--store", d.path("s")]),

@@ -81,6 +81,14 @@ class Desk:
         known[1:].write_parquet(copy / "seed0" / "identified.parquet")
         return copy
 
+    def another_ship(self) -> Path:
+        """A run of a ship with an actuator of another name."""
+        copy = self.spoilt("nothing")[1]
+        text = (copy / "profile.json").read_text()
+        assert "rudder_port" in text
+        (copy / "profile.json").write_text(text.replace("rudder_port", "rudder_left"))
+        return copy
+
     def on(self, command: str, *runs, store: str = "store", voyages: str = "trip_3") -> list:
         return [command, *(r if isinstance(r, Path) else self.sea / r for r in runs),
                 "--store", self.sea / store, "--voyages", voyages]  # fmt: skip
@@ -136,6 +144,8 @@ CASES = {
         "evaluate", "mmg", store="other", voyages="circle")),
     "diagnose: another ship": (["the voyages are of 'circle'"], lambda d: [
         *d.on("diagnose", "mmg", store="other", voyages="circle"), "--out", d.path("out")]),
+    "compare: two ships": (["mmg is of a ship with rudder_port", "rudder_left"], lambda d: d.on(
+        "compare", "mmg", d.another_ship())),
     "compare: two windows": (["windows of 20 s, short of 15 s"], lambda d: d.on(
         "compare", "mmg", "short")),
     "compare: --save in no folder": (["there is no folder"], lambda d: [
@@ -242,6 +252,10 @@ def rows():
 @pytest.mark.parametrize(("words", "arguments"), list(rows()))
 def test_it_is_one_sentence_and_exit_code_1(desk, capsys, words, arguments):
     judge(arguments(desk), 1, words, capsys)
+
+
+def test_scores_that_are_gone_are_made_again(desk, capsys):
+    judge(desk.spoilt("errors.parquet"), 0, ["Per voyage, spoilt"], capsys)
 
 
 def test_a_catalogue_of_rubbish_is_made_again(desk, capsys):

@@ -158,6 +158,13 @@ def test_every_command_has_help_with_an_example(command):
     assert code == 0 and f"Example: shiplog {command}" in " ".join(reported.split())
 
 
+def test_versions_and_the_short_word_for_help():
+    code, reported, _ = call("--version")
+    assert code == 0 and reported.startswith("shiplog 0.") and "Rerun 0." in reported
+    for command in ((), ("check",)):
+        assert call(*command, "-h")[:2] == call(*command, "--help")[:2]
+
+
 def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"not an mcap file at all")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from made_logs import protobuf_log
 
-from shiplog.logs import rerun_route
+from shiplog.logs import preflight, rerun_route
 
 
 @pytest.fixture(scope="module")
@@ -29,4 +29,5 @@ def by_rerun(monkeypatch):
     monkeypatch.setattr(rerun_route, "LEAST_MESSAGES", 0)
     monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
     monkeypatch.setattr(rerun_route, "read_most", watched)
+    monkeypatch.setattr(preflight, "candidates", lambda tables: [])  # none is decoded before
     return given

@@ -183,15 +183,20 @@ def kinds(found) -> list[str]:
     return sorted({finding.kind for finding in found.health.findings})
 
 
-def by_hand(path: Path, wanted=None):
+def known_colours(path: Path, **options) -> Path:
+    """A log that Rerun can read: no enum number beyond the schema."""
+    return protobuf_log(path, make=lambda k: sample(k, newest=3), **options)
+
+
+def by_hand(path: Path, wanted=None, others=False):
     """The same through the packages, whatever Rerun could do."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rerun_route, "worth_it", lambda tables: False)
-        return read(path, wanted)
+        return read(path, wanted, others)
 
 
-def assert_same(path: Path, wanted=None):
-    one, other = read(path, wanted), by_hand(path, wanted)
+def assert_same(path: Path, wanted=None, others=False):
+    one, other = read(path, wanted, others), by_hand(path, wanted, others)
     assert (one.contents, one.health) == (other.contents, other.health)
     assert one.frames.keys() == other.frames.keys()
     for topic, frame in one.frames.items():

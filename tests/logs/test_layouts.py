@@ -8,8 +8,20 @@ import json
 
 import numpy as np
 import polars as pl
-from circle_layouts import COMMON, RATE, SPEED, Voyage, converted, direct, iso, profile_of, same
+from circle_layouts import (
+    COMMON,
+    DATUM,
+    RATE,
+    SPEED,
+    Voyage,
+    converted,
+    direct,
+    iso,
+    profile_of,
+    same,
+)
 
+from shiplog import profile_file as profiles
 from shiplog.logs.read import contents
 
 
@@ -67,26 +79,68 @@ n = { channel = "propeller", unit = "rps" }
     same(path, profile, direct(tmp_path, profile, v), relative_time=True)
 
 
+PX4 = """[ship]
+name = "circle"
+length_m = 20.0
+[table]
+timestamp = { channel = "time", unit = "us" }
+[sensors.position]
+kind = "geodetic"
+topic = "/log_7_vehicle_gps_position_0"
+fields = ["latitude_deg", "longitude_deg"]
+unit = "deg"
+[sensors.velocity]
+kind = "ned"
+topic = "/log_7_vehicle_gps_position_0"
+fields = ["vel_n_m_s", "vel_e_m_s"]
+unit = "m/s"
+[sensors.heading]
+topic = "/log_7_vehicle_local_position_0"
+field = "heading"
+unit = "rad"
+[sensors.yaw_rate]
+topic = "/log_7_vehicle_angular_velocity_0"
+field = "xyz_2_"
+unit = "rad/s"
+[[actuators]]
+name = "rudder"
+kind = "rudder"
+topic = "/log_7_actuator_outputs_0"
+field = "output_0_"
+unit = "deg"
+offset = 1500.0
+sign = 0.1
+"""
+
+
 def test_7_csv_a_topic_of_an_autopilot(tmp_path):
-    """One CSV a topic with Unix microseconds: flight logs of PX4 and ArduPilot boats (ulog2csv)."""
+    """One CSV a topic, microseconds since the start of the autopilot, servo pulses: what ulog2csv
+    makes of the logs of PX4 boats."""
     v = Voyage()
     folder = tmp_path / "flight"
     folder.mkdir()
-    us = [ns // 1000 for ns in v.ns.tolist()]
+    us = [112_574_307 + ns // 1000 for ns in (v.ns - v.ns[0]).tolist()]
     north, east = v.velocity
+    none, pulses = np.zeros(len(v.t)), 1500.0 + 10.0 * v.rudder
+    heading = np.arctan2(np.sin(v.heading), np.cos(v.heading))
     tables = {
-        "gnss__fix": {"timestamp": us, "latitude": v.latitude, "longitude": v.longitude},
-        "gnss__ned": {"timestamp": us, "north": north, "east": east},
-        "gyro": {"timestamp": us, "heading_deg": v.heading_deg,
-                 "yaw_rate_degps": np.full(len(v.t), np.degrees(RATE))},
-        "rudder__main": {"timestamp": us, "angle_deg": v.rudder},
-        "propeller__shaft_1": {"timestamp": us[::2], "speed_rps": v.rps[::2]},
+        "vehicle_gps_position": {
+            "time_utc_usec": v.ns // 1000, "latitude_deg": v.latitude,
+            "longitude_deg": v.longitude, "vel_n_m_s": north, "vel_e_m_s": east,
+        },
+        "vehicle_local_position": {"x": v.north, "y": v.east, "heading": heading},
+        "vehicle_angular_velocity": {
+            "xyz[0]": none, "xyz[1]": none, "xyz[2]": np.full(len(v.t), RATE),
+        },
+        "actuator_outputs": {"noutputs": none + 2, "output[0]": pulses, "output[1]": none},
     }  # fmt: skip
     for name, columns in tables.items():
-        pl.DataFrame(columns).write_csv(folder / f"{name}.csv")
-    (path,) = converted(tmp_path, folder, None)
-    profile = profile_of("position", "ned", "heading", "yaw_rate", "rudder", "propeller")
-    same(path, profile, direct(tmp_path, profile, v))
+        frame = pl.DataFrame({"timestamp": us, **columns})
+        frame.write_csv(folder / f"log_7_{name}_0.csv")
+    profile = profiles.parse(PX4 + DATUM, "px4")
+    (path,) = converted(tmp_path, folder, profile)
+    known = direct(tmp_path, profile_of("position", "ned", "heading", "yaw_rate", "rudder"), v)
+    same(path, profile, known, relative_time=True)
 
 
 def test_8_ais_table_with_mmsi(tmp_path):

@@ -69,13 +69,13 @@ def nmea_known(folder: Path, profile, v: Voyage) -> pl.DataFrame:
 
 
 def test_3_nmea_of_a_multiplexer_with_receive_stamps(tmp_path):
-    """Unix milliseconds before each line, as Signal K's and other multiplexers' loggers write.
+    """Unix milliseconds and N before each sentence: the log of a Signal K server.
 
     Its clock is 2 s late against GNSS; headings keep step with positions all the same.
     """
     v = Voyage()
     lines = [
-        f"{round((v.unix[i] + 2.0) * 1000)};N0183;{line}"
+        f"{round((v.unix[i] + 2.0) * 1000)};N;{line}"
         for i in range(len(v.t)) for line in nmea(v, i)
     ]  # fmt: skip
     (tmp_path / "mux.log").write_text("\n".join(lines) + "\n")

@@ -7,12 +7,28 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from made_logs import COUNT, DESCRIPTORS, SECOND, START, Kind, by_the_package, protobuf_log
+from made_logs import (
+    COUNT,
+    DESCRIPTORS,
+    SECOND,
+    START,
+    Kind,
+    assert_same,
+    by_hand,
+    by_the_package,
+    chunks,
+    known_colours,
+    protobuf_log,
+    sample,
+)
 from mcap.writer import CompressionType, IndexType, Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.exceptions import LogUnreadable
+from shiplog.logs import chunks as chunks_module
+from shiplog.logs import preflight, read_ahead, rerun_route, scan
 from shiplog.logs.check import check
+from shiplog.logs.container import Index, Sound
 from shiplog.logs.read import contents, fields, read
 
 
@@ -223,3 +239,137 @@ def test_repeats_and_clocks_are_found(tmp_path):
     (gap,) = [f for f in report.findings if f.kind == "gap"]
     assert (gap.start_s, gap.end_s) == (pytest.approx(3.8), pytest.approx(6.0))
     assert report.messages_read == 191
+
+
+@pytest.fixture
+def on_the_walk(monkeypatch):
+    """Every log is checked first, however small; says which topics were decoded meanwhile."""
+    given: list[str] = []
+    whole = preflight.checked
+
+    def watched(tables):
+        sound = whole(tables)
+        given.extend(sound[1] if sound else ())
+        return sound
+
+    monkeypatch.setattr(rerun_route, "LEAST_MESSAGES", 0)
+    monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
+    monkeypatch.setattr(preflight, "checked", watched)
+    return given
+
+
+NUMBERS = ("value", "small", "signed", "point.x", "maybe", "timestamp.nanos")
+
+
+@pytest.mark.parametrize("jitter", [0, 10], ids=["in order", "out of order"])
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_numbers_and_large_messages_are_decoded_on_the_walk(
+    tmp_path, on_the_walk, jitter, compression
+):
+    """/a by Rerun, which also gives texts, /b as pictures, /c as numbers; in the log's order."""
+
+    def make(k: int):
+        message = sample(k, newest=3)
+        message.raw = bytes([k % 256]) * (9000 if k % 3 == 1 else 1)
+        return message
+
+    path = protobuf_log(
+        tmp_path / "log.mcap", count=900, make=make, compression=compression,
+        times=lambda k: START + k // 3 * SECOND + (9 * SECOND if jitter and k % jitter == 0 else 0),
+    )  # fmt: skip
+    wanted = {"/a": ("value", "names"), "/b": ("value", "names"), "/c": NUMBERS}
+    found = assert_same(path, wanted)
+    assert sorted(on_the_walk) == ["/b", "/c"]
+    assert list(found.frames) == ["/a", "/b", "/c"] and found.health.route == "fast"
+    assert assert_same(path, {"/c": NUMBERS}, others=True).frames["/a"].width == 3
+    assert assert_same(path, {}, others=True).frames.keys() == {"/a", "/b", "/c"}
+
+
+def test_a_bad_payload_costs_one_message_on_the_walk(tmp_path, on_the_walk):
+    path = known_colours(tmp_path / "log.mcap", count=90, replaced={30: b"\xff", 31: b"\x42\x20a"})
+    found = assert_same(path, {}, others=True)
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
+    assert {t: frame.height for t, frame in found.frames.items()} == {"/a": 29, "/b": 29, "/c": 30}
+    assert [f.value for f in found.health.findings] == [1.0, 1.0]
+
+
+def test_chunks_too_large_to_be_unpacked_at_once_are_decoded_on_the_walk(
+    tmp_path, on_the_walk, monkeypatch
+):
+    """And a walk that misses a message of theirs is not believed."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    monkeypatch.setattr(chunks_module, "AT_ONCE", 4096)
+    assert_same(path, {}, others=True)
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
+    on_the_walk.clear()
+    whole, missed = preflight._Waiting.take_alone, []
+
+    def missing(self, message):
+        if missed:
+            whole(self, message)
+        missed.append(message)
+
+    monkeypatch.setattr(preflight._Waiting, "take_alone", missing)
+    assert_same(path, {}, others=True)
+    assert on_the_walk == [] and missed
+
+
+def test_a_topic_of_two_channels_is_not_decoded_on_the_walk(tmp_path, on_the_walk):
+    path = known_colours(tmp_path / "log.mcap", count=300, topics=("/a", "/b", "/a"))
+    assert assert_same(path, {}, others=True).frames["/a"].height == 200
+    assert on_the_walk == ["/b"]
+
+
+@pytest.mark.parametrize("lie", ["place", "time", "beyond"])
+def test_an_index_that_lies_is_not_believed(tmp_path, on_the_walk, monkeypatch, lie):
+    """Nothing of what was decoded before is left in the tables: the log is read anew."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    expected = by_hand(path, {}, True)
+    whole, met = scan.index_of, []
+    monkeypatch.setattr(preflight, "HELD_BYTES", 1000)
+
+    def lying(body, section):
+        for index in whole(body, section):
+            places, times = index.places.copy(), index.times.copy()
+            met.append(index)
+            if len(met) < 9:
+                pass
+            elif lie == "time":
+                times[-1] += 1
+            else:
+                places[-1] = places[0] if lie == "place" else 1 << 40
+            yield Index(index.channel, times, places)
+
+    monkeypatch.setattr(scan, "index_of", lying)
+    found = read(path, {}, others=True)
+    assert on_the_walk == []
+    assert found.frames.keys() == expected.frames.keys()
+    for topic, frame in found.frames.items():
+        assert_frame_equal(frame, expected.frames[topic])
+
+
+def test_chunks_read_ahead_are_those_of_the_file(tmp_path, monkeypatch):
+    """With threads and without: the same items, and the same losses where a chunk is damaged."""
+    path = known_colours(tmp_path / "log.mcap")
+    where, size, _ = chunks(path)[3]
+    data = bytearray(path.read_bytes())
+    data[where + size // 2] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(data)
+    for log in (path, damaged):
+        met = []
+        for fewest in (2, 10**9):
+            monkeypatch.setattr(read_ahead, "FEWEST_CHUNKS", fewest)
+            found = scan.survey(log)
+            items = [i for i in scan.walk(found) if isinstance(i, Sound)]
+            met.append(([(i.offset, bytes(i.chunk.data)) for i in items], found.losses))
+        assert met[0] == met[1] and len(met[0][0]) > 8
+        assert len(met[0][1]) == (log == damaged)
+
+
+@pytest.mark.shared
+def test_the_walk_and_the_packages_give_one_table_of_every_foreign_log(shared_data, on_the_walk):
+    for path in sorted((shared_data / "mcap").glob("[cp]*/*.mcap")):
+        assert_same(path)
+        assert_same(path, {}, others=True)
+    assert len(on_the_walk) > 1200

@@ -11,27 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
-from made_logs import (
-    COUNT,
-    SECOND,
-    START,
-    assert_same,
-    by_the_package,
-    chunks,
-    protobuf_log,
-    sample,
-)
+from made_logs import COUNT, SECOND, START, assert_same, by_the_package, chunks, known_colours
 from mcap.writer import IndexType
 from mcap_ros2.writer import Writer as Ros2Writer
 from polars.testing import assert_frame_equal
 
 from shiplog.logs import rerun_route
 from shiplog.logs.read import read
-
-
-def known_colours(path: Path, **options) -> Path:
-    """A log that Rerun can read: no enum number beyond the schema."""
-    return protobuf_log(path, make=lambda k: sample(k, newest=3), **options)
 
 
 @pytest.mark.parametrize(
@@ -86,6 +72,17 @@ def test_rerun_is_not_waited_for_longer_than_it_may_take(tmp_path, by_rerun, mon
         assert by_rerun == []
     assert_same(path)
     assert set(by_rerun) == {"/a", "/b", "/c"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_a_reader_without_memory_leaves_the_log_to_the_other(tmp_path, by_rerun, monkeypatch):
+    """It may take no more than it has when it has just started."""
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    rerun_route.worker().stop()
+    monkeypatch.setattr(rerun_route.reading_limits, "memory", lambda size: 0)
+    assert_same(path)
+    assert by_rerun == []
+    rerun_route.worker().stop()  # it may have survived, with that limit
 
 
 def test_a_killed_worker_is_replaced(tmp_path, by_rerun):

@@ -6,6 +6,7 @@ import json
 import random
 import struct
 import zlib
+from collections import Counter
 
 import mcap_bytes as mcap
 import pytest
@@ -277,6 +278,30 @@ def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(re
     assert found.health.messages_read == CHUNKS * EACH
     assert sum(frame.height for frame in found.frames.values()) <= 60
     assert {f.kind for f in found.health.findings} == {"crc"}
+
+
+def test_a_chunk_of_more_messages_than_a_log_can_hold_is_counted_and_none_is_made(
+    reading, monkeypatch
+):
+    """Empty messages on two channels, packed to nothing; the sound log around them is read."""
+    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 1000)
+    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    made = Counter()
+    whole = records.record
+    monkeypatch.setattr(
+        records, "record", lambda opcode, *a: (made.update([opcode]), whole(opcode, *a))[1]
+    )
+    empty = b"".join(
+        mcap.record(mcap.MESSAGE, mcap.message(n, 0, START, START, b"")) for n in (1, 2, 1, 1)
+    )
+    header, *rest = parts()
+    found = reading(file([header, rest[0], (mcap.CHUNK, packed(empty * 5000, 0, 0)), *rest[1:]]))
+    assert numbers(found) == without()
+    assert found.health.messages_read == CHUNKS * EACH + 20_000
+    assert made[mcap.MESSAGE] == CHUNKS * EACH
+    told = {f.channel: f for f in found.health.findings if f.kind == "crc"}
+    assert {topic: f.value for topic, f in told.items()} == {"/gyro": 15_000, "/wind": 5000}
+    assert "are more than a log of this size can hold; left out" in told["/gyro"].sentence
 
 
 def test_unpacking_ends_where_a_log_of_this_size_cannot_go_on(reading, monkeypatch):

@@ -7,7 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from shiplog import profile_file as profiles
 from shiplog.models.mmg import body
+from shiplog.models.mmg.geometry import Geometry, geometry_of
+from shiplog.models.mmg.model import MMG
 
 # ---------------------------------------------------------------- published states
 
@@ -194,3 +197,11 @@ def test_twin_screws_and_rudders_in_a_mirror_change_places(twin, n):
     here, there = mirrored(even, *state, (0.2, n, -0.1, 0.6 * n), (0.1, 0.6 * n, -0.2, n))
     for part, force in here.items():
         assert there[part] == pytest.approx(force * [1, -1, -1], rel=1e-9, abs=1e-12), part
+
+
+# ---------------------------------------------------------------- parameters
+
+
+def test_a_model_is_hashable_so_that_it_is_compiled_once():
+    one, other = (MMG(geometry_of(profiles.load("esso-osaka"))[0]) for _ in range(2))
+    assert one == other and hash(one) == hash(other) and isinstance(one.geometry, Geometry)

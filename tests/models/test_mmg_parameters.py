@@ -7,8 +7,7 @@ from mmg_ships import TUNNEL, TWIN, estimated
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
 from shiplog.models.mmg import parameters
-from shiplog.models.mmg.geometry import Geometry, geometry_of, joined, split
-from shiplog.models.mmg.model import MMG
+from shiplog.models.mmg.geometry import geometry_of, joined, split
 
 # ---------------------------------------------------------------- geometry
 
@@ -156,8 +155,25 @@ def edited(tmp_path, old, new):
         ("eps = 1.42", 'eps = "1.42"', ["rudder.eps", "'1.42'", "not a number"]),
         ("eps = 1.42", "eps = true", ["rudder.eps", "True", "not a number"]),
         ("eps = 1.42", "eps = [1.42]", ["rudder.eps", "not a number"]),
+        ("eps = 1.42", "eps = 1" + 400 * "0", ["rudder.eps", "inf", "0.2 to 3"]),
+        ("eps = 1.42", "eps = 1" + 6000 * "0", ["not valid TOML"]),
+        ("eps = 1.42", "eps = " + 20_000 * "[", ["not valid TOML"]),
     ],
-    ids=["high", "low", "nan", "key", "section", "missing", "syntax", "string", "bool", "array"],
+    ids=[
+        "high",
+        "low",
+        "nan",
+        "key",
+        "section",
+        "missing",
+        "syntax",
+        "string",
+        "bool",
+        "array",
+        "400 digits",
+        "6000 digits",
+        "nested",
+    ],
 )
 def test_a_file_that_cannot_be_is_refused_with_its_name(esso, tmp_path, old, new, words):
     path = edited(tmp_path, old, new)
@@ -243,8 +259,3 @@ def test_published_values_lie_next_to_their_profile(tmp_path):
     assert parameters.published_file(str(own)) is None
     (tmp_path / "own.mmg.toml").write_text("", encoding="utf-8")
     assert parameters.published_file(str(own)) == tmp_path / "own.mmg.toml"
-
-
-def test_a_model_is_hashable_so_that_it_is_compiled_once():
-    one, other = (MMG(geometry_of(profiles.load("esso-osaka"))[0]) for _ in range(2))
-    assert one == other and hash(one) == hash(other) and isinstance(one.geometry, Geometry)

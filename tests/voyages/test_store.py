@@ -256,7 +256,7 @@ def hold_open(log, store, held, go):
 
 
 @pytest.mark.parametrize("second", ["another log", "the same log", "another log of that name"])
-def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, second):
+def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, caplog, second):
     """The first is held open until the second says that it waits."""
     store = Store(tmp_path / "store")
     held, go = tmp_path / "held", tmp_path / "go"
@@ -278,7 +278,8 @@ def test_two_ingests_at_once(tmp_path, voyage, monkeypatch, second):
 
     monkeypatch.setattr(stores, "SILENT_WAIT_S", 0.05)
     monkeypatch.setattr(stores.log, "handlers", [Release()])
-    monkeypatch.setattr(stores.log, "level", logging.INFO)
+    # by the logger itself: it remembers which levels an earlier test had asked for in vain
+    caplog.set_level(logging.INFO, stores.log.name)
     first.start()
     try:
         while not held.exists() and first.is_alive():

@@ -84,9 +84,9 @@ def row(paper: NetworkRun, fast: NetworkRun, seed: int) -> tuple[str, float]:
     reached = until(slow.best) / slow.steps
     as_good = f"{reached:.4f}" if np.isfinite(reached) else "never"
     line = (
-        f"{paper.profile.name} {paper.config.data:10} {seed:4d} {slow.best:9.0f} {quick.best:9.0f} "
-        f"{slow.steps:10.3g} {quick.steps:10.3g} {quick.steps / slow.steps:8.4f} {as_good:>8} "
-        f"{quick.seconds:6.1f}"
+        f"{paper.profile.ship.name} {paper.config.data:10} {seed:4d} {slow.best:9.0f} "
+        f"{quick.best:9.0f} {slow.steps:10.3g} {quick.steps:10.3g} "
+        f"{quick.steps / slow.steps:8.4f} {as_good:>8} {quick.seconds:6.1f}"
     )
     return line, quick.steps / slow.steps
 

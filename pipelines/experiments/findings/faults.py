@@ -114,12 +114,8 @@ def written(store: Store, log: Path, profile: Profile, label: str, write, share:
     columns["heading"] = np.angle(np.exp(1j * columns["heading"]))
     name = f"{voyage.name}+{label}"
     table = voyage.table.with_columns(pl.Series(n, v) for n, v in columns.items())
-    store.add(
-        replace(
-            voyage, name=name, table=table, report=replace(voyage.report, name=name),
-            contents=replace(voyage.contents, sha256=f"{voyage.contents.sha256}+{label}"),
-        )
-    )  # fmt: skip
+    report = replace(voyage.report, name=name)
+    store.add(replace(voyage, name=name, table=table, report=report))
     return name
 
 

@@ -14,6 +14,7 @@ from shiplog import units
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.delimited import DelimitedTable
+from shiplog.logs.dates import UNDATED
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.profile import TABLE_CHANNELS, TABLE_LABELS, Column, Profile, Source
 
@@ -141,7 +142,7 @@ def _topic(
     rate = {"nominal_hz": f"{1e9 / step:.3g}"} if step > 0 else {}
     return Series(
         topic, schema_of(topic, columns), time, columns, frame_id="midship",
-        metadata={**rate, "clock": "of the table", **noted},
+        metadata={**rate, **dict([UNDATED]), **noted},
     )  # fmt: skip
 
 
