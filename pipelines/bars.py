@@ -24,9 +24,8 @@ log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
 LEAST_DONE = 0.02  # share of the work, below which no time left is given: it would be hours off
-BYTES_PER_S = (
-    1.5e6  # of a log ingested or a table converted; a first guess that the finished logs correct
-)
+# Of a log ingested or a table converted: a first guess that the finished logs correct.
+BYTES_PER_S = 1.5e6
 
 
 class Bars:

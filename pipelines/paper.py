@@ -268,7 +268,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
 def _longest(errors: pl.DataFrame) -> str:
     """The test voyage with the most windows; the first of several."""
     count = errors.group_by("voyage", maintain_order=True).len()
-    return str(count["voyage"][int(count["len"].arg_max())])  # type: ignore[arg-type]
+    return count.sort("len", descending=True, maintain_order=True)["voyage"][0]
 
 
 def _sizes(sizes: pl.DataFrame) -> list[tuple]:

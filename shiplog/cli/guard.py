@@ -91,14 +91,14 @@ class _Child:
         """Its exit code, or minus the signal that ended it; and the file that it was reading."""
         passed_on = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         before = {number: signal.signal(number, self._pass_on) for number in passed_on}
-        said = b""
+        begun = b""  # names of the files that were begun, each with a zero behind it
         while some := os.read(self.pipe, 1 << 16):
-            said = (said + some)[-(1 << 16) :]
+            begun = (begun + some)[-(1 << 16) :]
         os.close(self.pipe)
         _, status = os.waitpid(self.pid, 0)
         for number, handler in before.items():
             signal.signal(number, handler)
-        names = said.split(b"\0")
+        names = begun.split(b"\0")
         return os.waitstatus_to_exitcode(status), names[-2] if len(names) > 1 else b""
 
     def _pass_on(self, number: int, _frame: object) -> None:

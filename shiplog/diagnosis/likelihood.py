@@ -18,15 +18,8 @@ import numpy as np
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.timescale import BIN, KNOT
 
-COLOURED_SHARES = (
-    0.0,
-    0.2,
-    0.4,
-    0.6,
-    0.8,
-    0.9,
-    0.95,
-)  # of the noise's variance, that may be coloured
+# Of the noise's variance, that may be coloured.
+COLOURED_SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
 LEAP = 16.0  # steps at once, at most
 ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it

@@ -184,14 +184,8 @@ def assumed(
     if inputs is not None:
         return of_reference(nominal_reference.assume(model, setting, start, record, given, inputs))
     start = widened(model, setting, start)
-    at = nominal_fit.converged(
-        model,
-        setting,
-        start,
-        record,
-        0 if given else nominal_fit.LINEARISATIONS,
-        discrepancy.SEEN,
-    )
+    rounds = 0 if given else nominal_fit.LINEARISATIONS
+    at = nominal_fit.converged(model, setting, start, record, rounds, discrepancy.SEEN)
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at, numbers)

@@ -34,7 +34,7 @@ class Search:
 
     table     the hypotheses weighed so far
     expected  label → expected log Bayes factor of that cause, by its size
-    scanned   label → score of that cause by itself, where it was found first
+    scanned   label → score of that cause by itself, scanned before any set is searched
     banned    names of causes without which the search went on
     """
 

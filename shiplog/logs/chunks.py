@@ -62,6 +62,7 @@ def chunk(body: bytes) -> Chunk | None:
     (packed,) = LENGTH.unpack_from(body, begin - LENGTH.size)
     compression = body[FIXED.size : FIXED.size + name].decode("utf-8", "backslashreplace")
     data = memoryview(body)[begin : begin + packed]  # no copy: it may be megabytes
+    # mcap declares bytes, and uses nothing of them here that a view has not
     return Chunk(compression, data, end, start, crc, size)  # type: ignore[arg-type]
 
 

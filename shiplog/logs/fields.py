@@ -14,12 +14,8 @@ STAMP_FIELDS = (
     "transforms[0].timestamp", "transforms[0].header.stamp",
 )  # fmt: skip
 STAMP_PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
-EPOCHS = (
-    (1e17, 1),
-    (1e14, 1_000),
-    (1e11, 1_000_000),
-    (1e8, SECOND_NS),
-)  # a number's unit, by its size
+# A number's unit, by its size: from 1e17 on it counts ns.
+EPOCHS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000), (1e8, SECOND_NS))
 
 Steps = tuple[str | int, ...]
 

@@ -33,29 +33,29 @@ def checked(tables: Tables) -> tuple[Tally, set[str]] | None:
     The counts are those of the message indexes, and must be those of the statistics. None where
     they are not, or where anything is damaged: the tables are then to be begun anew.
     """
-    found, tally, here = tables.found, Tally(), _Here(tables)
-    if rerun_route.suitable(tables).keys() - here.channels.keys():
+    found, tally, decoded = tables.found, Tally(), _Decoded(tables)
+    if rerun_route.suitable(tables).keys() - decoded.channels.keys():
         rerun_route.worker().start()  # Rerun loads while the chunks are checked
     try:
         for item in scan.walk(found):
             if isinstance(item, Index):
                 tally.note(item.channel, item.times, known=item.channel in found.channels)
-                here.take(item)
+                decoded.take(item)
             elif isinstance(item, Sound):
-                here.open(item)
-        here.decode()
+                decoded.open(item)
+        decoded.decode()
     except ValueError:  # what has no checksum is not what its index says
         return None
     stated = found.statistics and found.statistics.channel_message_counts
     counted = stated and {number: count for number, count in stated.items() if count}
     damaged = found.losses or found.unvouched or tally.orphans
-    done = {number: one.count for number, one in here.channels.items() if one.count}
+    done = {number: one.count for number, one in decoded.channels.items() if one.count}
     if damaged or counted != tally.counts or not done.items() <= tally.counts.items():
         return None
     return tally, {found.channels[number].topic for number in done}
 
 
-class _Here:
+class _Decoded:
     """The channels that are decoded on this walk."""
 
     def __init__(self, tables: Tables) -> None:

@@ -11,10 +11,9 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from .messages import Fields, Messages, leaves_of
-from .protobuf_layout import FlatMessages, flat, repeated
+from .protobuf_layout import DEEPEST, FlatMessages, flat, repeated
 
 F = FieldDescriptor
-DEEPEST = 12  # further down, and in a message inside its own kind, nothing is read
 SCALAR_TYPES: dict[int, pl.DataType] = {
     F.TYPE_DOUBLE: pl.Float64(), F.TYPE_FLOAT: pl.Float64(), F.TYPE_BOOL: pl.Boolean(),
     F.TYPE_INT32: pl.Int32(), F.TYPE_SINT32: pl.Int32(), F.TYPE_SFIXED32: pl.Int32(),

@@ -35,7 +35,7 @@ DTYPES = {
     pl.Float64: np.float64, pl.Boolean: np.bool_, pl.Int32: np.int32, pl.Int64: np.int64,
     pl.UInt32: np.uint32, pl.UInt64: np.uint64,
 }  # fmt: skip
-DEEPEST = 12  # messages in messages
+DEEPEST = 12  # messages in messages; further down, or inside their own kind, nothing is read
 LONGEST_VARINT = 10  # bytes
 MOST_LAYOUTS = 64  # of messages of one length; instruments have fewer than ten
 
@@ -107,12 +107,11 @@ class FlatMessages:
         tried = 0
         while len(rows):
             if tried == len(known):
+                if tried == MOST_LAYOUTS:
+                    left = zip(rows.tolist(), messages, strict=True)
+                    return others + [(row, message.tobytes()) for row, message in left]
                 first = messages[0].tobytes()
-                layout = None if tried == MOST_LAYOUTS else self._layout(first)
-                if layout is None and tried == MOST_LAYOUTS:
-                    return others + [
-                        (int(r), m.tobytes()) for r, m in zip(rows, messages, strict=True)
-                    ]
+                layout = self._layout(first)
                 if layout is None:
                     others.append((int(rows[0]), first))
                     rows, messages = rows[1:], messages[1:]
@@ -316,6 +315,7 @@ def _varint(data: bytes, at: int, end: int, shortest: bool = False) -> tuple[int
 
 
 def repeated(one: FieldDescriptor) -> bool:
+    """Whether a field is a list or a map."""
     if hasattr(one, "is_repeated"):  # protobuf 6 and later; `label` is on its way out
         return bool(one.is_repeated)
     return getattr(one, "label", None) == F.LABEL_REPEATED

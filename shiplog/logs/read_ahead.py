@@ -25,7 +25,7 @@ FEWEST_CHUNKS = 8  # below which threads cost more than they save
 Unpacked = tuple[bytes, Chunk | ValueError]  # a chunk's body, and the chunk or what is wrong
 
 
-class _Waiting(NamedTuple):
+class _Pending(NamedTuple):
     position: int  # of the record
     length: int  # of its body
     held: int  # bytes that count against AHEAD_BYTES
@@ -39,7 +39,7 @@ class ReadAhead:
     def __init__(self, stream: IO[bytes], path: Path, indexed: Mapping[int, ChunkIndex]) -> None:
         self._stream, self._path = stream, path
         self._left = deque(sorted(indexed.items()))
-        self._waiting: deque[_Waiting] = deque()
+        self._waiting: deque[_Pending] = deque()
         self._ready: tuple[int, Chunk | ValueError] | None = None  # of the body handed out last
         self._pool: ThreadPoolExecutor | None = None
         if len(indexed) >= FEWEST_CHUNKS:
@@ -90,7 +90,7 @@ class ReadAhead:
                 continue  # the walk takes the large ones piece by piece
             held += length + size
             result = self._pool.submit(_unpacked, self._path, position + HEAD.size, length)
-            self._waiting.append(_Waiting(position, length, length + size, result))
+            self._waiting.append(_Pending(position, length, length + size, result))
 
 
 def _unpacked(path: Path, begin: int, length: int) -> Unpacked | None:

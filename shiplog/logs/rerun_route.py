@@ -186,11 +186,7 @@ class Worker:
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None or not self.runs:
             self._stop()
-            alone = [
-                sys.executable,
-                "-P",
-                str(WORKER),
-            ]  # its folder not on the path: no name to clash
+            alone = [sys.executable, "-P", str(WORKER)]  # its folder not on the path: no clash
             with reading_limits.lifted():
                 self._process = subprocess.Popen(
                     alone,

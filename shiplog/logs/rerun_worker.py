@@ -78,10 +78,8 @@ def limit(memory: int) -> None:
     import resource
 
     pages = int(Path("/proc/self/statm").read_text().split()[5])  # of data and stacks
-    most, hard = (
-        pages * resource.getpagesize() + memory,
-        resource.getrlimit(resource.RLIMIT_DATA)[1],
-    )
+    most = pages * resource.getpagesize() + memory
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     most = most if hard == resource.RLIM_INFINITY else min(most, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 

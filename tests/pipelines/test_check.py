@@ -73,7 +73,7 @@ def test_a_check_finds_what_reading_everything_and_ingesting_find(tmp_path, make
 
 def test_the_time_that_a_check_takes_is_expected_from_what_the_log_says(tmp_path):
     """Of a log without a summary, and of none, too."""
-    sample = SAMPLES / "voyage_2.mcap"  # 106 307 messages: 0.2 s of decoding beside the start
+    sample = SAMPLES / "voyage_2.mcap"  # 106 307 messages: 0.2 s of decoding after the start
     assert 1.0 < expected_s(SAMPLES / "voyage_1.mcap") < expected_s(sample) < 5.0
     assert expected_s(cut(tmp_path)) > 1.0
     assert expected_s(tmp_path / "none.mcap") == 1.0
