@@ -53,13 +53,14 @@ def estimated(linear, weight, reference, at_one_place=None):
 
 def test_noise_is_raised_in_each_channel_by_as_much_as_was_drawn():
     """In addition to the nominal noise: three times that in sway, as much as that in surge."""
-    record, drawn_by = straight.sailed(COUNT), np.array([1.0, 3.0, 1.5])
+    count = 4 * COUNT  # so that the spread of a drawn factor is 4 %
+    record, drawn_by = straight.sailed(count), np.array([1.0, 3.0, 1.5])
     knots = segments.grid(record).knots
     more = replace(PROCESS_NOISE, acceleration=PROCESS_NOISE.acceleration * drawn_by)
-    drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
+    drawn = np.random.default_rng(8).standard_normal((count, 3 * knots))
     accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
-    left = left_by(linear, np.ones(COUNT))
+    left = left_by(linear, np.ones(count))
     value, remainder = raised_noise.by_channel(left)
     assert remainder.kind == RAISED
     assert remainder.channels == pytest.approx(tuple(np.hypot(1.0, drawn_by)), rel=0.1)
