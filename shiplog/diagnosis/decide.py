@@ -51,7 +51,8 @@ def decide(
     if verdict == "none":
         rest = [n for n in map(name_of, best.causes) if n not in names]
         traces = _named(table, found, best, rest)
-    reported = fit if verdict in ("named", "unknown") else table.fit(table.nothing)
+    stands = verdict in ("named", "unknown") or (verdict == "none" and not best.causes)
+    reported = fit if stands else table.fit(table.nothing)
     if side_force is not None:
         reported = _with_side_force(reported, side_force)
     nothing = Fit(table.first, table.nothing.found, reported.remainder)

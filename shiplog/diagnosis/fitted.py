@@ -74,7 +74,7 @@ class Fit:
     @property
     def noise_factor(self) -> float:
         """Of the process noise on its nominal one, a geometric mean over the channels."""
-        return self.found.noise_factor * float(np.prod(self.remainder.channels)) ** (1.0 / 3.0)
+        return self.remainder.overall(self.found.noise_factor)
 
 
 @dataclass(frozen=True)

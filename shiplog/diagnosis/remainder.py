@@ -48,6 +48,10 @@ class Remainder:
         """Whether the process noise is expected to be raised."""
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
+    def overall(self, noise_factor: float) -> float:
+        """A common factor and those of the channels in one, their geometric mean."""
+        return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
+
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
         """The process noise with each channel's factor and the intermittent force in it."""
         if not self.shaped:

@@ -68,6 +68,16 @@ def test_what_is_below_practical_size_is_no_change(trial):
     )
 
 
+@pytest.mark.parametrize("raised", (1.49, 1.51))
+def test_noise_as_on_an_ordinary_day_is_no_change(trial, raised):
+    """A quarter more wind: nothing is raised, beside a cause neither."""
+    made = weighed.search(trial, {((), RAISED): 0.6, (DRAG, RAISED): 0.4}, raised=raised)
+    found = posterior(made)
+    assert found.none == pytest.approx(0.6 if raised < 1.5 else 0.0)
+    assert found.kinds.get(RAISED, 0.0) == pytest.approx(0.0 if raised < 1.5 else 1.0)
+    assert found.names["drag"] == pytest.approx(0.4)
+
+
 def test_one_of_two_stated_names_is_not_enough(trial):
     """A or B: together sure, each by itself not."""
     found = posterior(weighed.search(trial, {(DRAG, NOMINAL): 0.55, (LOAD, NOMINAL): 0.45}))
