@@ -9,7 +9,7 @@ import straight
 
 from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
-from shiplog.diagnosis.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -31,11 +31,13 @@ def search(
     evidence: Mapping[tuple[tuple[str, ...], str], float] | None = None,
     sizes: Mapping[str, float] | None = None,
     side_force: SideForce | None = None,
+    raised: float = 2.0,
 ) -> Search:
     """Hypotheses (causes, kind) with these probabilities, up to a factor.
 
     evidence   of a hypothesis; 100 nats a cause where none is given
     sizes      of a label's numbers
+    raised     factor of raised process noise
     """
     point = of.first
     assert point is not None
@@ -48,7 +50,8 @@ def search(
         }
         count = sum(map(len, numbers.values()))
         output = (evidence or {}).get((labels, kind), 100.0 * len(labels))
-        found = Found("+".join(labels), output, 1.0, numbers, 0.01 * np.eye(count))
+        noise = raised if kind == RAISED else 1.0
+        found = Found("+".join(labels), output, noise, numbers, 0.01 * np.eye(count))
         remainder = Remainder(kind, 3.0)
         score = float(np.log(p)) - 40.0
         made.table.found[labels, kind] = Hypothesis(

@@ -35,7 +35,8 @@ def decide(
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
-    mostly = posteriors.share_of_causes(table, best) >= thresholds.MOST
+    device = is_device(table, best, fit)  # then what remains has a name, too
+    mostly = device or posteriors.share_of_causes(table, best) >= thresholds.MOST
     mostly = mostly and (posteriors.slight(table, best) or not _imitated(table, fit, names))
     verdict, structure, named, side_force = "undecided", None, (), None
     if names and mostly:
@@ -44,13 +45,14 @@ def decide(
         verdict, structure = "unknown", _structure(table, best, fit)
     elif found.none >= thresholds.STATED:
         verdict = "none"
-    if verdict in ("named", "unknown") and is_device(table, best, fit):
+    if verdict in ("named", "unknown") and device:
         verdict, structure, side_force = "named", None, best.side_force
     traces = ()
     if verdict == "none":
         rest = [n for n in map(name_of, best.causes) if n not in names]
         traces = _named(table, found, best, rest)
-    reported = fit if verdict in ("named", "unknown") else table.fit(table.nothing)
+    stands = verdict in ("named", "unknown") or (verdict == "none" and not best.causes)
+    reported = fit if stands else table.fit(table.nothing)
     if side_force is not None:
         reported = _with_side_force(reported, side_force)
     nothing = Fit(table.first, table.nothing.found, reported.remainder)
@@ -131,9 +133,7 @@ def is_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> bool:
 
 def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:
     """The same with the intermittent force in its remainder."""
-    surge, sway, yaw = side_force.unit * side_force.force
-    remainder = replace(fit.remainder, intermittent=(float(surge), float(sway), float(yaw)))
-    return replace(fit, remainder=remainder)
+    return replace(fit, remainder=side_force.remainder)
 
 
 def _reasons(

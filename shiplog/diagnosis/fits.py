@@ -4,6 +4,7 @@ and the part of its remainder."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,8 +60,8 @@ def without(
     trial: Trial, one: Fit, left_out: np.ndarray
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Numbers of the causes and coefficients [P], from the segments that are not `left_out` [S]."""
-    weight, noise = np.where(left_out, 0.0, trial.weight), one.found.noise_factor
-    total, _ = trial.products.total(one.point, noise, weight, one.remainder)
+    noise = one.found.noise_factor
+    total = trial.products.without(one.point, noise, trial.weight, one.remainder, left_out)
     level = evidence.solve(trial, total, 0.0, noise, one.point, one.included, one.remainder)
     numbers, _ = evidence.numbers_of(trial, level, one.point, one.included)
     return numbers, _coefficients(trial, level)
@@ -98,7 +99,8 @@ def changed(trial: Trial, point: Point, level: Level, included: tuple[str, ...],
     """Log Bayes factor, in nats, of a change of one family's weights over a level without it, at
     its most probable size; and that size. The level is of that `remainder`."""
     columns, ref = trial.families[family], trial.reference
-    total, _ = trial.products.total(point, level.noise_factor, trial.weight, remainder)
+    of = replace(remainder, kind=family)
+    total, _ = trial.products.total(point, level.noise_factor, trial.weight, of)
     more = [ref.columns.of[n] for n in included]
     rows = 1 + np.concatenate([np.arange(len(ref.pull)), *more])
     joined = ref.counts * total[np.ix_(rows, 1 + columns)]
@@ -136,7 +138,7 @@ def imitated(trial: Trial, one: Fit, label: str) -> float:
 
 def acts_on(trial: Trial, one: Fit, family: str) -> tuple[str, ...]:
     """Channels on which a change of a family's weights acts."""
-    changed_by = Remainder(family, CHANGE_SIZES[1], intermittent=one.remainder.intermittent)
+    changed_by = replace(one.remainder, kind=family, size=CHANGE_SIZES[1], noisy=False)
     level = evidence.level(trial, one.point, one.found.noise_factor, one.included, changed_by)
     of = trial.unseen if family in discrepancy.UNSEEN else trial.campaign.discrepancy
     columns = trial.families[family]

@@ -71,6 +71,11 @@ class Fit:
         """Labels of the causes that it holds, those of the model with them."""
         return tuple(self.found.numbers)
 
+    @property
+    def noise_factor(self) -> float:
+        """Of the process noise on its nominal one, a geometric mean over the channels."""
+        return self.remainder.overall(self.found.noise_factor)
+
 
 @dataclass(frozen=True)
 class Level:

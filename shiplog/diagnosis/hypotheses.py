@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog.diagnosis import intermittent
+from shiplog.diagnosis import intermittent, raised_noise
 from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
-from shiplog.diagnosis.remainder import NOMINAL
+from shiplog.diagnosis.remainder import NOMINAL, Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -54,6 +54,11 @@ class Hypotheses:
     @property
     def nothing(self) -> Hypothesis:
         return self.found[(), NOMINAL]
+
+    def best_of(self, kind: str) -> Hypothesis | None:
+        """The most probable one so far with this kind of remainder."""
+        same = (h for (_, other), h in self.found.items() if other == kind)
+        return max(same, key=lambda h: h.score, default=None)
 
     def ranked(self, without: Collection[str] = ()) -> list[Hypothesis]:
         """Best first; without those that contain a cause of these names."""
@@ -118,3 +123,8 @@ class Hypotheses:
         """An intermittent force at one place along the ship, and its log Bayes factor over raised
         noise, whose nominal part acts at one place too."""
         return intermittent.side_force(self.trial, fit, self.nominal_side_force)
+
+    def raised_by_channel(self, fit: Fit) -> Remainder:
+        """Process noise raised in each channel by itself, as a hypothesis leaves it."""
+        left = intermittent.noise_left(self.trial, fit)
+        return raised_noise.by_channel(left, self.nominal_side_force)[1]

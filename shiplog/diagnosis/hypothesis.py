@@ -48,6 +48,11 @@ class Hypothesis:
     def kind(self) -> str:
         return self.remainder.kind
 
+    @property
+    def noise_factor(self) -> float:
+        """As `Fit.noise_factor`."""
+        return self.remainder.overall(self.found.noise_factor)
+
 
 def name_of(label: str) -> str:
     """`clock_offset:wind` is the wind's clock."""

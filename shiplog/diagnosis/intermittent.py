@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis import fits, likelihood, unrecorded_thruster
+from shiplog.diagnosis import fits, likelihood, raised_noise, unrecorded_thruster
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.nominal_campaign import Campaign
+from shiplog.diagnosis.raised_noise import Left
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
@@ -38,19 +39,24 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
         gram = share * part[: 1 + len(pull), : 1 + len(pull)]
         own[rows] = np.linalg.solve(gram[1:, 1:] + information, gram[1:, 0] + pull) * unit
     left, none = linear.less_numbers(own, accelerations), np.zeros(linear.j.shape[-1])
-    found = unrecorded_thruster.estimate_side_force(
-        left, none, reference, reference.process_noise, campaign.weight
+    kept = raised_noise.left_by(
+        left, none, reference.process_noise, campaign.weight, reference.counts
     )
+    found = unrecorded_thruster.estimate_side_force(kept, reference)
     return found.unit * found.force if found.gain > 0.0 else None
 
 
-def side_force(trial: Trial, fit: Fit, nominal: np.ndarray | None = None) -> SideForce:
-    """Of what a hypothesis leaves; `nominal` as `unrecorded_thruster.estimate_side_force`."""
+def side_force(trial: Trial, fit: Fit, at_one_place: np.ndarray | None = None) -> SideForce:
+    """Of what a hypothesis leaves; `at_one_place` as `raised_noise.by_channel` has it."""
+    left = noise_left(trial, fit)
+    return unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
+
+
+def noise_left(trial: Trial, fit: Fit) -> Left:
+    """What a hypothesis leaves, to be explained by noise."""
     left, d = fits.residual(trial, fit.point.linear, fit)
-    process_noise = trial.process_noise(fit.remainder)
-    return unrecorded_thruster.estimate_side_force(
-        left, d, trial.reference, process_noise, trial.weight, nominal
-    )
+    ref = trial.reference
+    return raised_noise.left_by(left, d, ref.process_noise, trial.weight, ref.counts)
 
 
 def force_at_nodes(trial: Trial, fit: Fit, side_force: SideForce) -> tuple[np.ndarray, np.ndarray]:

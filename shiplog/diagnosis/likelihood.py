@@ -180,6 +180,11 @@ class Modes:
             self, accelerations=np.concatenate((self.accelerations, self.axes @ accelerations), -1)
         )
 
+    def first(self, columns: int) -> Modes:
+        """With that many of its C + W columns, C at least."""
+        more = columns + 1 - self.dd.shape[-1]
+        return replace(self, accelerations=self.accelerations[..., :more])
+
     def total(self, weight: np.ndarray, noise_factor: float = 1.0) -> np.ndarray:
         """[1 + C + W, 1 + C + W] sum of `gram`'s matrices, weighted [S], without making each of
         them."""

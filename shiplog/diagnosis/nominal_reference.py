@@ -21,6 +21,7 @@ from shiplog.diagnosis.linear_segments import Linear, Wide
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.nominal_fit import Converged, anchored, columns_of, converged, hold, wide_of
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.models.causes import Cause, Setting, constants_of
 from shiplog.models.compiled_network import Network
 from shiplog.models.extended import Extended
@@ -101,12 +102,12 @@ class Reference:
             return None
         return self.misfit.accelerations(cut, g) @ self.expected
 
-    def held(self, noise_factor: float, intermittent: np.ndarray | None = None) -> Wide:
-        """Allowed distance of a path where the process noise has this factor, and with an
-        intermittent force."""
-        acceleration = noise_factor * self.process_noise.acceleration
-        if intermittent is not None:
-            acceleration = np.hypot(acceleration, intermittent)
+    def held(self, noise_factor: float, remainder: Remainder) -> Wide:
+        """Allowed distance of a path where the process noise has this factor, with a remainder."""
+        of = remainder.in_noise(self.process_noise)
+        acceleration = noise_factor * of.acceleration
+        if of.intermittent is not None:
+            acceleration = np.hypot(acceleration, of.intermittent)
         return hold(self.process_noise, acceleration)
 
     @property

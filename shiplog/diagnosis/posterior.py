@@ -28,7 +28,7 @@ class Posterior:
     hypotheses   best first, with their probabilities [H]
     names        name of a cause → probability; below practical size it counts as no change
     labels       the same of each of its kinds, such as each clock
-    kinds        kind of remainder → probability
+    kinds        kind of remainder → probability; noise raised by little counts as nominal
     none         probability that nothing of practical size changed
     hidden       name → weight, relative to all these hypotheses, of causes that were only scanned
     """
@@ -86,8 +86,9 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
             names[name] = names.get(name, 0.0) + float(p)
         for label in real:
             labels[label] = labels.get(label, 0.0) + float(p)
-        kinds[one.kind] = kinds.get(one.kind, 0.0) + float(p)
-        if not real and one.kind == NOMINAL:
+        kind = practical_kind(one)
+        kinds[kind] = kinds.get(kind, 0.0) + float(p)
+        if not real and kind == NOMINAL:
             none += float(p)
     weight = float(np.exp(score - score.max()).sum())
     hidden: dict[str, float] = {}
@@ -110,15 +111,22 @@ def practical(table: Hypotheses, one: Hypothesis) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+def practical_kind(one: Hypothesis) -> str:
+    """Its kind of remainder; process noise as on an ordinary day is nominal."""
+    ordinary = one.kind == RAISED and one.noise_factor < thresholds.ORDINARY_NOISE
+    return NOMINAL if ordinary else one.kind
+
+
 def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
-    """The causes' share of the log Bayes factor of a hypothesis over no change."""
-    nothing = table.nothing.evidence
-    whole = one.evidence - nothing
-    alone = max(
-        (table.found[one.causes, kind].evidence for kind in (NOMINAL, RAISED)
-         if (one.causes, kind) in table.found), default=nothing,
-    )  # fmt: skip
-    return (alone - nothing) / whole if whole > 0.0 else 1.0
+    """Of what a hypothesis explains beyond nothing, the share that its causes explain: over nothing
+    with nominal, or with raised process noise. What raised noise explains no cause does."""
+    shares = []
+    for kind in (NOMINAL, RAISED):
+        nothing, alone = table.found.get(((), kind)), table.found.get((one.causes, kind))
+        if nothing is not None and one.evidence > nothing.evidence:
+            gained = 0.0 if alone is None else alone.evidence - nothing.evidence
+            shares.append(gained / (one.evidence - nothing.evidence))
+    return max(shares, default=1.0)
 
 
 def slight(table: Hypotheses, one: Hypothesis) -> bool:

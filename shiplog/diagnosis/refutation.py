@@ -36,7 +36,10 @@ class Judge(Protocol):
 
 
 def _in_doubt(search: Search, found: Posterior, decision: Decision) -> bool:
-    """Whether a remainder is stated that is more than an error of the causes' equations."""
+    """Whether a remainder is stated that is more than an error of the causes' equations, and is no
+    device, which has a name and is in the noise of the likelihood."""
+    if decision.side_force is not None:
+        return False
     best = posteriors.best_with(found, [one.cause.name for one in decision.named])
     return found.remainder is not None and not posteriors.slight(search.table, best)
 

@@ -38,7 +38,10 @@ def converge(
     far if the evidence is then below the `lowest` that is possible. Where that is known, no further
     step may lose STEP_NATS. A step that has gone too far is halved.
     """
-    point, noise_factor, lately = None, 1.0, None
+    # where each channel has a factor of its own the common one stays near 1; an intermittent force
+    # is estimated together with the nominal process noise, which is then kept
+    point, noise_factor, lately = None, 1.0, 1.0 if remainder.shaped else None
+    held = remainder.intermittent is not None
     near: Path | Point | None = path
     key = (tuple(included), remainder)
     if key in trial.converged:
@@ -46,13 +49,13 @@ def converge(
         lately = noise_factor
     stood: Mapping[str, np.ndarray] | None = None  # where the fit last held
     shorter = 0
-    steady = False  # whether the process noise has converged: a round then keeps it
+    steady = held  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, noise_factor, remainder)
             base = _fitted(trial, point, included, remainder, lately, steady, lowest)
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
-            if shorter == MOST_HALVINGS:
+            if shorter == MOST_HALVINGS or not included:
                 assert trial.first is not None
                 return trial.first, Found("+".join(included), -np.inf, noise_factor, numbers)
             shorter += 1
@@ -63,7 +66,7 @@ def converge(
             lowest = max(lowest, base.evidence - STEP_NATS)
         kept, steady = (
             steady,
-            lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY,
+            held or (lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY),
         )
         noise_factor = lately = base.noise_factor
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
@@ -73,7 +76,7 @@ def converge(
         far = trial.reference.apart(moved, numbers)
         numbers = moved
         if far < AT_REST:
-            if kept:
+            if kept and not held:
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
                 numbers, noise_factor = (
                     _within_bounds(trial, base.numbers, base.covariance),

@@ -12,6 +12,7 @@ from shiplog.diagnosis.likelihood import ProcessNoise
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
 CHANGE_SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
 LEAST_SPREAD = 0.05  # of the logarithm of the process noise: two campaigns are never alike
+SHAPE_NUMBERS = 3  # of a noise of its own in each channel, or of a force, its place and λ
 RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either way
 
 
@@ -22,6 +23,7 @@ class Remainder:
     kind          NOMINAL, RAISED, INTERMITTENT, or a family of the discrepancy
     size          of a change of that family's weights
     noisy         whether process noise is raised together with that change
+    channels      factors of the process noise in surge, sway and yaw rate, beside the common one
     intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force, where
                   it is a device's
     """
@@ -29,18 +31,34 @@ class Remainder:
     kind: str = NOMINAL
     size: float = 1.0
     noisy: bool = False
+    channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
     intermittent: tuple[float, float, float] | None = None
+
+    @property
+    def shape(self) -> tuple:
+        """What of it makes the process noise more than a multiple of the nominal one."""
+        return self.channels, self.intermittent
+
+    @property
+    def shaped(self) -> bool:
+        return self.shape != Remainder().shape
 
     @property
     def raises(self) -> bool:
         """Whether the process noise is expected to be raised."""
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
+    def overall(self, noise_factor: float) -> float:
+        """A common factor and those of the channels in one, their geometric mean."""
+        return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
+
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
-        """The process noise with the intermittent force in it."""
-        if self.intermittent is None:
+        """The process noise with each channel's factor and the intermittent force in it."""
+        if not self.shaped:
             return process_noise
-        return replace(process_noise, intermittent=np.array(self.intermittent))
+        force = None if self.intermittent is None else np.array(self.intermittent)
+        acceleration = process_noise.acceleration * self.channels
+        return replace(process_noise, acceleration=acceleration, intermittent=force)
 
 
 def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
@@ -50,5 +68,10 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     noise   factor of the nominal process noise
     nominal standard deviation of its logarithm from campaign to campaign
     """
-    spread = RAISED_SPREAD if remainder.raises else nominal
-    return -0.5 * (math.log(noise) / spread) ** 2 - math.log(spread / nominal)
+    if not remainder.raises:
+        return -0.5 * (math.log(noise) / nominal) ** 2
+    by_channel = np.log(noise * np.array(remainder.channels)) / RAISED_SPREAD
+    square, cost = by_channel @ by_channel, math.log(RAISED_SPREAD / nominal)
+    if not remainder.shaped:  # one number for all three
+        return float(-0.5 * square / SHAPE_NUMBERS - cost)
+    return float(-0.5 * square - SHAPE_NUMBERS * cost)

@@ -16,7 +16,7 @@ from shiplog.diagnosis import evidence, thresholds
 from shiplog.diagnosis.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
+from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.weighing import SEARCH_NATS, weigh
 
@@ -101,7 +101,7 @@ class Search:
         self, one: Hypothesis, fit: Fit
     ) -> list[tuple[tuple[str, ...], dict[str, np.ndarray], float]]:
         """The sets with one cause more that are worth a look: labels, numbers, score expected."""
-        if len(one.causes) >= MOST_CAUSES or one.kind == INTERMITTENT:
+        if len(one.causes) >= MOST_CAUSES:
             return []
         table = self.table
         candidates = [

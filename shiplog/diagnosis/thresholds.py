@@ -1,6 +1,6 @@
 """Every number that a verdict depends on: name, unit, reason. No other module decides by a number.
 
-Nine decide between hypotheses. The others say when there is nothing to decide on, and what is
+Ten decide between hypotheses. The others say when there is nothing to decide on, and what is
 listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
 factor.
 """
@@ -40,6 +40,11 @@ SLIGHT = 0.02
 # Share of the held-out error. Where a plain regression leaves less than this share of the model's
 # error, the model lacks a force: causes that change forces are not tested.
 BASELINE = 0.5
+
+# Ratio of standard deviations. Process noise that is raised by less than this counts as no change:
+# the force of gusts goes with the square of the wind speed, and a wind that is a quarter stronger
+# than that of the nominal voyages is no fault of the model.
+ORDINARY_NOISE = 1.5
 
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
 # time that it is on, while a force that merely varies is between as often as above.

@@ -146,15 +146,15 @@ class Trial:
         near          a path to start from, or a point whose linearisation predicts the path
         noise_factor  λ that limits the path. A path that follows every wave of the noise is as far
                       from the likely one as a free rollout; its nonlinearity imitates evidence
-        remainder     whose intermittent force the path may follow
+        remainder     whose process noise and intermittent force the path may follow
 
         Raises np.linalg.LinAlgError where the model diverges with these numbers only: this
         hypothesis then fails.
         """
-        ref, intermittent = self.reference, None if remainder is None else remainder.intermittent
+        ref = self.reference
         wide = ref.wide
         if noise_factor is not None:
-            wide = ref.held(noise_factor, None if intermittent is None else np.array(intermittent))
+            wide = ref.held(noise_factor, remainder or Remainder())
         cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.about(cut, self.grid)

@@ -20,12 +20,36 @@ SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not wor
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
 RAISED_FROM = 1.2  # times the nominal process noise, from which an intermittent force is tested
 RAISING = Remainder(RAISED)
+NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
+FORCE_ROUNDS = 2  # of fitting an intermittent force and numbers in turn
+
+
+@dataclass(frozen=True)
+class Rough:
+    """A set of causes with raised process noise: where it is linearised, and its levels there."""
+
+    point: Point
+    remainder: Remainder
+    levels: list[Level]
+
+    @property
+    def best(self) -> Level:
+        return max(self.levels, key=lambda level: level.value)
+
+    def fit(
+        self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level
+    ) -> Fit:  # fmt: skip
+        numbers = evidence.numbers_of(trial, one, self.point, included)
+        found = Found("+".join(labels), one.value, one.noise_factor, *numbers)
+        return Fit(self.point, found, self.remainder)
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of one family's weights: with what evidence, at what process noise."""
+    """A change of one family's weights: where it is linearised, with what evidence, at what process
+    noise."""
 
+    point: Point
     remainder: Remainder
     value: float
     noise: float
@@ -55,18 +79,52 @@ def weigh(
     nominal = best(trial, levels, NOMINAL).noise_factor
     if abs(math.log(nominal)) > 2.0 * trial.nominal_spread:  # its prior favours the nominal noise
         levels += nominal_levels(trial, point, included, nominal)
-    for kind in (NOMINAL, RAISED):
-        one = best(trial, levels, kind)
-        found = Found("+".join(labels), one.value, one.noise_factor,
-                      *evidence.numbers_of(trial, one, point, included))  # fmt: skip
-        table.put(labels, one.value, Fit(point, found, Remainder(kind)))
+    plain = Rough(point, RAISING, levels)
+    nominal_fit = plain.fit(trial, labels, included, best(trial, levels, NOMINAL))
+    table.put(labels, nominal_fit.found.evidence, replace(nominal_fit, remainder=Remainder()))
+    rough = rougher(table, labels, plain)
+    raised_fit = rough.fit(trial, labels, included, rough.best)
+    table.put(labels, raised_fit.found.evidence, raised_fit)
     if len(labels) == 1:
         gained = table.found[labels, NOMINAL].evidence - table.nothing.evidence
         table.noted_alone(labels[0], gained)
-    _weigh_families(table, labels, point, levels)
-    if best(trial, levels, RAISED).noise_factor > RAISED_FROM:
-        _weigh_intermittent(table, labels, point)
+    if plain.best.noise_factor > RAISED_FROM:
+        _weigh_intermittent(table, labels)
+    _weigh_families(table, labels, plain, rough)
     table.forget(banned)
+
+
+def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
+    """Raised noise with a factor of its own in each channel, where that is more probable than one
+    for all. Factors and numbers are fitted in turn: each is off where the other one is. They start
+    from the factors that were most probable so far, and stay there where the set is far behind."""
+    if plain.best.noise_factor <= RAISED_FROM:
+        return plain
+    trial, included = table.trial, table.included(labels)
+    fit = plain.fit(trial, labels, included, plain.best)
+    before, rounds = table.best_of(RAISED), NOISE_ROUNDS
+    if before is not None and before.remainder.shaped:
+        fit = _fitted_with(table, labels, fit, before.remainder)
+        near = table.score(fit.found.evidence, labels, RAISED) > before.score - SEARCH_NATS
+        rounds = 1 if near else 0
+    for _ in range(rounds):
+        fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
+    if not math.isfinite(fit.found.evidence):
+        return plain
+    at, remainder = fit.point, fit.remainder
+    levels = evidence.levels(trial, at, included, fit.found.noise_factor, remainder)
+    shaped = Rough(at, remainder, levels)
+    return shaped if shaped.best.value > plain.best.value else plain
+
+
+def _fitted_with(table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder) -> Fit:
+    """The same causes with another remainder; as it is, where an earlier fit of them failed."""
+    if not math.isfinite(fit.found.evidence):
+        return fit
+    point, found = converge(
+        table.trial, table.included(labels), fit.found.numbers, fit.point.path, remainder=remainder
+    )
+    return Fit(point, found, remainder)
 
 
 def nominal_levels(
@@ -100,61 +158,76 @@ def raised_over_nominal(trial: Trial, noise: float) -> float:
 
 
 def changed(
-    trial: Trial, point: Point, included: tuple[str, ...], levels: Sequence[Level], family: str
+    trial: Trial, plain: Rough, rough: Rough, included: tuple[str, ...], family: str
 ) -> Change:
     """A change of one family's weights together with included causes, at its best size and noise.
 
-    The noise may be raised as well, since no family describes an unknown force exactly. The
-    family counts only if it is more probable with nominal noise than raised noise alone;
-    otherwise its functions are a fit to noise.
+    The noise may be raised as well, since no family describes an unknown force exactly: in the
+    most probable way, `rough`. The family counts only if it is more probable with nominal noise
+    than noise alone that is raised by one factor; otherwise its functions are a fit to noise.
     """
-    nominal, raised = [], []
-    for level in levels:  # made under `raised`
-        gained, size = fits.changed(trial, point, level, included, family, RAISING)
-        value, noise = level.value + gained, level.noise_factor
-        nominal.append((value - raised_over_nominal(trial, noise), size, noise))
-        raised.append((value, size, noise))
-    noisy = max(nominal)[0] > max(level.value for level in levels)
-    value, size, noise = max(raised if noisy else nominal)
-    return Change(Remainder(family, size, noisy), value, noise)
+
+    def tried(of: Rough) -> list[tuple[float, float, float]]:
+        """Log evidence, size of the change, λ at each level, which are made under `raised`."""
+        found = []
+        for level in of.levels:
+            gained, size = fits.changed(trial, of.point, level, included, family, of.remainder)
+            found.append((level.value + gained, size, level.noise_factor))
+        return found
+
+    nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
+    noisy = max(nominal)[0] > plain.best.value
+    value, size, noise = max(tried(rough) if noisy else nominal)
+    if not noisy:
+        return Change(plain.point, Remainder(family, size), value, noise)
+    remainder = replace(rough.remainder, kind=family, size=size, noisy=True)
+    return Change(rough.point, remainder, value, noise)
 
 
-def _weigh_families(
-    table: Hypotheses, labels: tuple[str, ...], point: Point, levels: Sequence[Level]
-) -> None:
+def _weigh_families(table: Hypotheses, labels: tuple[str, ...], plain: Rough, rough: Rough) -> None:
     trial, included = table.trial, table.included(labels)
-    plain = max((table.found[labels, kind] for kind in (NOMINAL, RAISED)), key=lambda h: h.score)
-    changes = [changed(trial, point, included, levels, family) for family in trial.families]
+    kinds = (NOMINAL, RAISED, INTERMITTENT)
+    found = (table.found[labels, kind] for kind in kinds if (labels, kind) in table.found)
+    alone = max(found, key=lambda h: h.score)
+    changes = [changed(trial, plain, rough, included, family) for family in trial.families]
     scores = [table.score(c.value, labels, c.remainder.kind) for c in changes]
-    near = max((plain.score, *(score - SEARCH_NATS for score in scores)))
+    near = max((alone.score, *(score - SEARCH_NATS for score in scores)))
     for one, score in zip(changes, scores, strict=True):
-        _weigh_change(table, labels, point, one, plain, score >= near)
+        _weigh_change(table, labels, one, alone, score >= near)
 
 
 def _weigh_change(
-    table: Hypotheses, labels: tuple[str, ...], point: Point, one: Change, plain: Hypothesis,
-    leads: bool,
-) -> None:  # fmt: skip
+    table: Hypotheses, labels: tuple[str, ...], one: Change, alone: Hypothesis, leads: bool
+) -> None:
     """The set together with a change of one family; linearised again if that is promising."""
     trial, included, remainder = table.trial, table.included(labels), one.remainder
     if not leads:  # far behind: its numbers are never asked for
-        found = replace(plain.found, evidence=one.value)
-        table.put(labels, one.value, Fit(point, found, remainder))
+        found = replace(alone.found, evidence=one.value)
+        table.put(labels, one.value, Fit(one.point, found, remainder))
         return
-    here, _ = evidence.scan(trial, point, (), included, one.noise, remainder)
+    here, _ = evidence.scan(trial, one.point, (), included, one.noise, remainder)
     if labels:
-        again, base = converge(trial, included, here.numbers, point.path, remainder=remainder)
+        again, base = converge(trial, included, here.numbers, one.point.path, remainder=remainder)
         if math.isfinite(base.evidence) and base.evidence > one.value:
             table.put(labels, base.evidence, Fit(again, base, remainder))
             return
-    table.put(labels, max(one.value, here.evidence), Fit(point, here, remainder))
+    table.put(labels, max(one.value, here.evidence), Fit(one.point, here, remainder))
 
 
-def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...], point: Point) -> None:
-    """An intermittent side force instead of raised process noise. A force without a gain over
-    raised noise is that noise, and is not counted twice."""
-    raised = table.found[labels, RAISED]
-    fit = Fit(point, raised.found, Remainder(INTERMITTENT))
-    tried = table.intermittent(fit)
-    if tried.gain > 0.0:
-        table.put(labels, raised.evidence + tried.gain, fit, tried)
+def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
+    """An intermittent side force instead of raised process noise, with the causes fitted together
+    with it: fitted to raised noise alone they would make up for it. Less probable than noise that
+    is raised in each channel by itself it is that noise, and is not counted twice. Nor is a set
+    asked that is far behind another one with raised noise."""
+    raised, most = table.found[labels, RAISED], table.best_of(RAISED)
+    assert most is not None
+    if raised.score < most.score - SEARCH_NATS:
+        return
+    fit, before, rounds = table.fit(raised), table.best_of(INTERMITTENT), FORCE_ROUNDS
+    if before is not None:
+        fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
+    for _ in range(rounds):
+        tried = table.intermittent(fit)
+        fit = _fitted_with(table, labels, fit, tried.remainder)
+    if tried.gain > 0.0 and fit.found.evidence > raised.evidence:
+        table.put(labels, fit.found.evidence, fit, tried)

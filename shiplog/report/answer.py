@@ -107,7 +107,7 @@ def verdict(
     sentence = f"{none_named(context.lost)}."
     if not context.lost:
         sentence = verdicts.sentence(
-            word, causes, structure, found, decision.fit.found.noise_factor, context.alone,
+            word, causes, structure, found, decision.fit.noise_factor, context.alone,
             ranking, context.wrong,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes

@@ -20,6 +20,9 @@ from shiplog.simulation.error_reduction import Gain
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
 HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
+# Times the nominal process noise, from which it is mentioned: from one nominal campaign to the next
+# it differs by less
+NOTED_NOISE = 1.15
 
 
 @dataclass(frozen=True)
@@ -242,8 +245,14 @@ def sentence(
         return "Not trained in these conditions: record data there first, then diagnose again."
     if verdict == "external":
         return "The ship was pushed, held or towed: no force of its own explains these intervals."
-    return (
+    text = (
         "No change found: the errors are those that the model already has on its nominal voyages."
+    )
+    if noise_factor < NOTED_NOISE:
+        return text
+    return (
+        f"{text} Process noise is {noise_factor:.1f} times its nominal standard deviation, as "
+        "ordinary weather makes it."
     )
 
 

@@ -71,6 +71,12 @@ def test_nothing(trial):
     assert found.verdict == "undecided"
 
 
+def test_noise_as_on_an_ordinary_day_is_nothing_and_its_factor_is_reported(trial):
+    found = verdict(trial, {((), RAISED): 0.96, ((), NOMINAL): 0.04}, raised=1.3)
+    assert (found.verdict, found.structure, found.fit.noise_factor) == ("none", None, 1.3)
+    assert verdict(trial, {((), RAISED): 0.96, ((), NOMINAL): 0.04}).verdict == "unknown"
+
+
 def test_a_trace_is_reported_and_is_no_name(trial):
     """There for sure, and too small to matter."""
     found = verdict(trial, {(DRAG, NOMINAL): 0.97, ((), NOMINAL): 0.03}, sizes={"drag": 0.05})

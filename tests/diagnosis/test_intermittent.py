@@ -8,7 +8,14 @@ import pytest
 import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
-from shiplog.diagnosis import intermittent, likelihood, segments, unrecorded_thruster
+from shiplog.diagnosis import (
+    intermittent,
+    likelihood,
+    raised_noise,
+    segments,
+    unrecorded_thruster,
+)
+from shiplog.diagnosis.remainder import RAISED
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 COUNT = 24
@@ -35,15 +42,47 @@ def passed(force: float):
     )
 
 
+def left_by(linear, weight):
+    none = np.zeros(linear.j.shape[-1])
+    return raised_noise.left_by(linear, none, PROCESS_NOISE, weight, 1.0)
+
+
+def estimated(linear, weight, reference, at_one_place=None):
+    return unrecorded_thruster.estimate_side_force(left_by(linear, weight), reference, at_one_place)
+
+
+def test_noise_is_raised_in_each_channel_by_as_much_as_was_drawn():
+    """In addition to the nominal noise: three times that in sway, as much as that in surge."""
+    count = 4 * COUNT  # so that the spread of a drawn factor is 4 %
+    record, drawn_by = straight.sailed(count), np.array([1.0, 3.0, 1.5])
+    knots = segments.grid(record).knots
+    more = replace(PROCESS_NOISE, acceleration=PROCESS_NOISE.acceleration * drawn_by)
+    drawn = np.random.default_rng(8).standard_normal((count, 3 * knots))
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
+    left = left_by(linear, np.ones(count))
+    value, remainder = raised_noise.by_channel(left)
+    assert remainder.kind == RAISED
+    assert remainder.channels == pytest.approx(tuple(np.hypot(1.0, drawn_by)), rel=0.1)
+    alike = max(left.likelihood(PROCESS_NOISE.times(f)) for f in np.linspace(0.5, 4.0, 50))
+    assert value == pytest.approx(left.likelihood(remainder.in_noise(PROCESS_NOISE)))
+    assert value > alike + 10.0
+
+
+def test_nominal_noise_at_one_place_is_raised_with_the_others():
+    left = left_by(passed(40.0), np.ones(COUNT))
+    _, remainder = raised_noise.by_channel(left, np.array([0.0, 0.01, 0.004]))
+    side = (remainder.channels[1] * remainder.channels[2]) ** 0.5
+    assert remainder.intermittent == pytest.approx((0.0, 0.01 * side, 0.004 * side))
+
+
 def test_forces_at_one_place_are_found_there(reference):
     linear = passed(40.0)
-    none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
+    weight = np.ones(COUNT)
+    found = estimated(linear, weight, reference)
     assert found.gain > 30.0
     assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.05)
-    quiet = unrecorded_thruster.estimate_side_force(
-        passed(0.0), none, reference, PROCESS_NOISE, weight
-    )
+    quiet = estimated(passed(0.0), weight, reference)
     assert quiet.gain < 3.0
 
 
@@ -57,48 +96,34 @@ def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference
     drawn = np.random.default_rng(8).standard_normal((COUNT, 3 * knots))
     accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
     linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
-    none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    assert (
-        unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight).gain
-        < 0.0
-    )
+    assert estimated(linear, np.ones(COUNT), reference).gain < 0.0
 
 
 def test_a_segment_that_says_nothing_is_as_if_it_were_not_there(reference):
     """One on which the model diverged: rows of zeros, nothing of it measured."""
     linear = passed(40.0)
-    none = np.zeros(linear.j.shape[-1])
     lost = np.arange(COUNT) == 7
     used = linear.cut.used & ~lost[:, None, None]
     zeroed = [np.where(lost.reshape(-1, *[1] * (v.ndim - 1)), 0.0, v)
               for v in (linear.e, linear.z, linear.j)]  # fmt: skip
     away = replace(linear, cut=replace(linear.cut, used=used), lost=lost,
                    e=zeroed[0], z=zeroed[1], j=zeroed[2])  # fmt: skip
-    found = unrecorded_thruster.estimate_side_force(
-        away, none, reference, PROCESS_NOISE, np.where(lost, 0.0, 1.0)
-    )
-    without = unrecorded_thruster.estimate_side_force(
-        linear.pick(~lost), none, reference, PROCESS_NOISE, np.ones(COUNT - 1)
-    )
+    found = estimated(away, np.where(lost, 0.0, 1.0), reference)
+    without = estimated(linear.pick(~lost), np.ones(COUNT - 1), reference)
     assert (found.gain, found.lever) == pytest.approx((without.gain, without.lever))
 
 
 def test_a_nominal_force_at_one_place_is_no_force_of_the_trial(reference):
     """Bursts at one place: a force at that place unless they are nominal there."""
     linear = passed(40.0)
-    none, weight = np.zeros(linear.j.shape[-1]), np.ones(COUNT)
-    found = unrecorded_thruster.estimate_side_force(linear, none, reference, PROCESS_NOISE, weight)
-    nominal = found.force * found.unit
-    again = unrecorded_thruster.estimate_side_force(
-        linear, none, reference, PROCESS_NOISE, weight, nominal
-    )
+    weight = np.ones(COUNT)
+    found = estimated(linear, weight, reference)
+    again = estimated(linear, weight, reference, found.force * found.unit)
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
     # together with a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
-    other = unrecorded_thruster.estimate_side_force(
-        linear, none, reference, PROCESS_NOISE, weight, elsewhere
-    )
+    other = estimated(linear, weight, reference, elsewhere)
     assert other.gain > 20.0
 
 
@@ -112,12 +137,18 @@ def asked(monkeypatch):
     """Residuals of the nominal campaign when the force is tested, and the weights."""
     output = {}
 
-    def estimate_side_force(linear, d, reference, process_noise, weight):
-        left = likelihood.weighed(linear, process_noise).dd[:, 0, 0]
+    real = raised_noise.left_by
+
+    def left_by(linear, d, nominal, weight, counts):
+        left = likelihood.weighed(linear, nominal).dd[:, 0, 0]
         output.update(left=left, weight=weight)
         assert not d.any()
+        return real(linear, d, nominal, weight, counts)
+
+    def estimate_side_force(left, reference):
         return SideForce(0.0, output.get("gain", 7.0), 0.3, 2.0, UNIT)
 
+    monkeypatch.setattr(raised_noise, "left_by", left_by)
     monkeypatch.setattr(unrecorded_thruster, "estimate_side_force", estimate_side_force)
     return output
 

@@ -68,6 +68,16 @@ def test_what_is_below_practical_size_is_no_change(trial):
     )
 
 
+@pytest.mark.parametrize("raised", (1.49, 1.51))
+def test_noise_as_on_an_ordinary_day_is_no_change(trial, raised):
+    """A quarter more wind: nothing is raised, beside a cause neither."""
+    made = weighed.search(trial, {((), RAISED): 0.6, (DRAG, RAISED): 0.4}, raised=raised)
+    found = posterior(made)
+    assert found.none == pytest.approx(0.6 if raised < 1.5 else 0.0)
+    assert found.kinds.get(RAISED, 0.0) == pytest.approx(0.0 if raised < 1.5 else 1.0)
+    assert found.names["drag"] == pytest.approx(0.4)
+
+
 def test_one_of_two_stated_names_is_not_enough(trial):
     """A or B: together sure, each by itself not."""
     found = posterior(weighed.search(trial, {(DRAG, NOMINAL): 0.55, (LOAD, NOMINAL): 0.45}))
@@ -121,13 +131,17 @@ def test_a_stated_name_is_reported_in_its_likeliest_kind(trial):
 
 
 def test_share_of_what_is_explained_by_causes(trial):
-    """Of 50 nats with a change of position 10 are the cause's; of raised noise it is the better."""
+    """Of 50 nats with a change of position 4 are the cause's with nominal noise. With raised noise
+    it has 10, of which the noise has 6 by itself: 4 of 44."""
     both = weighed.search(
-        trial, {(DRAG, "position"): 0.9, (DRAG, NOMINAL): 0.05, (DRAG, RAISED): 0.05},
-        evidence={(DRAG, "position"): 50.0, (DRAG, NOMINAL): 4.0, (DRAG, RAISED): 10.0},
+        trial,
+        {(DRAG, "position"): 0.9, (DRAG, NOMINAL): 0.04, (DRAG, RAISED): 0.04, ((), RAISED): 0.02},
+        evidence={
+            (DRAG, "position"): 50.0, (DRAG, NOMINAL): 4.0, (DRAG, RAISED): 10.0, ((), RAISED): 6.0,
+        },
     )  # fmt: skip
     of = both.table.found
-    assert share_of_causes(both.table, of[DRAG, "position"]) == pytest.approx(0.2)
+    assert share_of_causes(both.table, of[DRAG, "position"]) == pytest.approx(4.0 / 44.0)
     assert share_of_causes(both.table, of[DRAG, RAISED]) == pytest.approx(1.0)
     assert share_of_causes(both.table, of[(), NOMINAL]) == 1.0  # nothing is explained
     del of[DRAG, NOMINAL], of[DRAG, RAISED]

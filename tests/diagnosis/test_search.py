@@ -57,6 +57,7 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
 def search_of(trial, point, placebo=None, banned=()) -> Search:
     made = Search(trial, point, placebo or {}, banned)
     made.table.intermittent = straight.no_hull
+    made.table.nominal_side_force = None
     return made
 
 
@@ -213,22 +214,33 @@ def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
         table.intermittent = no_force
         weigh(table, (), {}, point)
         assert table.found[(), RAISED].found.noise_factor > 1.5
-        assert asked == [Remainder(INTERMITTENT)]
+        assert asked[0].kind == RAISED
         assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
 
 
 @pytest.mark.parametrize("gain", [40.0, -1.0])
 def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
-    trial, point = trial_with({}, accelerations=raised_noise())
+    """Its evidence is that of the trial with the force in the process noise."""
+    plain, _ = trial_with({})
+    knots, unit = plain.grid.knots, np.array([0.0, 0.3, 0.2])
+    alone = replace(
+        straight.PROCESS_NOISE, acceleration=1e-6 * straight.PROCESS_NOISE.acceleration,
+        intermittent=2.0 * unit,
+    )  # fmt: skip
+    drawn = np.random.default_rng(6).standard_normal((8, 3 * knots))
+    pushed = drawn @ np.linalg.cholesky(alone.kernel(knots)).T
+    trial, point = trial_with({}, accelerations=pushed)
     table = search_of(trial, point).table
-    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 1.0, np.zeros(3))
+    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit)
     weigh(table, (), {}, point)
     if gain < 0.0:
         assert ((), INTERMITTENT) not in table.found
         return
     one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
-    assert one.evidence - raised.evidence == pytest.approx(gain)
-    assert one.score - raised.score == pytest.approx(gain)
+    assert one.remainder.intermittent == pytest.approx(2.0 * unit)
+    again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
+    assert one.evidence == pytest.approx(again.value)
+    assert one.evidence > raised.evidence + 5.0
 
 
 @pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
@@ -249,7 +261,8 @@ def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_n
     )  # fmt: skip
     assert quiet == pytest.approx(wanted)
     assert quiet + 2.0 < raised < quiet + 60.0
-    change = weighing.changed(trial, point, (), levels, "time")
+    either = weighing.Rough(point, weighing.RAISING, levels)
+    change = weighing.changed(trial, either, either, (), "time")
     assert change.remainder == Remainder("time", 3.0, noisy)
     assert change.value == pytest.approx((raised if noisy else quiet) + gain)
 

@@ -182,3 +182,21 @@ def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
     assert less.weight.tolist() == (~out).astype(float).tolist()
     assert trial.weight.tolist() == [1.0] * 8
     assert less.first is trial.first and less.products is trial.products
+
+
+@pytest.mark.parametrize("kind", (NOMINAL, "position"))
+@pytest.mark.parametrize("out", ([0, 1, 2, 3], [4, 5, 6, 7], [2], [1, 2, 3, 4], range(8)))
+def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kind, out):
+    """Of whole voyages, of a part of one, of parts of both, and of all that there is."""
+    left_out = np.isin(np.arange(8), out)
+    point, remainder, products = trial.at({}), Remainder(kind), trial.products
+    found = products.without(point, 1.5, trial.weight, remainder, left_out)
+    weight = np.where(left_out, 0.0, trial.weight)
+    fresh = straight.trial(trial.campaign, trial.record, trial.given).products
+    wanted, _ = fresh.total(point, 1.5, weight, remainder)
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
+    if len(out) < 8:
+        assert (
+            np.abs(found[0, 0] / products.total(point, 1.5, trial.weight, remainder)[0][0, 0] - 1)
+            > 0.01
+        )

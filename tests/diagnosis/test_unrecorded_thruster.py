@@ -10,6 +10,7 @@ import pytest
 from shiplog.diagnosis import (
     likelihood,
     linear_segments,
+    raised_noise,
     segments,
     unrecorded_thruster,
 )
@@ -46,11 +47,8 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
         np.zeros((count, 1, 6, 0)),
     )  # fmt: skip
     monkeypatch.setattr(likelihood, "weighed", lambda *_: weighed)
-    # an earlier force is no matter
-    noise = replace(process_noise, intermittent=np.array([9.0, 9.0, 9.0]))
-    found = unrecorded_thruster.estimate_side_force(
-        linear, np.zeros(0), reference, noise, np.ones(count)
-    )
+    left = raised_noise.left_by(linear, np.zeros(0), afloat.PROCESS_NOISE, np.ones(count), 1.0)
+    found = unrecorded_thruster.estimate_side_force(left, reference)
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0

@@ -23,6 +23,7 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.relinearisation import converge
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError
 from shiplog.voyages.store import Store
@@ -173,9 +174,10 @@ def test_the_manoeuvre_that_separates_is_the_seamans(sea):
 def test_a_path_may_follow_a_force_that_comes_and_goes(sea):
     """By twice the acceleration of the process noise and of it together."""
     ref, intermittent = sea.campaign.reference, np.array([0.0, 0.02, 0.01])
-    plain, pulsed = ref.held(1.5), ref.held(1.5, intermittent)
+    raised = Remainder("raised", channels=(1.0, 2.0, 1.0), intermittent=(0.0, 0.02, 0.01))
+    plain, pulsed = ref.held(1.5, Remainder()), ref.held(1.5, raised)
     assert pulsed.acceleration**2 == pytest.approx(
-        plain.acceleration**2 + (2.0 * intermittent) ** 2
+        (plain.acceleration * (1.0, 2.0, 1.0)) ** 2 + (2.0 * intermittent) ** 2
     )
 
 

@@ -46,3 +46,8 @@ def test_the_gain_of_another_fit_alone_is_in_the_sentence():
         "32.0% less."
     )
     assert sentence("named", [sure], None, gained, 1.0, -0.1).endswith("has an error 10.0% more.")
+
+
+def test_noise_of_rougher_weather_is_mentioned_where_nothing_changed():
+    assert "noise" not in sentence("none", [], None, None, 1.1)
+    assert "Process noise is 1.3 times its nominal" in sentence("none", [], None, None, 1.3)

@@ -1,0 +1,76 @@
+"""Process noise that is raised in each channel by itself: rougher weather, with nothing at work.
+
+Waves and gusts do not raise the noise of surge, sway and yaw rate alike. Were all three raised by
+one factor, whatever acts on one of them more than on the others would look like a force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from shiplog.diagnosis import likelihood
+from shiplog.diagnosis.likelihood import ProcessNoise, Startless
+from shiplog.diagnosis.linear_segments import Linear
+from shiplog.diagnosis.remainder import RAISED, Remainder
+
+FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of the process noise, to start from
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a hypothesis leaves of a trial, to be explained by noise.
+
+    nominal   process noise; weight [S] of the segments; counts as `Reference.counts`
+    """
+
+    startless: Startless
+    nominal: ProcessNoise
+    weight: np.ndarray
+    counts: float
+
+    def likelihood(self, process_noise: ProcessNoise) -> float:
+        """Log likelihood, nats, up to a constant."""
+        each, volume = self.startless.square(process_noise)
+        return -0.5 * self.counts * (float(self.weight @ each) + volume)
+
+
+def left_by(
+    linear: Linear, d: np.ndarray, nominal: ProcessNoise, weight: np.ndarray, counts: float
+) -> Left:
+    """d [C] numbers of the pass; weight [S] of its segments."""
+    kept = weight > 0.0  # a segment that says nothing has no likelihood
+    linear, weight = linear.pick(kept), weight[kept]
+    # subtracted before it is squared: of products small differences of large numbers would be left
+    alone = replace(linear, e=linear.e - linear.j @ d, j=linear.j[..., :0])
+    startless = likelihood.startless(likelihood.weighed(alone, nominal), nominal)
+    return Left(startless, nominal, weight, counts)
+
+
+def by_channel(left: Left, at_one_place: np.ndarray | None = None) -> tuple[float, Remainder]:
+    """The most probable factors of surge, sway and yaw rate, and their log likelihood.
+
+    at_one_place  acceleration [3] of nominal process noise that acts at one place: it is raised
+                  with the others; None without any
+    """
+
+    def raised(factors: np.ndarray) -> Remainder:
+        channels = np.exp(factors)
+        force = None
+        if at_one_place is not None:
+            force = tuple(float(a) for a in at_one_place * math.sqrt(channels[1] * channels[2]))
+        return Remainder(RAISED, channels=tuple(map(float, channels)), intermittent=force)  # type: ignore[arg-type]
+
+    def value(factors: np.ndarray) -> float:
+        return left.likelihood(raised(factors).in_noise(left.nominal))
+
+    alike = max(FACTORS, key=lambda factor: left.likelihood(left.nominal.times(factor)))
+    first = np.full(3, math.log(alike))
+    found = minimize(
+        lambda at: -value(at), first, method="Nelder-Mead",
+        options={"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1},
+    )  # fmt: skip
+    return -float(found.fun), raised(found.x)
