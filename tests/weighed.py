@@ -32,12 +32,14 @@ def search(
     sizes: Mapping[str, float] | None = None,
     side_force: SideForce | None = None,
     raised: float = 2.0,
+    spread: float = 0.1,
 ) -> Search:
     """Hypotheses (causes, kind) with these probabilities, up to a factor.
 
     evidence   of a hypothesis; 100 nats a cause where none is given
     sizes      of a label's numbers
     raised     factor of raised process noise
+    spread     standard deviation of every number
     """
     point = of.first
     assert point is not None
@@ -51,7 +53,7 @@ def search(
         count = sum(map(len, numbers.values()))
         output = (evidence or {}).get((labels, kind), 100.0 * len(labels))
         noise = raised if kind == RAISED else 1.0
-        found = Found("+".join(labels), output, noise, numbers, 0.01 * np.eye(count))
+        found = Found("+".join(labels), output, noise, numbers, spread**2 * np.eye(count))
         remainder = Remainder(kind, 3.0)
         score = float(np.log(p)) - 40.0
         made.table.found[labels, kind] = Hypothesis(

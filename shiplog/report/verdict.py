@@ -251,8 +251,8 @@ def sentence(
     if noise_factor < NOTED_NOISE:
         return text
     return (
-        f"{text} Process noise is {noise_factor:.1f} times its nominal standard deviation, as "
-        "ordinary weather makes it."
+        f"{text} Process noise is {noise_factor:.1f} times its nominal standard deviation: no more "
+        "than it varies."
     )
 
 

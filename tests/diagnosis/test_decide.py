@@ -79,7 +79,8 @@ def test_noise_as_on_an_ordinary_day_is_nothing_and_its_factor_is_reported(trial
 
 def test_a_trace_is_reported_and_is_no_name(trial):
     """There for sure, and too small to matter."""
-    found = verdict(trial, {(DRAG, NOMINAL): 0.97, ((), NOMINAL): 0.03}, sizes={"drag": 0.05})
+    probability = {(DRAG, NOMINAL): 0.97, ((), NOMINAL): 0.03}
+    found = verdict(trial, probability, sizes={"drag": 0.05}, spread=0.01)
     assert (found.verdict, named(found)) == ("none", [])
     assert [one.cause.label for one in found.traces] == ["drag"]
 

@@ -58,14 +58,24 @@ def test_a_factor_of_all_scores_changes_nothing(trial):
 
 def test_what_is_below_practical_size_is_no_change(trial):
     """`drag` at 0.09 of 0.1; together with `load`, which is large, only that is there."""
-    made = weighed.search(trial, MIXED, sizes={"drag": 0.09})
+    made = weighed.search(trial, MIXED, sizes={"drag": 0.09}, spread=0.001)
     found = posterior(made)
     assert found.names == pytest.approx({"load": 0.25, "clock": 0.18})
     assert found.none == pytest.approx(0.45)  # its hypotheses with a remainder are not nothing
-    assert posteriors.practical(made.table, made.table.found[("drag", "load"), NOMINAL]) == LOAD
-    assert posterior(weighed.search(trial, MIXED, sizes={"drag": -0.11})).none == pytest.approx(
-        0.05
-    )
+    both = posteriors.practical(made.table, made.table.found[("drag", "load"), NOMINAL])
+    assert both == {"drag": 0.0, "load": 1.0}
+    larger = weighed.search(trial, MIXED, sizes={"drag": -0.11}, spread=0.001)
+    assert posterior(larger).none == pytest.approx(0.05)
+
+
+def test_a_name_is_as_probable_as_a_practical_size_is(trial):
+    """`drag` there for sure: 0.12 with a spread of 0.02 is beyond 0.1 in 84 of 100 draws, and below
+    that there is no change."""
+    made = weighed.search(trial, {(DRAG, NOMINAL): 1.0}, sizes={"drag": 0.12}, spread=0.02)
+    found = posterior(made)
+    assert found.names["drag"] == pytest.approx(0.841, abs=0.03)
+    assert found.none == pytest.approx(1.0 - found.names["drag"])
+    assert found.stated == ()
 
 
 @pytest.mark.parametrize("raised", (1.49, 1.51))

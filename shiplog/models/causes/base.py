@@ -245,10 +245,10 @@ class Cause:
         numbers = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in estimates.items())
         return f"{self.story} {numbers}."
 
-    def practical(self, p: np.ndarray, setting: Setting) -> bool:
-        """Whether any of its numbers is large enough to matter."""
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        """Whether any of its numbers [..., Q] is large enough to matter: [...] bool."""
         least = np.array([setting.least(q) for q in self.parameters])
-        return bool((np.abs(p) >= least).any())
+        return np.asarray((np.abs(p) >= least).any(-1))
 
 
 def constants_of(causes: Iterable[Cause], setting: Setting) -> dict[str, np.ndarray]:

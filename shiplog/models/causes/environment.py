@@ -165,8 +165,8 @@ class ShallowWater(Cause):
             f"{1.0 + 1.2 * estimates['strength'].value:.2f} times that of deep water."
         )
 
-    def practical(self, p: np.ndarray, setting: Setting) -> bool:
-        return bool(p.max() > 0.05)
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(p.max(-1) > 0.05)
 
 
 def _bumps(state: Any, places: Any, spacing: Any) -> Any:

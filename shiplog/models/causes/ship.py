@@ -323,8 +323,8 @@ class RudderOffset(_OnRudders):
         )
         return f"The {self.what} have an offset of {angles} from the recorded angle."
 
-    def practical(self, p: np.ndarray, setting: Setting) -> bool:
-        return bool(np.abs(p).max() > np.radians(0.3))
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return np.asarray(np.abs(p).max(-1) > np.radians(0.3))
 
 
 @dataclass(frozen=True)
