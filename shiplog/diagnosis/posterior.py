@@ -1,8 +1,8 @@
 """Probabilities of causes and remainders, and the verdict that they allow.
 
 P(cause) is the sum over all hypotheses that contain it, each times the probability that its numbers
-are then of practical size. A cause is named where that is at least
-`thresholds.STATED`; otherwise a kind of remainder is, or nothing, or the verdict is undecided.
+are then of practical size. A cause is named where that is at least `thresholds.STATED`; otherwise a
+kind of remainder is, or nothing, or the verdict is undecided.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.remainder import NOMINAL, RAISED
 from shiplog.diagnosis.search import Search
+from shiplog.models.causes.base import deviations
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
@@ -109,28 +110,28 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
 
 def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
     """Label → probability, given this hypothesis, that its numbers are large enough to matter."""
-    by, setting = {c.label: c for c in table.catalogue}, table.trial.reference.setting
-    columns, covariance = table.trial.reference.columns, one.found.covariance
+    reference, covariance = table.trial.reference, one.found.covariance
+    by = {c.label: c for c in table.catalogue}
     found, at = {}, 0
     for label, numbers in one.found.numbers.items():
-        part = slice(at, at + len(columns.of[label]))
+        part = slice(at, at + len(reference.columns.of[label]))
         at = part.stop
         if label not in one.causes:
             continue
         drawn = np.asarray(numbers)[None]
         if covariance is not None:
-            drawn = numbers + _drawn(covariance[part, part])
-        found[label] = float(by[label].practical(drawn, setting).mean())
+            drawn = drawn + _deviations(covariance[part, part])
+        found[label] = float(np.mean(by[label].practical(drawn, reference.setting)))
     return found
 
 
-def _drawn(covariance: np.ndarray) -> np.ndarray:
-    """[DRAWS, Q] deviations, always the same normal ones."""
-    unit = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    scale = np.where(unit > 0.0, unit, 1.0)
-    values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))
-    return (normal * np.sqrt(np.maximum(values, 0.0))) @ axes.T * scale
+def _deviations(covariance: np.ndarray) -> np.ndarray:
+    """As `deviations`; none where a fit far behind has no covariance any more. Gaussian, as the
+    evidence is."""
+    try:
+        return deviations(covariance, math.inf, DRAWS)
+    except np.linalg.LinAlgError:
+        return np.zeros((1, len(covariance)))
 
 
 def practical_kind(one: Hypothesis) -> str:

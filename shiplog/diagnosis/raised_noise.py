@@ -24,7 +24,9 @@ FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0)  # of the process nois
 class Left:
     """What a hypothesis leaves of a trial, to be explained by noise.
 
-    nominal   process noise; weight [S] of the segments; counts as `Reference.counts`
+    nominal   process noise of the nominal campaign
+    weight    [S] of the segments
+    counts    as `Reference.counts`
     """
 
     startless: Startless
@@ -41,7 +43,8 @@ class Left:
 def left_by(
     linear: Linear, d: np.ndarray, nominal: ProcessNoise, weight: np.ndarray, counts: float
 ) -> Left:
-    """d [C] numbers of the pass; weight [S] of its segments."""
+    """What numbers d [C], SI, leave of a pass; weight [S] of its segments. Raises
+    np.linalg.LinAlgError where its path diverged."""
     kept = weight > 0.0  # a segment that says nothing has no likelihood
     linear, weight = linear.pick(kept), weight[kept]
     # subtracted before it is squared: of products small differences of large numbers would be left
@@ -61,8 +64,10 @@ def by_channel(left: Left, at_one_place: np.ndarray | None = None) -> tuple[floa
         channels = np.exp(factors)
         force = None
         if at_one_place is not None:
-            force = tuple(float(a) for a in at_one_place * math.sqrt(channels[1] * channels[2]))
-        return Remainder(RAISED, channels=tuple(map(float, channels)), intermittent=force)  # type: ignore[arg-type]
+            ahead, across, turning = at_one_place * math.sqrt(channels[1] * channels[2])
+            force = (float(ahead), float(across), float(turning))
+        surge, sway, yaw_rate = map(float, channels)
+        return Remainder(RAISED, channels=(surge, sway, yaw_rate), intermittent=force)
 
     def value(factors: np.ndarray) -> float:
         return left.likelihood(raised(factors).in_noise(left.nominal))

@@ -23,9 +23,10 @@ class Remainder:
     kind          NOMINAL, RAISED, INTERMITTENT, or a family of the discrepancy
     size          of a change of that family's weights
     noisy         whether process noise is raised together with that change
-    channels      factors of the process noise in surge, sway and yaw rate, beside the common one
-    intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force, where
-                  it is a device's
+    channels      factors of the process noise in surge, sway and yaw rate, in addition to the
+                  common one
+    intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force at one
+                  place, in addition to the process noise
     """
 
     kind: str = NOMINAL
@@ -49,7 +50,7 @@ class Remainder:
         return self.noisy or self.kind in (RAISED, INTERMITTENT)
 
     def overall(self, noise_factor: float) -> float:
-        """A common factor and those of the channels in one, their geometric mean."""
+        """A common factor times the geometric mean of those of the channels."""
         return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
 
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
@@ -73,5 +74,5 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     by_channel = np.log(noise * np.array(remainder.channels)) / RAISED_SPREAD
     square, cost = by_channel @ by_channel, math.log(RAISED_SPREAD / nominal)
     if not remainder.shaped:  # one number for all three
-        return float(-0.5 * square / SHAPE_NUMBERS - cost)
+        return float(-0.5 * square / len(by_channel) - cost)
     return float(-0.5 * square - SHAPE_NUMBERS * cost)

@@ -45,10 +45,8 @@ class Products:
     def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
         """Products of the point, and the wanted factors λ: one pass serves every λ, but that of an
         intermittent force together with the process noise, whose axes turn with it."""
-        process_noise, shape, left = (
-            remainder.in_noise(self._campaign.reference.process_noise), remainder.shape,
-            noise_factor,
-        )  # fmt: skip
+        process_noise = remainder.in_noise(self._campaign.reference.process_noise)
+        shape, left = remainder.shape, noise_factor
         if process_noise.intermittent is not None:
             process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0
         for of, known, found in self._modes:

@@ -18,7 +18,9 @@ from shiplog.diagnosis.trial import Trial
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
-RAISED_FROM = 1.2  # times the nominal process noise, from which an intermittent force is tested
+# Times the nominal process noise, from which a factor for each channel, and an intermittent force,
+# are tested
+RAISED_FROM = 1.2
 RAISING = Remainder(RAISED)
 NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
 FORCE_ROUNDS = 2  # of fitting an intermittent force and numbers in turn
@@ -36,9 +38,8 @@ class Rough:
     def best(self) -> Level:
         return max(self.levels, key=lambda level: level.value)
 
-    def fit(
-        self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level
-    ) -> Fit:  # fmt: skip
+    def fit(self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level) -> Fit:
+        """The set at one of its levels."""
         numbers = evidence.numbers_of(trial, one, self.point, included)
         found = Found("+".join(labels), one.value, one.noise_factor, *numbers)
         return Fit(self.point, found, self.remainder)

@@ -20,9 +20,7 @@ from shiplog.simulation.error_reduction import Gain
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
 HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
-# Times the nominal process noise, from which it is mentioned: from one nominal campaign to the next
-# it differs by less
-NOTED_NOISE = 1.15
+NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def test_a_name_is_as_probable_as_a_practical_size_is(trial):
 
 @pytest.mark.parametrize("raised", (1.49, 1.51))
 def test_noise_as_on_an_ordinary_day_is_no_change(trial, raised):
-    """A quarter more wind: nothing is raised, beside a cause neither."""
+    """A quarter more wind: no unknown remains, with a cause or without one."""
     made = weighed.search(trial, {((), RAISED): 0.6, (DRAG, RAISED): 0.4}, raised=raised)
     found = posterior(made)
     assert found.none == pytest.approx(0.6 if raised < 1.5 else 0.0)

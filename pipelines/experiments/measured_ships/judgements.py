@@ -10,7 +10,8 @@ JUDGEMENTS: dict[str, str] = {
     "esso-osaka, published": (
         "Half of it. The position's clock is right: the sensors alone say 0.95 s between position "
         "and velocity. That the wind pushes half as hard athwart as published, the random trials "
-        "alone say, too. The wind's clock is unconfirmed, and half of the error is left."
+        "alone say, too. The antenna's offset of a tenth of a metre is unconfirmed, and half of "
+        "the error is left."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "

@@ -223,12 +223,7 @@ class Cause:
 
         freedom   degrees of it with which the covariance's size is known: Student's t
         """
-        rng = np.random.default_rng(0)
-        root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(p)))
-        drawn = rng.standard_normal((draws, len(p))) @ root.T
-        if math.isfinite(freedom):
-            drawn *= np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
-        many = self.displayed(p + drawn)
+        many = self.displayed(p + deviations(covariance, freedom, draws))
         found = {}
         for name, (value, unit) in self.displayed(np.asarray(p, dtype=float)).items():
             spread = many[name][0] - value
@@ -249,6 +244,22 @@ class Cause:
         """Whether any of its numbers [..., Q] is large enough to matter: [...] bool."""
         least = np.array([setting.least(q) for q in self.parameters])
         return np.asarray((np.abs(p) >= least).any(-1))
+
+
+def deviations(covariance: np.ndarray, freedom: float, draws: int) -> np.ndarray:
+    """[draws, Q] from the most probable numbers, SI; the same ones at each call.
+
+    covariance   [Q, Q], SI
+    freedom      degrees of it with which the covariance's size is known: Student's t
+
+    Raises np.linalg.LinAlgError where the covariance is none.
+    """
+    rng = np.random.default_rng(0)
+    root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(covariance)))
+    drawn = rng.standard_normal((draws, len(covariance))) @ root.T
+    if math.isfinite(freedom):
+        drawn *= np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
+    return drawn
 
 
 def constants_of(causes: Iterable[Cause], setting: Setting) -> dict[str, np.ndarray]:
