@@ -124,7 +124,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     whole = tried.covering(decided.point)
     reach("external forces")
     external, out_of_reach = error_location.external(
-        tried, decided.point, whole, decision.fit.remainder
+        tried, decided.point, whole, decision.fit.remainder, nominal
     )
     tried = tried.leaving_out(out_of_reach)
     judge = None if judge is None else replace(judge, trial=tried)

@@ -8,7 +8,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.trial_voyages import windows_of
 from shiplog.profile import Profile
 from shiplog.simulation import baselines
-from shiplog.simulation.error_reduction import parts
+from shiplog.simulation.error_reduction import parts, stays
 from shiplog.simulation.rollout import simulate
 from shiplog.training.load_model import Run
 from shiplog.voyages.store import Store
@@ -20,7 +20,8 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
     """Why the run's model cannot identify causes that change forces; empty where it can.
 
     Quadratic least squares is fitted to all nominal voyages but one in turn, and rolled out on
-    that one. The physical model was fitted to all of them, so the comparison favours it.
+    that one. The physical model was fitted to all of them, so the comparison favours it. Windows
+    in which either diverges are left out.
     """
     if run.lacks or not run.judges_itself:
         return run.lacks
@@ -37,6 +38,10 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
         fitted = baselines.least_squares(cut.pick(np.flatnonzero(~out)))
         left = cut.pick(np.flatnonzero(out))
         plain[out] = parts(simulate(fitted, left) - left.state, left.dt)
+    counted = stays(own) & stays(plain)
+    if not counted.any():
+        return ""
+    own, plain = own[counted], plain[counted]
     share = plain.sum(1).mean() / max(own.sum(1).mean(), 1e-12)
     if share >= thresholds.BASELINE:
         return ""

@@ -36,11 +36,15 @@ def decide(
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
     device = is_device(table, best, fit)  # then what remains has a name, too
-    mostly = device or posteriors.share_of_causes(table, best) >= thresholds.MOST
-    mostly = mostly and (posteriors.slight(table, best) or not _imitated(table, fit, names))
+    in_doubt: dict[str, str] = {}
+    if not posteriors.slight(table, best):
+        in_doubt = _imitated(table, fit, names)
+    sure = tuple(name for name in names if name not in in_doubt)
+    kept = [n for n in best.causes if name_of(n) not in in_doubt]
+    mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
     verdict, structure, named, side_force = "undecided", None, (), None
-    if names and mostly:
-        verdict, named = "named", _named(table, found, best, names)
+    if sure and mostly:
+        verdict, named = "named", _named(table, found, best, sure)
     elif best.kind != NOMINAL and (kind is not None or names):
         verdict, structure = "unknown", _structure(table, best, fit)
     elif found.none >= thresholds.STATED:
@@ -58,20 +62,25 @@ def decide(
     nothing = Fit(table.first, table.nothing.found, reported.remainder)
     return Decision(
         verdict, named, structure, side_force, traces,
-        _reasons(search, found, refuted | dict(doubted or {}), named),
+        _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
         found.ranking(), reported, nothing, search.expected,
     ), found  # fmt: skip
 
 
-def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> bool:
-    """Whether the remainder could reproduce most of a named cause's effect. An offset of the
-    rudder, for instance, may be a part of an unknown force of the controls."""
-    shares = [
-        fits.imitated(table.trial, fit, label)
-        for label in fit.included
-        if label not in table.trial.fixed and name_of(label) in names
-    ]
-    return any(share > thresholds.MOST for share in shares)
+def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> dict[str, str]:
+    """Names → why each is in doubt: the remainder could do most of what the cause does. An offset
+    of the rudder, for instance, may be a part of an unknown force of the controls. That puts no
+    other cause in doubt."""
+    shares: dict[str, float] = {}
+    for label in fit.included:
+        if label not in table.trial.fixed and name_of(label) in names:
+            share = fits.imitated(table.trial, fit, label)
+            shares[name_of(label)] = max(share, shares.get(name_of(label), 0.0))
+    return {
+        name: f"what remains unknown could do {share:.0%} of it as well"
+        for name, share in shares.items()
+        if share > thresholds.MOST
+    }
 
 
 def _named(

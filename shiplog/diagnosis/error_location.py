@@ -32,6 +32,7 @@ from shiplog.simulation.extended_simulator import campaign
 from shiplog.simulation.sensitivities import series
 from shiplog.training.load_model import Run
 from shiplog.voyages import one_hertz
+from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
 
@@ -40,19 +41,26 @@ PAUSE_NODES = 2.5  # nodes that an intermittent force may pause for
 
 
 def external(
-    trial: Trial, point: Point, whole: Linear, remainder: Remainder
+    trial: Trial, point: Point, whole: Linear, remainder: Remainder, nominal: Record | None
 ) -> tuple[list[Interval], np.ndarray]:
     """Stretches that no force of the ship explains, and the segments [S] bool that they touch: no
     hypothesis is judged on those. The point is of the model as it stands, `whole` its pass with
-    the segments between its own."""
+    the segments between its own; `nominal` the voyages of the nominal campaign, if there is one."""
     ref = trial.reference
+    physics, values = ref.model.stand_in, np.array(list(ref.coefficients.values()))
     base, _ = evidence.scan(trial, point, (), trial.fixed, remainder=remainder)
     fit = Fit(point, base, remainder)
-    found = external_forces.find(
-        *fits.residual(trial, fits.of_parts(trial, whole, fit), fit),
-        trial.process_noise(remainder).times(base.noise_factor), trial.record,
-        ref.model.stand_in, np.array(list(ref.coefficients.values())),
-    )  # fmt: skip
+    residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
+    process_noise = trial.process_noise(remainder).times(base.noise_factor)
+    found = external_forces.find(residual, d, process_noise, trial.record, physics, values)
+    left = None if nominal is None else trial.campaign.residual(nominal)
+    if found and left is not None and nominal is not None:
+        none = np.zeros(left.j.shape[-1])
+        weighed = external_forces.balance(left, none, ref.process_noise, nominal, physics, values)
+        found = external_forces.find(
+            residual, d, process_noise, trial.record, physics, values,
+            external_forces.most(weighed, nominal),
+        )  # fmt: skip
     out = np.zeros(len(trial.rows), dtype=bool)
     of = np.array(trial.record.names)[trial.record.voyage[trial.rows]]
     begin = trial.record.time[trial.rows]

@@ -2,7 +2,8 @@
 
 The residual acceleration times mass and added mass is compared with the largest force of the ship:
 screws at full power, rudders at every angle in their slipstream, wind, hull, and the model's
-nominal error. A larger force is external.
+nominal error. A larger force is external. Where the nominal voyages have as large a force, which
+nothing pushed, it is an error of the model and not external.
 """
 
 from __future__ import annotations
@@ -86,15 +87,27 @@ class Balance:
     rows   [K]     of the record
     force  [K, 3]  unexplained
     sd     [K, 3]
-    limit  [K, 3]  what ship, wind and hull could add there, and what the model misses always
+    own    [K, 3]  what ship, wind and hull could add there
+    misfit [3]     what the model misses always
     full   [3]     the ship's own means, at bollard
     """
 
     rows: np.ndarray
     force: np.ndarray
     sd: np.ndarray
-    limit: np.ndarray
+    own: np.ndarray
+    misfit: np.ndarray
     full: np.ndarray
+
+    @property
+    def limit(self) -> np.ndarray:
+        """[K, 3] beyond which a force is external."""
+        return self.own + thresholds.EXTERNAL_MISFIT * self.misfit
+
+    @property
+    def excess(self) -> np.ndarray:
+        """[K, 3] how far the force is beyond the ship's own, for sure."""
+        return np.abs(self.force) - self.own - thresholds.EXTERNAL_SPREADS * self.sd
 
 
 def find(
@@ -104,17 +117,22 @@ def find(
     record: Record,
     physics: MMG,
     values: np.ndarray,
+    nominal_excess: np.ndarray | None = None,
 ) -> tuple[Stretch, ...]:
     """All events, in order of voyage and time.
 
     linear   of a record's segments, best those of `residual_acceleration.covering`
     d        [C] the columns' numbers
     physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
+    nominal_excess  [3] as `most` gives it for voyages that nothing pushed; None without any
     """
     if not physics.geometry.propellers and not physics.geometry.thrusters:
         return ()  # who knows what drives it
     weighed = balance(linear, d, process_noise, record, physics, values)
-    beyond = np.abs(weighed.force) > weighed.limit + thresholds.EXTERNAL_SPREADS * weighed.sd
+    allowed = thresholds.EXTERNAL_MISFIT * weighed.misfit
+    if nominal_excess is not None:
+        allowed = np.maximum(allowed, nominal_excess)
+    beyond = weighed.excess > allowed
     beyond &= ~_contradicted(record, weighed.rows)[:, None]
     found = []
     for part in _unbroken(record, weighed.rows):
@@ -122,6 +140,12 @@ def find(
             for first, last in stretches(beyond[part, channel]):
                 found.append(_event(record, weighed, part, channel, first, last))
     return tuple(_merged(found, record.names))
+
+
+def most(weighed: Balance, record: Record) -> np.ndarray:
+    """[3] N, N and N m: the most that voyages exceed the ship's own forces by."""
+    kept = ~_contradicted(record, weighed.rows)
+    return weighed.excess[kept].max(0, initial=0.0)
 
 
 def balance(
@@ -146,15 +170,14 @@ def balance(
     misfit = np.sqrt(np.maximum(spread**2 - np.median(doubt, axis=0) ** 2, 0.0))
     state = residual_acceleration.around(record, record.state, rows)
     actuator = residual_acceleration.around(record, record.actuator, rows)
-    limit = np.abs(_forces(physics, values, state, actuator)["hull"])
-    limit += thresholds.EXTERNAL_MISFIT * misfit
-    limit += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
+    own = np.abs(_forces(physics, values, state, actuator)["hull"])
+    own += np.where(_resting(record, physics, rows), RESTING, 1.0)[:, None] * full
     if physics.geometry.wind:
         angle = np.linspace(0.0, 2.0 * math.pi, 73)
         worst = np.abs(np.asarray(_of_wind(physics, values, np.cos(angle), np.sin(angle)))).max(0)
         speed = np.linalg.norm(residual_acceleration.around(record, record.wind, rows), axis=1)
-        limit += (GUST * speed[:, None]) ** 2 * worst
-    return Balance(rows, force, doubt, limit, full)
+        own += (GUST * speed[:, None]) ** 2 * worst
+    return Balance(rows, force, doubt, own, misfit, full)
 
 
 def masses(physics: MMG, values: np.ndarray) -> np.ndarray:

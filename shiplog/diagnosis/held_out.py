@@ -13,7 +13,7 @@ from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
-from shiplog.simulation.error_reduction import Gain, gain, parts
+from shiplog.simulation.error_reduction import Gain, gain, parts, stays
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
 
@@ -45,6 +45,27 @@ class Rollouts:
         """[N, 3] by channel."""
         return self.parts(self.states_before)
 
+    @cached_property
+    def counted(self) -> np.ndarray:
+        """[N] bool: the windows of every figure, in which the model as it stands does not diverge.
+
+        That one window runs away says nothing of a cause, and would outweigh all others. A model
+        that diverges in most of them does not simulate this ship: then all are counted.
+        """
+        stay = stays(self.losses_before)
+        return stay if 2 * stay.sum() > len(stay) else np.ones_like(stay)
+
+    @property
+    def diverged(self) -> int:
+        """Windows that no figure counts."""
+        return int((~self.counted).sum())
+
+    def gain_between(self, before: np.ndarray, after: np.ndarray) -> Gain:
+        """Of L by window and channel [N, 3], on the windows that are counted."""
+        counted = self.counted
+        voyages = [name for name, kept in zip(self.voyages, counted, strict=True) if kept]
+        return gain(before[counted], after[counted], voyages)
+
 
 @dataclass(frozen=True)
 class HeldOut(Rollouts):
@@ -67,8 +88,7 @@ class HeldOut(Rollouts):
         return states
 
     def gain(self, decision: Decision) -> Gain:
-        after = self.parts(self.states_after(decision))
-        return gain(self.losses_before, after, self.voyages)
+        return self.gain_between(self.losses_before, self.parts(self.states_after(decision)))
 
     def adapted(self, decision: Decision) -> Gain:
         """Gain of fitting the model's own coefficients again, with no cause named."""
@@ -107,10 +127,9 @@ class HeldOut(Rollouts):
 
     def worth(self, rest: Decision, decision: Decision) -> Gain:
         """Gain of a decision over the same decision without one cause."""
-        return gain(
-            self.parts(self.states_after(rest)), self.parts(self.states_after(decision)),
-            self.voyages,
-        )  # fmt: skip
+        return self.gain_between(
+            self.parts(self.states_after(rest)), self.parts(self.states_after(decision))
+        )
 
     def lost(self, found: Gain | None) -> str:
         """Why no cause can be named; empty where one can.
@@ -118,10 +137,11 @@ class HeldOut(Rollouts):
         Either a reversed sign reduces the error far more than all named causes do, or the model is
         worse than holding the velocity, with the named causes in it too.
         """
-        own = float(self.losses_before.sum(1).mean())
+        counted = self.cut.pick(np.flatnonzero(self.counted))
+        own = float(self.losses_before[self.counted].sum(1).mean())
         after = own if found is None else min(own, found.after)
-        hold = float(self.parts(self.cut.state[:, :1]).sum(1).mean())
-        other, turned = sign_conventions.best(self.before, self.cut)
+        hold = float(parts(counted.state[:, :1] - counted.state, counted.dt).sum(1).mean())
+        other, turned = sign_conventions.best(self.before, counted)
         if turned < min(thresholds.TURNED_SIGN * after, hold):
             return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
         if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:

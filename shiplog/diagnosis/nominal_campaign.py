@@ -32,6 +32,7 @@ from shiplog.diagnosis.campaign_characteristics import (
 from shiplog.diagnosis.campaign_parts import products
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
+from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.nominal_fit import Converged
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
@@ -86,6 +87,23 @@ class Campaign:
     def deviation(self) -> np.ndarray:
         """Of one part's numbers, the unseen families' with them [C + W]."""
         return np.append(self.effects.deviation, np.zeros(self.unseen.count))
+
+    def residual(self, record: Record) -> Linear | None:
+        """The nominal voyages, whose record this is, without what the campaign says and what each
+        of its parts deviates by; None where there are none of the model's own."""
+        made = self.reference
+        if made.nominal is None or made.misfit is None or not self.rows:
+            return None
+        unit, deviation = made.columns.unit, self.effects.deviation
+        free, all_ = np.flatnonzero(deviation > 0.0), np.arange(len(unit))
+        numbers = np.zeros((len(made.nominal.e), len(unit)))
+        for gram, rows in zip(self.each, self.rows, strict=True):
+            own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
+            left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + all_)] @ made.mean
+            numbers[rows] = made.mean * unit
+            numbers[np.ix_(rows, free)] += np.linalg.solve(own, left) * unit[free]
+        weights = made.misfit.accelerations(made.nominal.cut, segments.grid(record))
+        return made.nominal.less_numbers(numbers, weights)
 
     def prior_without(self, left_out: int, apart: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Information and pull of θ, one nominal voyage left out; of the numbers of a voyage that

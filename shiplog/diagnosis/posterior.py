@@ -140,12 +140,13 @@ def practical_kind(one: Hypothesis) -> str:
     return NOMINAL if ordinary else one.kind
 
 
-def share_of_causes(table: Hypotheses, one: Hypothesis) -> float:
-    """Of what a hypothesis explains beyond nothing, the share that its causes explain: over nothing
-    with nominal, or with raised process noise. What raised noise explains no cause does."""
+def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:
+    """Of what a hypothesis explains beyond nothing, the share that these of its causes explain:
+    over nothing with nominal, or with raised process noise. What raised noise explains no cause
+    does. Nothing, where these causes alone were not weighed."""
     shares = []
     for kind in (NOMINAL, RAISED):
-        nothing, alone = table.found.get(((), kind)), table.found.get((one.causes, kind))
+        nothing, alone = table.found.get(((), kind)), table.found.get((tuple(causes), kind))
         if nothing is not None and one.evidence > nothing.evidence:
             gained = 0.0 if alone is None else alone.evidence - nothing.evidence
             shares.append(gained / (one.evidence - nothing.evidence))

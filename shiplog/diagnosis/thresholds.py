@@ -83,6 +83,6 @@ ACTS = 1.0 / 3.0
 # by so many standard deviations of its estimate.
 EXTERNAL_SPREADS = 3.0
 
-# Ratio. The nominal misfit of this ship, times this, is allowed in addition to those
-# forces.
+# Ratio. The misfit of this ship's model, times this, is allowed in addition to those forces; and at
+# least what the nominal voyages have beyond them, which nothing pushed.
 EXTERNAL_MISFIT = 5.0

@@ -53,6 +53,11 @@ def parts(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(each), np.minimum(each, RUNAWAY), RUNAWAY)
 
 
+def stays(loss: np.ndarray) -> np.ndarray:
+    """[N] bool, of L by window and channel [N, 3]: whether the rollout did not run away."""
+    return loss.max(1, initial=0.0) < RUNAWAY
+
+
 def shares(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> tuple[float, float]:
     """90 % interval of the ratio of means of L after [N] to L before [N], bootstrapped over blocks
     of windows that never join two voyages (Künsch 1989)."""

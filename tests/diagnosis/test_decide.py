@@ -131,6 +131,24 @@ def test_a_cause_that_the_remainder_imitates_is_not_named_with_it(trial, monkeyp
     assert word == "named" or found.structure.family == "time"
 
 
+@pytest.mark.parametrize(
+    ("alone", "word", "names"), [(60.0, "named", ["drag"]), (10.0, "unknown", [])]
+)
+def test_a_cause_that_the_remainder_imitates_puts_no_other_in_doubt(
+    trial, monkeypatch, alone, word, names
+):
+    """The other is named where it explains most by itself, without the one in doubt."""
+    both = ("drag", "load")
+    shares = {"drag": 0.1, "load": 0.8}
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label: shares[label])
+    sure = {(both, "time"): 0.96, (DRAG, NOMINAL): 0.02, (both, NOMINAL): 0.02}
+    evidence = {(both, "time"): 80.0, (both, NOMINAL): 70.0, (DRAG, NOMINAL): alone}
+    found = verdict(trial, sure, evidence=evidence)
+    assert (found.verdict, named(found)) == (word, names)
+    assert "could do 80% of it" in found.rejected["load"]
+    assert "drag" not in found.rejected or word == "unknown"
+
+
 def test_a_name_of_two_kinds_is_reported_in_the_likelier(trial):
     """A verdict that names a clock says which."""
     found = verdict(trial, {(WIND, NOMINAL): 0.36, (GNSS, NOMINAL): 0.32, (GNSS, RAISED): 0.32})

@@ -60,6 +60,30 @@ def test_another_ship_under_a_crude_model_has_no_external_force(sailed):
     assert found(afloat.record(sailed)) == ()
 
 
+def test_a_force_that_the_nominal_voyages_have_too_is_no_external_one(sailed):
+    """What nothing pushed there is an error of the model: only a larger force is external."""
+
+    def excess(force):
+        record = under(sailed, force)
+        weighed = external_forces.balance(
+            afloat.linear(record), NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA
+        )
+        return external_forces.most(weighed, record)
+
+    record = under(sailed, (0.0, 60.0, 0.0))
+    linear = afloat.linear(record)
+
+    def held_against(nominal):
+        return external_forces.find(
+            linear, NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA, nominal
+        )
+
+    calm, alike = excess((0.0, 0.0, 0.0)), excess((0.0, 70.0, 0.0))
+    assert (calm == 0.0).all() and 10.0 < alike[1] < 70.0  # less what the ship can do itself
+    assert len(held_against(calm)) == 1
+    assert held_against(alike) == ()
+
+
 def test_a_receiver_that_stands_still_and_catches_up_is_no_hand(sailed):
     """Position held for 3 s; the velocity that was filtered from it falls, and overshoots."""
     record = under(sailed, (0.0, 0.0, 0.0), noise=0.2)

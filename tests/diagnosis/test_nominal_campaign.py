@@ -205,6 +205,31 @@ def test_a_prior_without_a_part_has_less_and_all_of_them_the_same(learned):
     assert nobody == pytest.approx(ref.information)
 
 
+def test_what_is_left_of_a_campaign_has_nothing_that_its_parts_differ_by(learned):
+    """With the numbers of every part free, its products with what is left are zero there; where
+    parts do not differ, what the campaign says in common is gone and no more."""
+    _, made = learned
+    ref, record = made.reference, straight.sailed(24)
+    count = len(ref.columns.unit)
+    accelerations = ref.misfit.accelerations(ref.nominal.cut, segments.grid(record))
+
+    def pulls(left):
+        modes = likelihood.modes(likelihood.weighed(left, ref.process_noise), ref.process_noise)
+        each = campaign_parts.products(
+            modes.joined(accelerations), made.rows, ref.columns.unit, made.weight
+        )
+        return np.stack([one[1:, 0] for one in each])
+
+    free = replace(made, effects=replace(made.effects, deviation=np.full(count, 1e4)))
+    before = np.abs(pulls(ref.nominal)).max(0)
+    assert (np.abs(pulls(free.residual(record))) < 1e-3 * before.max()).all()
+    alike = replace(made, effects=replace(made.effects, deviation=np.zeros(count)))
+    numbers = np.tile(ref.mean * ref.columns.unit, (len(ref.nominal.e), 1))
+    wanted = ref.nominal.less_numbers(numbers, accelerations)
+    assert alike.residual(record).e == pytest.approx(wanted.e)
+    assert replace(made, rows=(), each=()).residual(record) is None
+
+
 def test_a_name_that_the_campaign_did_not_know_may_differ_least(learned, model, monkeypatch):
     """A cause that only the trial can have, such as a second place's: no deviation was learned."""
     found, _ = learned

@@ -151,11 +151,12 @@ def test_share_of_what_is_explained_by_causes(trial):
         },
     )  # fmt: skip
     of = both.table.found
-    assert share_of_causes(both.table, of[DRAG, "position"]) == pytest.approx(4.0 / 44.0)
-    assert share_of_causes(both.table, of[DRAG, RAISED]) == pytest.approx(1.0)
-    assert share_of_causes(both.table, of[(), NOMINAL]) == 1.0  # nothing is explained
+    assert share_of_causes(both.table, of[DRAG, "position"], DRAG) == pytest.approx(4.0 / 44.0)
+    assert share_of_causes(both.table, of[DRAG, RAISED], DRAG) == pytest.approx(1.0)
+    assert share_of_causes(both.table, of[(), NOMINAL], ()) == 1.0  # nothing is explained
+    assert share_of_causes(both.table, of[DRAG, "position"], LOAD) == 0.0  # never weighed alone
     del of[DRAG, NOMINAL], of[DRAG, RAISED]
-    assert share_of_causes(both.table, of[DRAG, "position"]) == 0.0
+    assert share_of_causes(both.table, of[DRAG, "position"], DRAG) == 0.0
 
 
 # --- one device

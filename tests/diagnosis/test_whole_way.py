@@ -103,6 +103,36 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
     assert "worse than one that keeps its velocities" in wild.lost(None)
 
 
+def with_diverged(held, rows):
+    """The same windows, in which the model runs away in some."""
+    states = held.states_before.copy()
+    states[rows, -1] = np.inf
+    made = HeldOut(held.cut, held.before, held.trial)
+    made.__dict__["states_before"] = states
+    return made
+
+
+def test_a_window_in_which_the_model_runs_away_is_in_no_figure(sea):
+    """One would outweigh all others: the figures are those of the windows without it."""
+    held, decision = sea.done.held, sea.done.decision
+    one = with_diverged(held, [0])
+    assert (one.diverged, held.diverged) == (1, 0)
+    assert one.lost(None) == ""
+    found, whole = one.gain(decision), held.gain(decision)
+    assert found.windows == whole.windows - 1
+    before = held.losses_before[1:].sum(1).mean()
+    assert found.before == pytest.approx(before)
+    assert 0.0 < found.reduction < 1.0
+
+
+def test_a_model_that_runs_away_in_most_windows_names_nothing(sea):
+    held = sea.done.held
+    every = with_diverged(held, range(len(held.cut)))
+    assert every.diverged == 0  # they are all counted, and each is as bad as can be
+    assert every.losses_before.min() >= 1e9
+    assert "and 3000000000 as log and profile have it" in every.lost(None)
+
+
 @pytest.mark.parametrize(
     "words", ("the rudder's sign turned round", "the two rudders exchanged",
              "the propeller's sign turned round", "the one that it blows towards"),

@@ -26,7 +26,6 @@ from shiplog.diagnosis.held_out import Rollouts
 from shiplog.diagnosis.trial_voyages import record_of, setting_of, windows_of
 from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import CATALOGUE, Cause, Setting, constants_of
-from shiplog.simulation.error_reduction import gain
 from shiplog.training import load_model
 from shiplog.voyages.store import Store
 
@@ -93,7 +92,7 @@ def oracle(
         causes, {cause.label: p for cause, p in known}, None, constants_of(causes, setting)
     )
     after = held.parts(simulator.states(cut, simulator.theta))
-    found = gain(held.losses_before, after, held.voyages)
+    found = held.gain_between(held.losses_before, after)
     return {"before": found.before, "after": found.after, "reduction": found.reduction}
 
 

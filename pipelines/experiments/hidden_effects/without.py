@@ -104,7 +104,9 @@ def _no_baseline(stack: ExitStack) -> None:
 
 
 def _no_practical_size(stack: ExitStack) -> None:
-    stack.enter_context(patch.object(posterior, "practical", lambda search, one: one.causes))
+    stack.enter_context(
+        patch.object(posterior, "practical", lambda table, one: dict.fromkeys(one.causes, 1.0))
+    )
 
 
 def _no_share_of_causes(stack: ExitStack) -> None:
