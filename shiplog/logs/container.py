@@ -36,6 +36,7 @@ from .refusals import MAGIC
 log = logging.getLogger(__name__)
 
 FOOTER = struct.Struct("<QQI")
+INDEXED = struct.Struct("<QQQQ")  # of a chunk's index: times, where it stands, bytes of its record
 TAIL = HEAD.size + FOOTER.size + len(MAGIC)
 AFTER_CRC = 4 + len(MAGIC)  # the end of a file that the summary's checksum leaves out
 LARGEST_SUMMARY = 256 << 20  # bytes; that of a day in chunks of a second has 10 MB
@@ -61,6 +62,16 @@ class Loss:
     end: int | None = None
     chunk: bool = False
     held: dict[int, int] = field(default_factory=dict)  # messages by channel; 0: not known
+
+
+def lost(offset: int, reason: str, stated: Chunk | ChunkIndex) -> Loss:
+    """The loss of a chunk that says from when to when it reached."""
+    return Loss("crc", offset, reason, stated.message_start_time, stated.message_end_time, True)
+
+
+def held_by(entry: ChunkIndex | None) -> dict[int, int]:
+    """The channels that its index says it has, and not how many messages of each."""
+    return dict.fromkeys(entry.message_index_offsets, 0) if entry else {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +129,8 @@ class Survey:
     statistics: Statistics | None = None
     summed: list[McapRecord] = field(default_factory=list)  # descriptions in a sound summary
     indexed: dict[int, ChunkIndex] = field(default_factory=dict)  # by where the chunk stands
+    hinted: dict[int, int] = field(default_factory=dict)  # the same of a summary that is not sound:
+    # bytes of the chunk's record, a claim that its own CRC has to bear out
     sections: int = 1  # logs that stand in the file one behind the other
     counts: dict[int, int] = field(default_factory=dict)  # messages by channel, if not in summary
     chunks: int = 0
@@ -166,6 +179,7 @@ def read_summary(stream: IO[bytes], found: Survey) -> None:
     if tail[: HEAD.size] != HEAD.pack(Opcode.FOOTER, FOOTER.size) or tail[-8:] != MAGIC:
         # a newer writer's footer may be longer; then the summary is left, and nothing else
         found.ended = tail[-8:] == MAGIC and _longer_footer(stream, found.size)
+        _take_hints(stream, found, tail)
         return
     start, _, crc = FOOTER.unpack_from(tail, HEAD.size)
     if start == 0:
@@ -177,6 +191,7 @@ def read_summary(stream: IO[bytes], found: Survey) -> None:
     if met is None:
         reason = "has a damaged summary; what follows was counted from the data itself"
         found.losses.append(Loss("crc", found.size - TAIL, reason))
+        _take_hints(stream, found, tail)
         return
     found.end = start
     found.summed = [record for record in met if isinstance(record, (Schema, Channel))]
@@ -191,6 +206,25 @@ def read_summary(stream: IO[bytes], found: Survey) -> None:
             opcode, length, fault = head(stream, record.offset, found.size)
             if fault is None and opcode == Opcode.METADATA and length <= LARGEST_SUMMARY:
                 note(found, parsed(Metadata, stream.read(length)), SUMMED)
+
+
+def _take_hints(stream: IO[bytes], found: Survey, tail: bytes) -> None:
+    """Note where a summary that is not sound says that chunks stand, as far as it can be read."""
+    if len(tail) < TAIL or tail[-8:] != MAGIC:
+        return
+    start, _, _ = FOOTER.unpack_from(tail, HEAD.size)
+    length = found.size - start
+    if not TAIL < length <= LARGEST_SUMMARY:
+        return
+    section, at = read_at(stream, start, length), 0
+    while at + HEAD.size <= len(section):
+        opcode, length = HEAD.unpack_from(section, at)
+        at += HEAD.size
+        if opcode == Opcode.CHUNK_INDEX and INDEXED.size <= length <= len(section) - at:
+            _, _, where, whole = INDEXED.unpack_from(section, at)
+            if where + whole <= start and whole > HEAD.size:
+                found.hinted[where] = whole
+        at += length
 
 
 def _longer_footer(stream: IO[bytes], size: int) -> bool:

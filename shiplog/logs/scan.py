@@ -7,32 +7,31 @@ knows, the beginning of another log. So damage costs what it hit, and no more.
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
 from mcap.opcode import Opcode
-from mcap.records import Chunk, ChunkIndex, Header, McapRecord, Message, Metadata
+from mcap.records import Header, Metadata
 
-from . import chunks, records
+from . import beginnings, chunks, contents, records
 from .container import (
-    BROKEN,
     LARGEST_SUMMARY,
     LOOSE,
     SECTION,
     SUMMED,
-    VOUCHED,
     Alone,
     Index,
     Loss,
     Sound,
     Survey,
     head,
+    held_by,
     index_of,
+    lost,
     note,
     read_at,
     read_summary,
@@ -43,15 +42,14 @@ from .refusals import MAGIC, check_file, refusal
 
 Item = Sound | Index | Alone
 
-LOOKED = 1 << 20  # bytes that are searched at once
-OVERLAP = len(MAGIC) + HEAD.size
-BEGINNING = re.compile(  # of a log; a chunk below 1 TB; a message or a description below 16 MB
-    re.escape(MAGIC) + rb"\x01|\x06.{5}\0{3}|[\x03-\x05].{3}\0{5}", re.DOTALL
-)
 LONGEST_ALONE = 1_000_000  # bytes of a message that a search takes: in most bytes is no message
 LEAST_DESCRIPTION, LARGEST_DESCRIPTION = 14, 1 << 22  # bytes; large schemas have 100 kB
 NEAR_NS = 10**14  # 28 h: how far from the others the log time of such a message may be
 LONGEST_FOOTER = 64  # bytes, of which 20 are known
+UNVOUCHED = (
+    "holds a chunk that does not match its checksum. No other message can be read, so its were: "
+    "nothing vouches for their values"
+)
 # What may be unpacked: real logs are packed to a tenth, seldom to a fiftieth, of their size.
 MOST_WORK, MOST_RATIO = 8 << 30, 50
 
@@ -97,7 +95,7 @@ def _describe(found: Survey) -> None:
         counts: Counter[int] = Counter()
         for item in walk(trial):
             if not isinstance(item, Index):
-                for _ in contents_of(trial, item, counts):
+                for _ in contents.messages_of(trial, item, counts):
                     pass
         trial.counts = {n: count for n, count in counts.items() if n in trial.channels}
         _last.update(key=key, trial=trial)
@@ -110,41 +108,6 @@ def _describe(found: Survey) -> None:
 
 
 _last: dict[str, Any] = {}  # the walk of `_describe`: a command opens one log several times
-
-
-def contents_of(
-    found: Survey, item: Sound | Alone, counts: Counter[int] | None = None
-) -> Iterator[list[Message]]:
-    """The messages of an item, in batches; its descriptions are noted in `found`.
-
-    counts  messages by channel so far: they are then counted here, and not handed on
-    """
-    here: Counter[int] | None = None if counts is None else Counter()
-    try:
-        if isinstance(item, Alone):
-            yield _noted(found, chunks.alone(item, here), LOOSE, item.section)
-        else:
-            belief = VOUCHED if item.chunk.uncompressed_crc else LOOSE
-            for batch in chunks.contents(item.chunk, here):
-                yield _noted(found, batch, belief, item.section)
-    except ValueError as error:  # only where nothing had a checksum
-        if isinstance(item, Sound):
-            found.losses.append(lost(item.offset, str(error), item.chunk))
-    else:
-        if counts is not None and here:
-            counts.update({n + item.section * SECTION: count for n, count in here.items()})
-
-
-def _noted(found: Survey, batch: Iterable[McapRecord], belief: int, section: int) -> list[Message]:
-    here = []
-    for record in batch:
-        if isinstance(record, Message):
-            record.channel_id += section * SECTION
-            here.append(record)
-        else:
-            whole = not isinstance(record, records.Unnamed)
-            note(found, record, belief if whole else BROKEN, section)
-    return here
 
 
 def walk(found: Survey) -> Iterator[Item]:
@@ -185,10 +148,35 @@ class _Walk:
                 if item is not None:
                     yield item
                 position = after
+            if self.low is None:
+                yield from self._unvouched()
         except _Enough:
             reason = "unpacks to far more than a log of its size can; what follows was not read"
             found.losses.append(Loss("crc", self.anchor, reason, start=self.high))
         self._finish()
+
+    def _unvouched(self) -> Iterator[Item]:
+        """Chunks that are whole but for their CRC, where no other message of the log can be read.
+
+        One wrong bit in the CRC of a log of a single chunk must not cost all of it.
+        """
+        losses = self.found.losses
+        for i, loss in enumerate(losses):
+            if not loss.chunk:
+                continue
+            _, length, _ = head(self.stream, loss.offset, self.found.size)
+            packed = chunks.chunk(self.ahead.body(loss.offset, length))
+            if packed is None:
+                continue
+            self.work -= packed.uncompressed_size
+            if self.work < 0:
+                raise _Enough
+            try:
+                opened = chunks.opened(replace(packed, uncompressed_crc=0))
+            except ValueError:  # more is wrong with it than that
+                continue
+            losses[i] = Loss("crc", loss.offset, UNVOUCHED)
+            yield self._take(Sound(loss.offset, self._number(), opened, self.anchor), self.anchor)
 
     def _step(self, position: int) -> tuple[Loss | None, Item | None, int]:
         """What stands at `position`: a fault, or an item or none and where the next record is."""
@@ -203,11 +191,12 @@ class _Walk:
             bad = self._open(position, length)
             if isinstance(bad, Sound):
                 return None, self._take(bad, bad.end), after
-        entry = found.indexed.get(position)
-        if entry and (fault or opcode != Opcode.CHUNK or after != position + entry.chunk_length):
-            sound = self._open(position, entry.chunk_length - HEAD.size)
-            if isinstance(sound, Sound):
-                after = position + entry.chunk_length
+        entry, hint = found.indexed.get(position), found.hinted.get(position)
+        whole = entry.chunk_length if entry else hint
+        if whole and (fault or opcode != Opcode.CHUNK or after != position + whole):
+            sound = self._open(position, whole - HEAD.size)
+            if isinstance(sound, Sound) and (entry or sound.chunk.uncompressed_crc):
+                after = position + whole
                 return None, self._take(sound, after), after
         if fault is not None:
             return fault, None, 0
@@ -218,6 +207,9 @@ class _Walk:
         if isinstance(bad, Loss):
             self._lose(bad)
             return None, None, after
+        if opcode > Opcode.DATA_END and self.next_sound(self.anchor, after) is not None:
+            # not a newer writer's: what is damaged may look like a record that ends with a chunk
+            return Loss("crc", position, f"holds a record of unknown kind {opcode}"), None, 0
         return None, self._other(position, opcode, length), after
 
     def _other(self, position: int, opcode: int, length: int) -> Item | None:
@@ -300,7 +292,7 @@ class _Walk:
         self.found.chunks += 1
         self.visited.add(loss.offset)
         entry = self.found.indexed.get(loss.offset)
-        loss = replace(loss, held=_held(entry))
+        loss = replace(loss, held=held_by(entry))
         self.found.losses.append(loss)
         self.lost = loss
 
@@ -318,12 +310,14 @@ class _Walk:
             self.anchor = after + 1
         return after
 
-    def next_sound(self, start: int) -> int | None:
-        """Where the next chunk, message or log begins that can be read, from `start` on."""
-        limit = next(
-            (at for at in self.starts if at >= start and self._indexed(at)), self.found.end
-        )
-        for at, kind in _beginnings(self.stream, start, limit):
+    def next_sound(self, start: int, end: int | None = None) -> int | None:
+        """Where the next chunk, message or log begins that can be read, from `start` on; before
+        `end`, where one is given."""
+        end = self.found.end if end is None else min(end, self.found.end)
+        limit = next((at for at in self.starts if start <= at < end and self._indexed(at)), end)
+        hints = (at for at in sorted(self.found.hinted) if start <= at < limit)
+        limit = next((at for at in hints if self._hinted(at)), limit)
+        for at, kind in beginnings.beginnings(self.stream, start, limit):
             if kind == Opcode.CHUNK and self._checked(at):
                 return at
             if kind == Opcode.MESSAGE and self._plausible(at):
@@ -332,11 +326,15 @@ class _Walk:
                 return at
             if kind == Opcode.HEADER:
                 return at
-        return limit if limit < self.found.end else None
+        return limit if limit < end else None
 
     def _indexed(self, position: int) -> bool:
         length = self.found.indexed[position].chunk_length - HEAD.size
         return isinstance(self._open(position, length), Sound)
+
+    def _hinted(self, position: int) -> bool:
+        sound = self._open(position, self.found.hinted[position] - HEAD.size)
+        return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
 
     def _checked(self, position: int) -> bool:
         """Whether a chunk stands here whose CRC is right, and is one."""
@@ -373,28 +371,5 @@ class _Walk:
             if offset not in self.visited:
                 found.chunks += 1
                 found.losses.append(
-                    replace(lost(offset, "has lost its beginning", entry), held=_held(entry))
+                    replace(lost(offset, "has lost its beginning", entry), held=held_by(entry))
                 )
-
-
-def _beginnings(stream: IO[bytes], start: int, limit: int) -> Iterator[tuple[int, int]]:
-    """Where in [start, limit) a log, a chunk or a message may begin, and which (its opcode)."""
-    while start < limit:
-        window = read_at(stream, start, LOOKED + OVERLAP)
-        at = 0
-        while at < LOOKED and (hit := BEGINNING.search(window, at)):
-            at = hit.start()
-            if at >= LOOKED or start + at >= limit:
-                break
-            yield start + at, Opcode.HEADER if window[at] == MAGIC[0] else window[at]
-            at += 1
-        start += LOOKED
-
-
-def lost(offset: int, reason: str, stated: Chunk | ChunkIndex) -> Loss:
-    """The loss of a chunk that says from when to when it reached."""
-    return Loss("crc", offset, reason, stated.message_start_time, stated.message_end_time, True)
-
-
-def _held(entry: ChunkIndex | None) -> dict[int, int]:
-    return dict.fromkeys(entry.message_index_offsets, 0) if entry else {}

@@ -214,6 +214,83 @@ def test_offsets_that_no_file_has_are_damage(reading):
         assert numbers(reading(file(parts(), summary))) == without()
 
 
+def indexed(made: list[tuple[int, bytes]], off: int = 0) -> bytes:
+    """A summary that says where each chunk stands, or so many bytes beside it."""
+    found = described()
+    for at, length in places(file(made), mcap.CHUNK):
+        body = struct.pack("<QQQQ", START, START, at + off, length) + mcap.numbers({})
+        body += struct.pack("<Q", 0) + mcap.text("zstd") + struct.pack("<QQ", length, length)
+        found += mcap.record(mcap.CHUNK_INDEX, body)
+    return found
+
+
+@pytest.mark.parametrize("broken", ["its checksum", "its last record", "the footer"])
+@pytest.mark.parametrize(("off", "lost"), [(0, ()), (7, (3,))], ids=["true", "false"])
+def test_a_damaged_summary_still_says_where_a_chunk_without_a_head_stands(
+    reading, broken, off, lost
+):
+    """Its word is taken where the chunk's own CRC bears it out, and only there."""
+    whole = file(parts(), indexed(parts(), off))
+    at = CHUNK_AT[3][0]
+    data = changed(whole, at, b"\x07" + bytes([whole[at + 1] ^ 0x55]))
+    spoilt = {"its checksum": -12, "its last record": -37 - 20, "the footer": -37}[broken]
+    place = len(data) + spoilt
+    found = reading(changed(data, place, bytes([data[place] ^ 0x20])))
+    assert numbers(found) == without(*lost)
+    assert "crc" in {f.kind for f in found.health.findings} or broken == "the footer"
+    assert found.health.findings
+
+
+def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_for(reading):
+    """Four bytes must not cost a whole log; beside a sound chunk such a one stays lost."""
+    header, first, *_ = parts()
+    raw = zstandard.ZstdDecompressor().decompress(first[1][44:])
+    wrong = (mcap.CHUNK, packed(raw, 0, EACH - 1, crc=zlib.crc32(raw) ^ 1))
+    found = reading(file([header, wrong]))
+    assert numbers(found) == list(range(EACH))
+    (finding,) = found.health.findings
+    assert finding.kind == "crc" and "nothing vouches for their values" in finding.sentence
+    assert found.health.chunks_lost == 0
+    second = parts()[3 + len(TOPICS) - 1]
+    assert second[0] == mcap.CHUNK
+    beside = reading(file([header, wrong, second], described()), "two.mcap")
+    assert numbers(beside) == list(range(EACH, 2 * EACH))
+    with pytest.raises(LogUnreadable, match="does not have the size it states"):
+        short = (mcap.CHUNK, packed(raw, 0, EACH - 1, size=len(raw) - 1))
+        reading(file([header, short]), "no.mcap")
+
+
+def test_a_chunk_in_a_record_of_unknown_kind_is_read_and_a_newer_writers_record_passed(reading):
+    """Behind a cut, the last letter of "zstd" is an opcode, and what follows the length of the
+    chunk's data: a record that ends where the chunk does."""
+    at = CHUNK_AT[1][0]
+    found = reading(changed(GOOD, at, b"d" + struct.pack("<Q", CHUNK_AT[1][1] - 9)))
+    assert numbers(found) == without(1)
+    cut = reading(GOOD[:472] + GOOD[472 + 123 :], "cut.mcap")
+    assert numbers(cut) == without()
+    assert {f.kind for f in cut.health.findings} == {"crc"}
+    header, *others = parts()
+    newer = reading(file([header, (0x90, bytes(100)), *others]), "newer.mcap")
+    assert numbers(newer) == without() and newer.health.findings == ()
+
+
+def test_messages_outside_chunks_are_searched_for_behind_damage(reading):
+    """Those of a known channel, of the time of the others."""
+    bodies = [
+        mcap.message(k % 3 + 1, k, START + k * SECOND, START + k * SECOND, payload(k))
+        for k in range(30)
+    ]
+    channels = [(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(TOPICS, 1)]
+    data = file([parts()[0], *channels, *((mcap.MESSAGE, body) for body in bodies)])
+    at, _ = places(data, mcap.MESSAGE)[10]
+    found = reading(changed(data, at + 5, b"\x40"))  # a length that no file has
+    assert numbers(found) == [k for k in range(30) if k != 10]
+    early = mcap.message(1, 0, START - 10**15, START, payload(0))  # of another time: no message
+    data = changed(data, at + 5, b"\x40")
+    data = data[:at] + mcap.record(9, early) + data[at:]
+    assert numbers(reading(data, "early.mcap")) == [k for k in range(30) if k != 10]
+
+
 def test_an_integer_of_hundreds_of_digits_is_infinite(reading):
     huge = b'{"x": 1' + b"0" * 400 + b"}"
     bodies = [mcap.message(1, k, START, START, b'{"x": 0.5}') for k in range(3)]
