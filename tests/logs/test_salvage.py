@@ -241,6 +241,19 @@ def test_a_damaged_summary_still_says_where_a_chunk_without_a_head_stands(
     assert found.health.findings
 
 
+def test_a_damaged_summary_is_not_believed_of_a_chunk_without_a_checksum(reading):
+    """Nothing bears its word out: any bytes would be taken for a chunk."""
+    made = parts()
+    at = [i for i, (kind, _) in enumerate(made) if kind == mcap.CHUNK][3]
+    made[at] = (mcap.CHUNK, changed(made[at][1], 24, bytes(4)))
+    whole = file(made, indexed(made))
+    assert numbers(reading(whole)) == without()
+    place = CHUNK_AT[3][0]
+    data = changed(whole, place, b"\x07" + bytes([whole[place + 1] ^ 0x55]))
+    data = changed(data, len(data) - 12, bytes([data[-12] ^ 0x20]))
+    assert numbers(reading(data, "spoilt.mcap")) == without(3)
+
+
 def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_for(reading):
     """Four bytes must not cost a whole log; beside a sound chunk such a one stays lost."""
     header, first, *_ = parts()
