@@ -8,7 +8,7 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.trial_voyages import windows_of
 from shiplog.profile import Profile
 from shiplog.simulation import baselines
-from shiplog.simulation.error_reduction import parts, stays
+from shiplog.simulation.error_reduction import diverged, parts
 from shiplog.simulation.rollout import simulate
 from shiplog.training.load_model import Run
 from shiplog.voyages.store import Store
@@ -38,7 +38,7 @@ def lacking(run: Run, store: Store, profile: Profile) -> str:
         fitted = baselines.least_squares(cut.pick(np.flatnonzero(~out)))
         left = cut.pick(np.flatnonzero(out))
         plain[out] = parts(simulate(fitted, left) - left.state, left.dt)
-    counted = stays(own) & stays(plain)
+    counted = ~(diverged(own) | diverged(plain))
     if not counted.any():
         return ""
     own, plain = own[counted], plain[counted]

@@ -52,15 +52,12 @@ def external(
     fit = Fit(point, base, remainder)
     residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
     process_noise = trial.process_noise(remainder).times(base.noise_factor)
-    found = external_forces.find(residual, d, process_noise, trial.record, physics, values)
-    left = None if nominal is None else trial.campaign.residual(nominal)
-    if found and left is not None and nominal is not None:
-        none = np.zeros(left.j.shape[-1])
-        weighed = external_forces.balance(left, none, ref.process_noise, nominal, physics, values)
-        found = external_forces.find(
-            residual, d, process_noise, trial.record, physics, values,
-            external_forces.most(weighed, nominal),
-        )  # fmt: skip
+    found: tuple[external_forces.Stretch, ...] = ()
+    if external_forces.driven(physics):
+        weighed = external_forces.balance(residual, d, process_noise, trial.record, physics, values)
+        found = external_forces.find(weighed, trial.record)
+        if found and nominal is not None:
+            found = external_forces.find(weighed, trial.record, _nominal_excess(trial, nominal))
     out = np.zeros(len(trial.rows), dtype=bool)
     of = np.array(trial.record.names)[trial.record.voyage[trial.rows]]
     begin = trial.record.time[trial.rows]
@@ -69,6 +66,18 @@ def external(
         out |= inside & (of == stretch.voyage)
     intervals = [Interval(s.voyage, s.start_s, s.end_s, "external", s.sentence) for s in found]
     return intervals, out
+
+
+def _nominal_excess(trial: Trial, nominal: Record) -> np.ndarray | None:
+    """As `external_forces.largest_excess`, of the nominal voyages; None where they are unknown."""
+    ref, left = trial.reference, trial.campaign.residual(nominal)
+    if left is None:
+        return None
+    weighed = external_forces.balance(
+        left, np.zeros(left.j.shape[-1]), ref.process_noise, nominal, ref.model.stand_in,
+        np.array(list(ref.coefficients.values())),
+    )  # fmt: skip
+    return external_forces.largest_excess(weighed, nominal)
 
 
 def by_channel(held: HeldOut) -> list[dict]:

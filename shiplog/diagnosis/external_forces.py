@@ -100,35 +100,24 @@ class Balance:
     full: np.ndarray
 
     @property
-    def limit(self) -> np.ndarray:
-        """[K, 3] beyond which a force is external."""
-        return self.own + thresholds.EXTERNAL_MISFIT * self.misfit
-
-    @property
     def excess(self) -> np.ndarray:
-        """[K, 3] how far the force is beyond the ship's own, for sure."""
+        """[K, 3] N, N and N m by which the force surely exceeds the ship's own."""
         return np.abs(self.force) - self.own - thresholds.EXTERNAL_SPREADS * self.sd
 
 
-def find(
-    linear: Linear,
-    d: np.ndarray,
-    process_noise: ProcessNoise,
-    record: Record,
-    physics: MMG,
-    values: np.ndarray,
-    nominal_excess: np.ndarray | None = None,
-) -> tuple[Stretch, ...]:
-    """All events, in order of voyage and time.
+def driven(physics: MMG) -> bool:
+    """Whether it is known what drives the ship: else no force can be called external."""
+    return bool(physics.geometry.propellers or physics.geometry.thrusters)
 
-    linear   of a record's segments, best those of `residual_acceleration.covering`
-    d        [C] the columns' numbers
-    physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
-    nominal_excess  [3] as `most` gives it for voyages that nothing pushed; None without any
+
+def find(
+    weighed: Balance, record: Record, nominal_excess: np.ndarray | None = None
+) -> tuple[Stretch, ...]:
+    """All events of a record, in order of voyage and time.
+
+    nominal_excess  [3] N, N and N m, as `largest_excess` gives it for the nominal voyages; None
+                    without any
     """
-    if not physics.geometry.propellers and not physics.geometry.thrusters:
-        return ()  # who knows what drives it
-    weighed = balance(linear, d, process_noise, record, physics, values)
     allowed = thresholds.EXTERNAL_MISFIT * weighed.misfit
     if nominal_excess is not None:
         allowed = np.maximum(allowed, nominal_excess)
@@ -138,12 +127,13 @@ def find(
     for part in _unbroken(record, weighed.rows):
         for channel in range(3):
             for first, last in stretches(beyond[part, channel]):
-                found.append(_event(record, weighed, part, channel, first, last))
+                limit = weighed.own[part, channel] + allowed[channel]
+                found.append(_event(record, weighed, limit, part, channel, first, last))
     return tuple(_merged(found, record.names))
 
 
-def most(weighed: Balance, record: Record) -> np.ndarray:
-    """[3] N, N and N m: the most that voyages exceed the ship's own forces by."""
+def largest_excess(weighed: Balance, record: Record) -> np.ndarray:
+    """[3] N, N and N m: the most by which the forces of a record exceed the ship's own."""
     kept = ~_contradicted(record, weighed.rows)
     return weighed.excess[kept].max(0, initial=0.0)
 
@@ -156,7 +146,12 @@ def balance(
     physics: MMG,
     values: np.ndarray,
 ) -> Balance:
-    """The forces behind `find`, for a plot of them."""
+    """The forces that `find` judges.
+
+    linear   of a record's segments, best those of `residual_acceleration.covering`
+    d        [C] the columns' numbers
+    physics  an MMG of the ship, for masses and means, with its coefficients `values` [P]
+    """
     weigh = masses(physics, values).T
     full = means(record, physics, values)
     reach = np.abs(np.linalg.solve(weigh, full))
@@ -303,10 +298,11 @@ def _unbroken(record: Record, rows: np.ndarray) -> Iterator[slice]:
 
 
 def _event(
-    record: Record, weighed: Balance, part: slice, channel: int, first: int, last: int
-) -> tuple[float, Stretch]:
-    """How far beyond the limit, and the event: knots first to last of a part, and on to where
-    the force has fallen to EDGE of its peak."""
+    record: Record, weighed: Balance, limit: np.ndarray, part: slice, channel: int, first: int,
+    last: int,
+) -> tuple[float, Stretch]:  # fmt: skip
+    """How far beyond its limit, of the knots of the part; and the event: knots first to last, and
+    on to where the force has fallen to EDGE of its peak."""
     force, rows = np.abs(weighed.force[part, channel]), weighed.rows[part]
     at = first + int(force[first : last + 1].argmax())
     share, time = force / force[at], record.time[rows]
@@ -326,7 +322,7 @@ def _event(
         peak=float(weighed.force[part, channel][at]),
         percent=float(100.0 * force[at] / weighed.full[2 if channel == 2 else 0]),
     )
-    return float((force / weighed.limit[part, channel])[first : last + 1].max()), found
+    return float((force / limit)[first : last + 1].max()), found
 
 
 def _merged(events: list[tuple[float, Stretch]], names: tuple[str, ...]) -> Iterator[Stretch]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shiplog import channels
-from shiplog.diagnosis import discrepancy, evidence, thresholds
+from shiplog.diagnosis import discrepancy, evidence, thresholds, voyage_effects
 from shiplog.diagnosis.fitted import Fit, Level, Point
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.remainder import CHANGE_SIZES, Remainder
@@ -73,7 +73,6 @@ def of_parts(trial: Trial, linear: Linear, one: Fit) -> Linear:
     columns, campaign = trial.reference.columns, trial.campaign
     common = solved(trial, one) / columns.unit
     deviation = math.hypot(1.0, campaign.apart) * campaign.effects.deviation
-    free = np.flatnonzero(deviation > 0.0)
     accelerations = np.zeros((len(linear.e), linear.z.shape[-1] - 6, 0))
     if trial.reference.misfit is not None:
         accelerations = trial.reference.misfit.accelerations(linear.cut, trial.grid)
@@ -84,10 +83,8 @@ def of_parts(trial: Trial, linear: Linear, one: Fit) -> Linear:
         one.point, one.found.noise_factor, trial.weight, one.remainder
     )  # fmt: skip
     for i, gram in enumerate(each):
-        own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
-        left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + np.arange(len(common)))] @ common
-        rows = np.flatnonzero(of == i)
-        numbers[np.ix_(rows, free)] = np.linalg.solve(own, left) * columns.unit[free]
+        own = voyage_effects.own_numbers(gram, common, deviation)
+        numbers[of == i] = own * columns.unit
     return linear.less_numbers(numbers, accelerations)
 
 

@@ -13,7 +13,7 @@ from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
-from shiplog.simulation.error_reduction import Gain, gain, parts, stays
+from shiplog.simulation.error_reduction import Gain, diverged, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
 
@@ -49,15 +49,15 @@ class Rollouts:
     def counted(self) -> np.ndarray:
         """[N] bool: the windows of every figure, in which the model as it stands does not diverge.
 
-        That one window runs away says nothing of a cause, and would outweigh all others. A model
-        that diverges in most of them does not simulate this ship: then all are counted.
+        One window in which the model diverges says nothing of a cause, and would outweigh all
+        others. A model that diverges in most windows does not simulate this ship: all are counted.
         """
-        stay = stays(self.losses_before)
-        return stay if 2 * stay.sum() > len(stay) else np.ones_like(stay)
+        counted = ~diverged(self.losses_before)
+        return counted if 2 * counted.sum() > len(counted) else np.ones_like(counted)
 
     @property
-    def diverged(self) -> int:
-        """Windows that no figure counts."""
+    def not_counted(self) -> int:
+        """Windows that are in no figure."""
         return int((~self.counted).sum())
 
     def gain_between(self, before: np.ndarray, after: np.ndarray) -> Gain:

@@ -7,6 +7,7 @@ together. The variance between its voyages and between their parts (`voyage_effe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -94,14 +95,12 @@ class Campaign:
         made = self.reference
         if made.nominal is None or made.misfit is None or not self.rows:
             return None
-        unit, deviation = made.columns.unit, self.effects.deviation
-        free, all_ = np.flatnonzero(deviation > 0.0), np.arange(len(unit))
+        unit = made.columns.unit
+        deviation = math.hypot(1.0, self.apart) * self.effects.deviation
         numbers = np.zeros((len(made.nominal.e), len(unit)))
         for gram, rows in zip(self.each, self.rows, strict=True):
-            own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
-            left = gram[1 + free, 0] - gram[np.ix_(1 + free, 1 + all_)] @ made.mean
-            numbers[rows] = made.mean * unit
-            numbers[np.ix_(rows, free)] += np.linalg.solve(own, left) * unit[free]
+            own = voyage_effects.own_numbers(gram, made.mean, deviation)
+            numbers[rows] = (made.mean + own) * unit
         weights = made.misfit.accelerations(made.nominal.cut, segments.grid(record))
         return made.nominal.less_numbers(numbers, weights)
 

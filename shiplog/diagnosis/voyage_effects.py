@@ -53,6 +53,20 @@ def reduced(gram: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, float]
     return gram - half.T @ half, 2.0 * float(np.log(np.diagonal(root)).sum())
 
 
+def own_numbers(gram: np.ndarray, common: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """b [C] of one part, most probable given θ, and zero where it has none.
+
+    gram       products [1 + C, 1 + C] of the part, or of more columns behind these
+    common     θ [C]
+    deviation  [C] of b
+    """
+    b, free = np.zeros(len(common)), np.flatnonzero(deviation > 0.0)
+    own = gram[np.ix_(1 + free, 1 + free)] + np.diag(deviation[free] ** -2.0)
+    left = gram[1 + free, 0] - gram[1 + free, 1 : 1 + len(common)] @ common
+    b[free] = np.linalg.solve(own, left)
+    return b
+
+
 def learn(
     each: Sequence[np.ndarray],
     known: np.ndarray,

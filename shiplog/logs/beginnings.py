@@ -22,7 +22,7 @@ BEGINNING = re.compile(  # of a log; a chunk below 1 TB; a message or a descript
 def beginnings(stream: IO[bytes], start: int, limit: int) -> Iterator[tuple[int, int]]:
     """Where in [start, limit) a log, a chunk or a message may begin, and which (its opcode)."""
     while start < limit:
-        window = read_at(stream, start, LOOKED + OVERLAP)
+        window = read_at(stream, start, min(LOOKED, limit - start) + OVERLAP)
         at = 0
         while at < LOOKED and (hit := BEGINNING.search(window, at)):
             at = hit.start()

@@ -15,7 +15,7 @@ import numpy as np
 import polars as pl
 from mcap.records import Channel, Message
 
-from . import chunks, contents, scan
+from . import chunks, scan, sound_messages
 from .container import SECTION, Alone, Index, Sound, Survey
 from .messages import Decoder
 from .records import HEAD, MESSAGE, TooLarge
@@ -32,7 +32,7 @@ def messages(found: Survey) -> Iterator[list[Message]]:
     chunk that holds more than the whole log can."""
     for item in scan.walk(found):
         if not isinstance(item, Index) and not _beyond(item, room(found)):
-            yield from filter(None, contents.messages_of(found, item))
+            yield from filter(None, sound_messages.messages_of(found, item))
 
 
 def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
@@ -46,7 +46,7 @@ def read_all(tables: Tables, topics: Collection[str] | None = None) -> Tally:
         if left_out := _beyond(item, tables.room):
             _count(tables, topics, left_out, tally)
             continue
-        for met in contents.messages_of(tables.found, item):
+        for met in sound_messages.messages_of(tables.found, item):
             for message in met:
                 batch.setdefault(message.channel_id, []).append(message)
                 held += len(message.data) + OVERHEAD
@@ -179,7 +179,7 @@ def _messages_on(found: Survey, topics: Collection[str]) -> Iterator[list[Messag
                 for batch in chunks.contents(item.chunk, only=numbers):
                     yield [record for record in batch if isinstance(record, Message)]
         elif isinstance(item, Alone):
-            yield from contents.messages_of(found, item)
+            yield from sound_messages.messages_of(found, item)
 
 
 def nanoseconds(times: list[int]) -> np.ndarray:

@@ -17,7 +17,7 @@ from typing import IO, Any
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 
-from . import beginnings, chunks, contents, records
+from . import beginnings, chunks, records, sound_messages
 from .container import (
     LARGEST_SUMMARY,
     LOOSE,
@@ -95,7 +95,7 @@ def _describe(found: Survey) -> None:
         counts: Counter[int] = Counter()
         for item in walk(trial):
             if not isinstance(item, Index):
-                for _ in contents.messages_of(trial, item, counts):
+                for _ in sound_messages.messages_of(trial, item, counts):
                     pass
         trial.counts = {n: count for n, count in counts.items() if n in trial.channels}
         _last.update(key=key, trial=trial)
@@ -127,7 +127,8 @@ class _Walk:
         self.section, self.closed, self.begun, self.chunked = 0, False, False, False
         self.past_data = False  # behind a DATA_END: what is broken there is no message
         self.visited: set[int] = set()
-        self.starts = sorted(found.indexed)
+        self.searched = found.begin  # nothing sound begins between the anchor and here
+        self.starts, self.hints = sorted(found.indexed), sorted(found.hinted)
         self.low: int | None = None  # ns, log times of the messages so far
         self.high = 0
         self.lost: Loss | None = None  # the chunk before, if it was not sound
@@ -160,23 +161,16 @@ class _Walk:
 
         One wrong bit in the CRC of a log of a single chunk must not cost all of it.
         """
+        self.closed = False  # the end of the log was met, and no other log begins
         losses = self.found.losses
         for i, loss in enumerate(losses):
             if not loss.chunk:
                 continue
             _, length, _ = head(self.stream, loss.offset, self.found.size)
-            packed = chunks.chunk(self.ahead.body(loss.offset, length))
-            if packed is None:
-                continue
-            self.work -= packed.uncompressed_size
-            if self.work < 0:
-                raise _Enough
-            try:
-                opened = chunks.opened(replace(packed, uncompressed_crc=0))
-            except ValueError:  # more is wrong with it than that
-                continue
-            losses[i] = Loss("crc", loss.offset, UNVOUCHED)
-            yield self._take(Sound(loss.offset, self._number(), opened, self.anchor), self.anchor)
+            whole = self._open(loss.offset, length, vouched=False)
+            if isinstance(whole, Sound):  # else more is wrong with it than its CRC
+                losses[i] = Loss("crc", loss.offset, UNVOUCHED)
+                yield self._take(whole, whole.end)
 
     def _step(self, position: int) -> tuple[Loss | None, Item | None, int]:
         """What stands at `position`: a fault, or an item or none and where the next record is."""
@@ -207,9 +201,11 @@ class _Walk:
         if isinstance(bad, Loss):
             self._lose(bad)
             return None, None, after
-        if opcode > Opcode.DATA_END and self.next_sound(self.anchor, after) is not None:
-            # not a newer writer's: what is damaged may look like a record that ends with a chunk
-            return Loss("crc", position, f"holds a record of unknown kind {opcode}"), None, 0
+        if opcode > Opcode.DATA_END:
+            # a newer writer's; or damage, which may look like a record that ends with a chunk
+            if self.next_sound(max(self.anchor, self.searched), after) is not None:
+                return Loss("crc", position, f"holds a record of unknown kind {opcode}"), None, 0
+            self.searched = after
         return None, self._other(position, opcode, length), after
 
     def _other(self, position: int, opcode: int, length: int) -> Item | None:
@@ -263,8 +259,9 @@ class _Walk:
                 note(self.found, record, SUMMED, self.section)
         return self.section
 
-    def _open(self, position: int, length: int) -> Sound | Loss:
-        """The chunk whose body of this length follows the head at `position`, checked."""
+    def _open(self, position: int, length: int, vouched: bool = True) -> Sound | Loss:
+        """The chunk whose body of this length follows the head at `position`, checked; but for its
+        CRC, where it need not be `vouched` for."""
         most = chunks.FIXED_BYTES + chunks.LONGEST_NAME
         start = read_at(self.stream, position + HEAD.size, most)
         if chunks.stated(start[: max(length, 0)], length) is None:
@@ -277,7 +274,10 @@ class _Walk:
         if self.work < 0:
             raise _Enough
         try:
-            opened = self.ahead.opened(position, packed)
+            if vouched:
+                opened = self.ahead.opened(position, packed)
+            else:
+                opened = chunks.opened(replace(packed, uncompressed_crc=0))
         except ValueError as error:
             return lost(position, str(error), packed)
         begin = chunks.FIXED_BYTES + len(packed.compression.encode())
@@ -315,8 +315,7 @@ class _Walk:
         `end`, where one is given."""
         end = self.found.end if end is None else min(end, self.found.end)
         limit = next((at for at in self.starts if start <= at < end and self._indexed(at)), end)
-        hints = (at for at in sorted(self.found.hinted) if start <= at < limit)
-        limit = next((at for at in hints if self._hinted(at)), limit)
+        limit = next((at for at in self.hints if start <= at < limit and self._hinted(at)), limit)
         for at, kind in beginnings.beginnings(self.stream, start, limit):
             if kind == Opcode.CHUNK and self._checked(at):
                 return at
@@ -333,6 +332,7 @@ class _Walk:
         return isinstance(self._open(position, length), Sound)
 
     def _hinted(self, position: int) -> bool:
+        """Whether a chunk stands where a damaged summary says so: its CRC has to be right."""
         sound = self._open(position, self.found.hinted[position] - HEAD.size)
         return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
 

@@ -92,10 +92,9 @@ def verdict(
     rejected, notes = dict(decision.rejected) | dict(context.dropped), list(context.notes)
     if context.lost:
         notes.insert(0, f"{context.lost}. The model is not of this ship, or the profile is wrong.")
-    if held is not None and held.diverged:
-        notes.append(
-            f"Windows in which the model diverges, in none of the figures: {held.diverged}."
-        )
+    if held is not None and held.not_counted:
+        number = held.not_counted
+        notes.append(f"Windows in which the model diverges, in none of the figures: {number}.")
     named = {n.cause.label for n in decision.named}
     rejected = {k: why for k, why in rejected.items() if k not in named}
     unavailable = verdicts.rejected_json(context.untested)

@@ -53,9 +53,9 @@ def parts(error: np.ndarray, dt: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(each), np.minimum(each, RUNAWAY), RUNAWAY)
 
 
-def stays(loss: np.ndarray) -> np.ndarray:
-    """[N] bool, of L by window and channel [N, 3]: whether the rollout did not run away."""
-    return loss.max(1, initial=0.0) < RUNAWAY
+def diverged(loss: np.ndarray) -> np.ndarray:
+    """[N] bool: whether the rollout of each window diverged, of L by window and channel [N, 3]."""
+    return loss.max(1, initial=0.0) >= RUNAWAY
 
 
 def shares(before: np.ndarray, after: np.ndarray, voyages: Sequence[str]) -> tuple[float, float]:

@@ -18,11 +18,14 @@ def sailed():
     return afloat.voyage(150.0)
 
 
-def found(record) -> tuple[Stretch, ...]:
-    linear = afloat.linear(record)
-    return external_forces.find(
-        linear, NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA
+def balance(record):
+    return external_forces.balance(
+        afloat.linear(record), NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA
     )
+
+
+def found(record) -> tuple[Stretch, ...]:
+    return external_forces.find(balance(record), record)
 
 
 def under(sailed, force, noise=1.0):
@@ -65,18 +68,12 @@ def test_a_force_that_the_nominal_voyages_have_too_is_no_external_one(sailed):
 
     def excess(force):
         record = under(sailed, force)
-        weighed = external_forces.balance(
-            afloat.linear(record), NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA
-        )
-        return external_forces.most(weighed, record)
+        return external_forces.largest_excess(balance(record), record)
 
     record = under(sailed, (0.0, 60.0, 0.0))
-    linear = afloat.linear(record)
 
     def held_against(nominal):
-        return external_forces.find(
-            linear, NONE, afloat.PROCESS_NOISE, record, afloat.MODEL, afloat.THETA, nominal
-        )
+        return external_forces.find(balance(record), record, nominal)
 
     calm, alike = excess((0.0, 0.0, 0.0)), excess((0.0, 70.0, 0.0))
     assert (calm == 0.0).all() and 10.0 < alike[1] < 70.0  # less what the ship can do itself

@@ -104,7 +104,7 @@ def test_a_model_that_simulates_nothing_names_nothing(sea):
 
 
 def with_diverged(held, rows):
-    """The same windows, in which the model runs away in some."""
+    """The same windows, in some of which the model diverges."""
     states = held.states_before.copy()
     states[rows, -1] = np.inf
     made = HeldOut(held.cut, held.before, held.trial)
@@ -112,11 +112,11 @@ def with_diverged(held, rows):
     return made
 
 
-def test_a_window_in_which_the_model_runs_away_is_in_no_figure(sea):
+def test_a_window_in_which_the_model_diverges_is_in_no_figure(sea):
     """One would outweigh all others: the figures are those of the windows without it."""
     held, decision = sea.done.held, sea.done.decision
     one = with_diverged(held, [0])
-    assert (one.diverged, held.diverged) == (1, 0)
+    assert (one.not_counted, held.not_counted) == (1, 0)
     assert one.lost(None) == ""
     found, whole = one.gain(decision), held.gain(decision)
     assert found.windows == whole.windows - 1
@@ -125,10 +125,10 @@ def test_a_window_in_which_the_model_runs_away_is_in_no_figure(sea):
     assert 0.0 < found.reduction < 1.0
 
 
-def test_a_model_that_runs_away_in_most_windows_names_nothing(sea):
+def test_a_model_that_diverges_in_most_windows_names_nothing(sea):
     held = sea.done.held
     every = with_diverged(held, range(len(held.cut)))
-    assert every.diverged == 0  # they are all counted, and each is as bad as can be
+    assert every.not_counted == 0  # they are all counted, and each is as bad as can be
     assert every.losses_before.min() >= 1e9
     assert "and 3000000000 as log and profile have it" in every.lost(None)
 

@@ -215,7 +215,7 @@ def test_offsets_that_no_file_has_are_damage(reading):
 
 
 def indexed(made: list[tuple[int, bytes]], off: int = 0) -> bytes:
-    """A summary that says where each chunk stands, or so many bytes beside it."""
+    """A summary that says where each chunk stands, or so many bytes further on."""
     found = described()
     for at, length in places(file(made), mcap.CHUNK):
         body = struct.pack("<QQQQ", START, START, at + off, length) + mcap.numbers({})
@@ -255,7 +255,7 @@ def test_a_damaged_summary_is_not_believed_of_a_chunk_without_a_checksum(reading
 
 
 def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_for(reading):
-    """Four bytes must not cost a whole log; beside a sound chunk such a one stays lost."""
+    """Four bytes must not cost a whole log. Where another chunk is sound, it is lost."""
     header, first, *_ = parts()
     raw = zstandard.ZstdDecompressor().decompress(first[1][44:])
     wrong = (mcap.CHUNK, packed(raw, 0, EACH - 1, crc=zlib.crc32(raw) ^ 1))
@@ -266,11 +266,36 @@ def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_f
     assert found.health.chunks_lost == 0
     second = parts()[3 + len(TOPICS) - 1]
     assert second[0] == mcap.CHUNK
-    beside = reading(file([header, wrong, second], described()), "two.mcap")
-    assert numbers(beside) == list(range(EACH, 2 * EACH))
+    with_sound = reading(file([header, wrong, second], described()), "two.mcap")
+    assert numbers(with_sound) == list(range(EACH, 2 * EACH))
     with pytest.raises(LogUnreadable, match="does not have the size it states"):
         short = (mcap.CHUNK, packed(raw, 0, EACH - 1, size=len(raw) - 1))
         reading(file([header, short]), "no.mcap")
+
+
+def test_a_chunk_with_a_wrong_checksum_is_read_by_the_descriptions_outside_it(reading):
+    header, *_ = parts()
+    channels = [(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(TOPICS, 1)]
+    body = mcap.message(2, 0, START, START, payload(5))
+    wrong = (mcap.CHUNK, packed(mcap.record(mcap.MESSAGE, body), 0, 0, crc=1))
+    found = reading(file([header, *channels, wrong]))
+    assert (numbers(found), set(found.frames)) == ([5], {"/wind"})
+
+
+def test_records_of_unknown_kind_are_searched_once(reading, monkeypatch):
+    """Each from where the one before it ended: a file of them must not take its size squared."""
+    header, first, *others = parts()
+    looked, plain = [], scan.beginnings.read_at
+
+    def noted(stream, offset, length):
+        looked.append(plain(stream, offset, length))
+        return looked[-1]
+
+    monkeypatch.setattr(scan.beginnings, "read_at", noted)
+    data = file([header, first, *[(0x90, bytes(20))] * 500, *others])
+    assert numbers(reading(data)) == without()
+    passes, overlaps = 2, 2 * 500 * scan.beginnings.OVERLAP  # for descriptions, and for messages
+    assert 500 * 29 <= sum(map(len, looked)) <= passes * len(data) + overlaps
 
 
 def test_a_chunk_in_a_record_of_unknown_kind_is_read_and_a_newer_writers_record_passed(reading):
