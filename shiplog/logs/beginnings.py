@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator
 from typing import IO
 
@@ -31,3 +32,8 @@ def beginnings(stream: IO[bytes], start: int, limit: int) -> Iterator[tuple[int,
             yield start + at, Opcode.HEADER if window[at] == MAGIC[0] else window[at]
             at += 1
         start += LOOKED
+
+
+def within(places: list[int], start: int, end: int) -> list[int]:
+    """Those of sorted places in [start, end)."""
+    return places[bisect_left(places, start) : bisect_left(places, end)]

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
@@ -41,6 +41,7 @@ from .records import HEAD, MESSAGE, parsed
 from .refusals import MAGIC, check_file, refusal
 
 Item = Sound | Index | Alone
+Taken = TypeVar("Taken", Sound, Alone)
 
 LONGEST_ALONE = 1_000_000  # bytes of a message that a search takes: in most bytes is no message
 LEAST_DESCRIPTION, LARGEST_DESCRIPTION = 14, 1 << 22  # bytes; large schemas have 100 kB
@@ -200,13 +201,16 @@ class _Walk:
             return Loss("crc", position, reason), None, 0
         if isinstance(bad, Loss):
             self._lose(bad)
+            if bad.start is not None:  # its lengths are true: what is in it, its CRC speaks against
+                self.searched = after
             return None, None, after
-        if opcode > Opcode.DATA_END:
-            # a newer writer's; or damage, which may look like a record that ends with a chunk
+        item = self._other(position, opcode, length)
+        if item is None and opcode != Opcode.ATTACHMENT:  # one may hold a whole log
+            # what is damaged may look like a record that reaches over chunks and ends with one
             if self.next_sound(max(self.anchor, self.searched), after) is not None:
-                return Loss("crc", position, f"holds a record of unknown kind {opcode}"), None, 0
+                return Loss("crc", position, "holds a record that reaches over others"), None, 0
             self.searched = after
-        return None, self._other(position, opcode, length), after
+        return None, item, after
 
     def _other(self, position: int, opcode: int, length: int) -> Item | None:
         """A record that is no chunk."""
@@ -215,20 +219,34 @@ class _Walk:
             body = self._body(position, length if whole else MESSAGE.size)
             self.found.unvouched |= opcode == Opcode.MESSAGE
             item = Alone(position, self._number(), opcode, body, whole)
-            return self._take(item, position + HEAD.size + length)
+            if self._certain(item):
+                return self._take(item, position + HEAD.size + length)
+            if position == self.found.begin:  # a damaged header
+                return None
+            return self._mistaken(position, length) or self._take(item, self.anchor)
         if opcode == Opcode.MESSAGE_INDEX and length <= LARGEST_SUMMARY:
             index = next(index_of(self._body(position, length), self.section), None)
             if index is not None and self.lost is not None:
                 held = self.lost.held
                 held[index.channel] = held.get(index.channel, 0) + len(index.times)
                 return None
-            return index
+            return index or self._mistaken(position, length)
         if opcode == Opcode.METADATA and length <= LARGEST_SUMMARY:
             note(self.found, parsed(Metadata, self._body(position, length)), LOOSE)
         self.past_data |= opcode == Opcode.DATA_END and length <= LONGEST_FOOTER
-        return None
+        return self._mistaken(position, length)
 
-    def _take(self, item: Sound | Alone, after: int) -> Sound | Alone:
+    def _mistaken(self, position: int, length: int) -> Sound | None:
+        """The chunk that a record of another kind is, when only its opcode is damaged."""
+        sound = self._vouched(position, length)
+        return self._take(sound, sound.end) if sound else None
+
+    def _vouched(self, position: int, length: int) -> Sound | None:
+        """The chunk with a right CRC whose body of this length follows the head at `position`."""
+        sound = self._open(position, length)
+        return sound if isinstance(sound, Sound) and sound.chunk.uncompressed_crc else None
+
+    def _take(self, item: Taken, after: int) -> Taken:
         """Note where a sound item ends, and what it says of time."""
         self.anchor, self.begun, self.lost = after, True, None
         times: tuple[int, ...] = ()
@@ -248,6 +266,14 @@ class _Walk:
             self.low = times[0] if self.low is None else min(self.low, times[0])
             self.high = max(self.high, times[-1])
         return item
+
+    def _certain(self, item: Alone) -> bool:
+        """Whether it is a description to its last byte, or a message of a known channel."""
+        if item.opcode != Opcode.MESSAGE:
+            return records.exact(item.opcode, item.body)
+        if len(item.body) < MESSAGE.size:
+            return False
+        return MESSAGE.unpack_from(item.body)[0] + item.section * SECTION in self.found.channels
 
     def _number(self) -> int:
         """The section of what is handed on now; a closing magic before it begins another."""
@@ -314,8 +340,8 @@ class _Walk:
         """Where the next chunk, message or log begins that can be read, from `start` on; before
         `end`, where one is given."""
         end = self.found.end if end is None else min(end, self.found.end)
-        limit = next((at for at in self.starts if start <= at < end and self._indexed(at)), end)
-        limit = next((at for at in self.hints if start <= at < limit and self._hinted(at)), limit)
+        limit = next(filter(self._indexed, beginnings.within(self.starts, start, end)), end)
+        limit = next(filter(self._hinted, beginnings.within(self.hints, start, limit)), limit)
         for at, kind in beginnings.beginnings(self.stream, start, limit):
             if kind == Opcode.CHUNK and self._checked(at):
                 return at
@@ -335,8 +361,7 @@ class _Walk:
         """Whether a chunk stands where a damaged summary says so: its CRC has to be right."""
         length = self.found.hinted[position] - HEAD.size
         self.work -= length  # a damaged summary may name one place a million times over
-        sound = self._open(position, length)
-        return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
+        return self._vouched(position, length) is not None
 
     def _checked(self, position: int) -> bool:
         """Whether a chunk stands here whose CRC is right, and is one."""
@@ -344,8 +369,7 @@ class _Walk:
         if fault is not None or length <= chunks.FIXED_BYTES:
             return False
         self.work -= chunks.FIXED_BYTES
-        sound = self._open(position, length)
-        return isinstance(sound, Sound) and sound.chunk.uncompressed_crc != 0
+        return self._vouched(position, length) is not None
 
     def _plausible(self, position: int) -> bool:
         """Whether a message may stand here; only where there are no chunks, which vouch for it."""

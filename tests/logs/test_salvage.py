@@ -232,7 +232,7 @@ def test_a_damaged_summary_still_says_where_a_chunk_without_a_head_stands(
     """Its word is taken where the chunk's own CRC bears it out, and only there."""
     whole = file(parts(), indexed(parts(), off))
     at = CHUNK_AT[3][0]
-    data = changed(whole, at, b"\x07" + bytes([whole[at + 1] ^ 0x55]))
+    data = changed(whole, at, b"\x07\x05")  # an index of five bytes
     spoilt = {"its checksum": -12, "its last record": -37 - 20, "the footer": -37}[broken]
     place = len(data) + spoilt
     found = reading(changed(data, place, bytes([data[place] ^ 0x20])))
@@ -249,7 +249,7 @@ def test_a_damaged_summary_is_not_believed_of_a_chunk_without_a_checksum(reading
     whole = file(made, indexed(made))
     assert numbers(reading(whole)) == without()
     place = CHUNK_AT[3][0]
-    data = changed(whole, place, b"\x07" + bytes([whole[place + 1] ^ 0x55]))
+    data = changed(whole, place, b"\x07\x05")
     data = changed(data, len(data) - 12, bytes([data[-12] ^ 0x20]))
     assert numbers(reading(data, "spoilt.mcap")) == without(3)
 
@@ -282,6 +282,22 @@ def test_a_chunk_with_a_wrong_checksum_is_read_by_the_descriptions_outside_it(re
     assert (numbers(found), set(found.frames)) == ([5], {"/wind"})
 
 
+@pytest.mark.parametrize("opcode", [k for k in range(1, 256, 7)] + list(range(1, 16)))
+def test_a_chunk_of_which_only_the_opcode_is_damaged_is_read(reading, opcode):
+    """In a log without a summary nothing else says that it is one."""
+    assert numbers(reading(changed(GOOD, CHUNK_AT[3][0], bytes([opcode])))) == without()
+
+
+@pytest.mark.parametrize("opcode", [mcap.HEADER, mcap.SCHEMA, mcap.CHANNEL, mcap.MESSAGE, ord("x")])
+@pytest.mark.parametrize("how", ["insert", "overwrite"])
+def test_what_looks_like_a_record_outside_chunks_hides_no_chunk(reading, opcode, how):
+    """A byte in front of the header makes it a record that reaches over chunks; in its place, a
+    damaged description of no channel."""
+    found = reading(GOOD[:8] + bytes([opcode]) + GOOD[8 if how == "insert" else 9 :])
+    assert numbers(found) == without()
+    assert set(found.frames) == set(TOPICS)
+
+
 def test_records_of_unknown_kind_are_searched_once(reading, monkeypatch):
     """Each from where the one before it ended: a file of them must not take its size squared."""
     header, first, *others = parts()
@@ -302,11 +318,15 @@ def test_a_chunk_in_a_record_of_unknown_kind_is_read_and_a_newer_writers_record_
     """Behind a cut, the last letter of "zstd" is an opcode, and what follows the length of the
     chunk's data: a record that ends where the chunk does."""
     at = CHUNK_AT[1][0]
-    found = reading(changed(GOOD, at, b"d" + struct.pack("<Q", CHUNK_AT[1][1] - 9)))
+    unknown = changed(GOOD, at, b"d")
+    found = reading(changed(unknown, at + 100, bytes([GOOD[at + 100] ^ 1])))
     assert numbers(found) == without(1)
+    assert numbers(reading(unknown, "unknown.mcap")) == without()  # it is still a chunk
     cut = reading(GOOD[:472] + GOOD[472 + 123 :], "cut.mcap")
     assert numbers(cut) == without()
     assert {f.kind for f in cut.health.findings} == {"crc"}
+    again = reading(GOOD[:2255] + GOOD[2255 + 281 :], "again.mcap")  # and in a chunk cut short
+    assert numbers(again) == without(4)
     header, *others = parts()
     newer = reading(file([header, (0x90, bytes(100)), *others]), "newer.mcap")
     assert numbers(newer) == without() and newer.health.findings == ()
