@@ -205,8 +205,7 @@ class _Walk:
                 self.searched = after
             return None, None, after
         item = self._other(position, opcode, length)
-        if item is None and opcode != Opcode.ATTACHMENT:  # one may hold a whole log
-            # what is damaged may look like a record that reaches over chunks and ends with one
+        if item is None and opcode != Opcode.ATTACHMENT:  # which may hold a whole log
             if self.next_sound(max(self.anchor, self.searched), after) is not None:
                 return Loss("crc", position, "holds a record that reaches over others"), None, 0
             self.searched = after
