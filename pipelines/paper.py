@@ -10,15 +10,15 @@ from pathlib import Path
 import polars as pl
 
 from pipelines import train_networks
-from pipelines.evaluate import EvaluatedRuns, evaluate_runs
+from pipelines.evaluate import evaluate_runs
 from shiplog import files
 from shiplog.channels import VELOCITY
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
-from shiplog.report import tables, viewer
-from shiplog.report.paper import figures, sets, statements
-from shiplog.report.paper.style import named
+from shiplog.report import viewer
+from shiplog.report.paper import figures, report, sets, statements
+from shiplog.report.paper.report import Results
 from shiplog.report.text_table import inert
 from shiplog.training import run_folder
 from shiplog.training.options import TrainOptions
@@ -35,7 +35,6 @@ from shiplog.voyages.store import Store
 log = logging.getLogger(__name__)
 
 BASELINES = {"hold": "holds the velocity", "least_squares": "quadratic least squares"}
-SHOWN_VOYAGES = 4  # of a set, in the report
 HALF = 0.5  # of the training seconds that the reference set has at most, d-ref having all
 
 
@@ -56,25 +55,6 @@ class Voyages:
             test=self.test,
             chosen_by=self.chosen_by,
         )
-
-
-@dataclass(frozen=True)
-class Results:
-    """What the trainings came to.
-
-    runs        of each set that is finished
-    failures    training → why it did not end
-    losses      set, seed, loss: L over the test windows
-    histories   set, seed, epoch, training, validation, smoothed
-    compared    see `statements.differences`
-    """
-
-    runs: dict[str, RunFolder]
-    failures: dict[str, str]
-    losses: pl.DataFrame
-    histories: pl.DataFrame
-    compared: pl.DataFrame
-    evaluation: EvaluatedRuns
 
 
 def paper_command(
@@ -115,7 +95,7 @@ def paper_command(
         "recipe": recipe,
         "split": chosen.of("d-ref").model_dump(mode="json"),
         "reference": list(chosen.reference),
-        "sets": _summary(results).to_dicts(),
+        "sets": report.summary(results).to_dicts(),
         "statements": results.compared.to_dicts(),
         "floors": results.evaluation.means,
         "failures": failures,
@@ -258,7 +238,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
             figures.states(own, measured, ("ref", name), path(f"ref and {name}"))
     for name, frame in frames.items():
         files.write_frame(numbers / f"{name}.parquet", frame)
-    text = report_of(results, chosen, sizes)
+    text = report.text(results, chosen.chosen_by, sizes)
     files.write_text(out / "report.md", inert(text) + "\n")
     title = f"{profile.ship.name}: {len(results.runs)} window sets"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
@@ -271,14 +251,6 @@ def _longest(errors: pl.DataFrame) -> str:
     return count.sort("len", descending=True, maintain_order=True)["voyage"][0]
 
 
-def _sizes(sizes: pl.DataFrame) -> list[tuple]:
-    """Rows of the report's table of sets: of many voyages a few."""
-    short = pl.col("voyages").str.split(", ").map_elements(
-        lambda names: listed(names, SHOWN_VOYAGES), return_dtype=pl.String
-    )  # fmt: skip
-    return sizes.with_columns(voyages=short).rows()
-
-
 def _angles(profile: Profile) -> frozenset[str]:
     """Actuators that are angles."""
     return frozenset(a.name for a in profile.actuators if a.si_unit == "rad")
@@ -289,56 +261,3 @@ def _units(profile: Profile) -> dict[str, str]:
     names = {"rad": "deg", "rev/s": "rev/s", "1": "1"}
     units = {a.name: names.get(a.si_unit, a.si_unit) for a in profile.actuators}
     return units | ({"wind_speed": "m/s", "wind_angle": "deg"} if profile.has_wind else {})
-
-
-def _summary(results: Results) -> pl.DataFrame:
-    """set, seeds, and mean, least and greatest test L, best validation L (median)."""
-    best = results.histories.group_by("set", "seed").agg(pl.col("validation").min())
-    best = best.group_by("set").agg(validation=pl.col("validation").median())
-    loss = pl.col("loss")
-    return (
-        results.losses.group_by("set", maintain_order=True)
-        .agg(seeds=pl.len(), mean=loss.mean(), least=loss.min(), most=loss.max())
-        .join(best, on="set", how="left", maintain_order="left")
-    )
-
-
-def report_of(results: Results, chosen: Voyages, sizes: pl.DataFrame) -> str:
-    """Markdown: sets, losses, what the paper states and what these data say."""
-    run = next(iter(results.runs.values()))
-    baselines = results.evaluation.means
-    count = results.evaluation.errors.filter(
-        pl.col("run") == run.name, pl.col("seed") == run.config.seeds[0]
-    ).height
-    figures_of = ("validation", "mean", "least", "most")
-    losses = [
-        (named(row["set"]), row["seeds"], *(f"{row[name]:.0f}" for name in figures_of))
-        for row in _summary(results).iter_rows(named=True)
-    ]
-    lines = [
-        f"# {run.profile.ship.name}: {len(results.runs)} window sets",
-        "",
-        f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
-        f"{listed(results.evaluation.voyages)}, {count} windows. Split by {chosen.chosen_by}.",
-        "",
-        tables.table(tuple(sizes.columns), _sizes(sizes)),
-        "",
-        "L of the test windows; a baseline that holds the velocity has "
-        f"{baselines['hold']:.0f}, quadratic least squares on the reference set "
-        f"{baselines['least_squares']:.0f}.",
-        "",
-        tables.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
-                     losses),
-        "",
-        "## What the paper states, on these data",
-        "",
-        "Ratios are geometric means over pairs of one seed, with intervals that hold together at "
-        "95 % (eight comparisons).",
-        "",
-        *[f"- {row['statement']} {statements.sentence(row)}"
-          for row in results.compared.iter_rows(named=True)],
-    ]  # fmt: skip
-    if results.failures:
-        lines += ["", "## What could not be trained", ""]
-        lines += [f"- {name}: {why}" for name, why in results.failures.items()]
-    return "\n".join(lines)

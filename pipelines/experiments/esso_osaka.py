@@ -14,10 +14,11 @@ from pathlib import Path
 import polars as pl
 
 from pipelines.convert import convert
-from pipelines.evaluate import EvaluatedRuns, evaluate_runs
+from pipelines.evaluate import evaluate_runs
 from pipelines.prepare import expand, ingest_logs
 from pipelines.train_networks import train_run
 from shiplog import profile_file as profiles
+from shiplog.report.evaluation import EvaluatedRuns
 from shiplog.training.run_config import Config
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
