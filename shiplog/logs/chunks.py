@@ -119,6 +119,15 @@ def message_counts(sound: Chunk) -> Counter[int]:
     return counts
 
 
+def sound(opened_chunk: Chunk) -> bool:
+    """Whether an opened chunk holds records from its first byte to its last."""
+    try:
+        message_counts(opened_chunk)
+    except ValueError:
+        return False
+    return True
+
+
 def alone(item: Alone, counts: Counter[int] | None) -> Iterator[McapRecord]:
     """The same of a record that stands in no chunk."""
     body = memoryview(item.body)

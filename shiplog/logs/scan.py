@@ -163,14 +163,13 @@ class _Walk:
         One wrong bit in the CRC of a log of a single chunk must not cost all of it.
         """
         self.closed = False  # the end of the log was met, and no other log begins
-        losses = self.found.losses
-        for i, loss in enumerate(losses):
+        for i, loss in enumerate(tuple(self.found.losses)):
             if not loss.chunk:
                 continue
             _, length, _ = head(self.stream, loss.offset, self.found.size)
             whole = self._open(loss.offset, length, vouched=False)
-            if isinstance(whole, Sound):  # else more is wrong with it than its CRC
-                losses[i] = Loss("crc", loss.offset, UNVOUCHED)
+            if isinstance(whole, Sound) and chunks.sound(whole.chunk):
+                self.found.losses[i] = Loss("crc", loss.offset, UNVOUCHED)
                 yield self._take(whole, whole.end)
 
     def _step(self, position: int) -> tuple[Loss | None, Item | None, int]:

@@ -273,6 +273,19 @@ def test_a_log_of_one_chunk_whose_checksum_is_wrong_is_read_and_is_not_vouched_f
         reading(file([header, short]), "no.mcap")
 
 
+def test_a_chunk_with_a_wrong_checksum_and_wrong_records_is_lost_once(tmp_path):
+    """Its bytes are no records, so it is not read."""
+    header, first, *_ = parts()
+    raw = zstandard.ZstdDecompressor().decompress(first[1][44:])
+    spoilt = raw + struct.pack("<BQ", mcap.MESSAGE, 1 << 40)  # a message that ends nowhere
+    wrong = (mcap.CHUNK, packed(spoilt, 0, EACH - 1, crc=zlib.crc32(raw) ^ 1))
+    path = tmp_path / "spoilt.mcap"
+    path.write_bytes(file([header, wrong]))
+    found = scan.survey(path)
+    assert list(scan.walk(found)) == []
+    assert [loss.reason for loss in found.losses if loss.chunk] == ["does not match its checksum"]
+
+
 def test_a_chunk_with_a_wrong_checksum_is_read_by_the_descriptions_outside_it(reading):
     header, *_ = parts()
     channels = [(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(TOPICS, 1)]
