@@ -90,9 +90,12 @@ class Discrepancy:
         if not self.families:
             return np.zeros((len(cut), 3 * g.knots, 0))
         knots = segment_nodes.at_knots(cut, g)
-        parts = [
-            segment_nodes.accelerations(f.features(knots), self.acceleration) for f in self.families
-        ]
+        parts = []
+        for family in self.families:
+            of = family.features(knots)
+            if family.name in cut.factors:
+                of = of * cut.factors[family.name][:, None]
+            parts.append(segment_nodes.accelerations(of, self.acceleration))
         return np.concatenate(parts, axis=-1)
 
 

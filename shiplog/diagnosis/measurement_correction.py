@@ -28,6 +28,17 @@ def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.
     return record
 
 
+def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Family of the discrepancy → factor [3] of the forces that depend on its inputs."""
+    found: dict[str, np.ndarray] = {}
+    for cause in causes:
+        if (values := numbers.get(cause.label)) is None or not np.any(values != 0.0):
+            continue
+        for family, factor in cause.scales(np.asarray(values)).items():
+            found[family] = found.get(family, np.ones(3)) * factor
+    return found
+
+
 def read(
     model: Extended,
     setting: Setting,
@@ -41,6 +52,7 @@ def read(
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
+    base = replace(base, factors=factors(model.causes, given))
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
     observed = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it

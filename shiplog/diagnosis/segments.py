@@ -5,7 +5,8 @@ How long they are is the record's `timescale`: half a minute for a model ship of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,8 @@ class Cut:
     used    [S, B, 6]      bool
     driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' nodes
     voyage  [S]
+    factors  family of the discrepancy → factor [3] of the forces that depend on its inputs; none
+             where they are as on the nominal voyages
     """
 
     rows: np.ndarray
@@ -33,6 +36,7 @@ class Cut:
     driven: np.ndarray
     voyage: np.ndarray
     step: float
+    factors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)

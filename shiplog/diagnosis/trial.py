@@ -26,7 +26,7 @@ from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.measurement_correction import read
+from shiplog.diagnosis.measurement_correction import factors, read
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.remainder import LEAST_SPREAD, Remainder
@@ -156,6 +156,7 @@ class Trial:
         if noise_factor is not None:
             wide = ref.held(noise_factor, remainder or Remainder())
         cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
+        cut = replace(cut, factors=factors(ref.model.causes, numbers))
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.about(cut, self.grid)
         if isinstance(near, Point):

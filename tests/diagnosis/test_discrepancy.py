@@ -1,6 +1,7 @@
 """Features of a model's discrepancy, of states and controls that are written out by hand."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -284,12 +285,43 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
     assert columns.tolist() == list(range(7, 7 + found.count))
 
     monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: at)
-    accelerations = found.accelerations(None, None)  # type: ignore[arg-type]
+    accelerations = found.accelerations(SimpleNamespace(factors={}), None)  # type: ignore[arg-type]
     assert accelerations.shape == (4, 15, found.count)
     features = np.concatenate([f.features(at) for f in found.families], -1)
     for channel in range(3):
         own = accelerations[:, 5 * channel : 5 * channel + 5]
         assert own == pytest.approx(ACCELERATION[channel] * features[..., channel, :])
+
+
+def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one_error(monkeypatch):
+    """A wind pressed down by 1/1.2 has 1/1.2² of the force, and so of each product of U_A² with an
+    angle: what the model gets wrong must not tell the two apart."""
+    at = knots(state=np.zeros((4, 5, 6)), seed=8)
+    found = discrepancy.of(TWIN, ACCELERATION, 0, SEEN, at)
+    driven = at.driven.copy()
+    driven[..., -2:] /= 1.2
+
+    def of(there: Knots, factors: dict) -> np.ndarray:
+        monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: there)
+        return found.accelerations(SimpleNamespace(factors=factors), None)  # type: ignore[arg-type]
+
+    scale = of(Knots(at.state, driven), {})
+    force = of(at, {"wind": np.full(3, 1.2**-2)})
+    (wind,) = (f for f in found.families if f.name == "wind")
+    features = len(wind.columns) // 3
+    products = [k for k in range(len(wind.columns)) if k % features < features - WAVES["wind"]]
+    own = wind.columns[products]
+    assert force[..., own] == pytest.approx(scale[..., own], rel=1e-9)
+    assert np.abs(scale[..., own]).max() > 0.1 * ACCELERATION.min()
+
+    one_channel, plain = of(at, {"wind": np.array([1.0, 1.5, 1.0])}), of(at, {})
+    for channel, factor in enumerate((1.0, 1.5, 1.0)):
+        rows = slice(5 * channel, 5 * channel + 5)
+        assert one_channel[:, rows, wind.columns] == pytest.approx(
+            factor * plain[:, rows, wind.columns]
+        )
+    others = np.setdiff1d(np.arange(found.count), wind.columns)
+    assert (one_channel[..., others] == plain[..., others]).all()
 
 
 def test_the_same_ship_has_the_same_features_every_time():

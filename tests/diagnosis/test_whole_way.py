@@ -231,3 +231,16 @@ def test_causes_converge_from_where_they_converged_before(compass):
         asked.clear()
     assert ends[0][0] > 2 and ends[1][0] == 1
     assert ends[0][1] == pytest.approx(ends[1][1], rel=0.02)
+
+
+def test_the_models_error_in_the_wind_tells_no_wind_force_from_an_anemometers_scale(sea):
+    """Both are the same force: 1/1.2² of it, or a wind that is 1.2 times as strong as measured."""
+    trial, scale = sea.done.trial, {"wind_speed_scale": np.array([0.2])}
+    force = {"wind_force": np.full(3, 1.2**-2 - 1.0)}
+    path = trial.at(scale).path
+    measured, scaled = trial.at(scale, path), trial.at(force, path)
+    assert measured.linear.cut.factors == trial.at({}).linear.cut.factors == {}
+    assert scaled.linear.cut.factors["wind"] == pytest.approx(np.full(3, 1.2**-2))
+    assert trial.covering(scaled).cut.factors["wind"] == pytest.approx(np.full(3, 1.2**-2))
+    one, other = (evidence.level(trial, point, 1.0).value for point in (measured, scaled))
+    assert other == pytest.approx(one, abs=1.0)

@@ -210,6 +210,11 @@ class Cause:
         """X, Y, N [..., 3] at midship, in addition to the ship's own [N, N, N m]."""
         return None
 
+    def scales(self, p: np.ndarray) -> Mapping[str, np.ndarray]:
+        """Family of the discrepancy → factor [3] of all forces that depend on its inputs: what the
+        model gets wrong of them grows with them."""
+        return {}
+
     # --- words ---
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:

@@ -100,6 +100,10 @@ class WindForce(Cause):
         factor = {axis: already + p[i] for i, axis in enumerate("xyn")}
         return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
 
+    def scales(self, p: np.ndarray) -> dict[str, np.ndarray]:
+        """The ship's wind force is so many times the true one of before, not the model's."""
+        return {} if self.lacking else {"wind": 1.0 + np.asarray(p)}
+
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         already = 0.0 if self.lacking else 1.0
         return {q.name: (already + p[..., i], "1") for i, q in enumerate(self.parameters)}
