@@ -29,7 +29,8 @@ def corrected(causes: Sequence[Cause], record: Record, numbers: Mapping[str, np.
 
 
 def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Family of the discrepancy → factor [3] of the forces that depend on its inputs."""
+    """Family of the discrepancy → factor [3] (1) of X, Y and N that depend on its inputs: the
+    product over causes, label → numbers, SI, of what each `scales`."""
     found: dict[str, np.ndarray] = {}
     for cause in causes:
         if (values := numbers.get(cause.label)) is None or not np.any(values != 0.0):

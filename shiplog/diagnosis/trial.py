@@ -45,7 +45,14 @@ class Readings:
         self._known: list[tuple[Numbers, Read]] = []
 
     def of(self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers) -> Read:
-        """The segments as read with these numbers.
+        """The segments as read with these numbers, and the factors of all of them."""
+        cut, moved, observed = self._read(reference, record, rows, numbers)
+        return replace(cut, factors=factors(reference.model.causes, numbers)), moved, observed
+
+    def _read(
+        self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers
+    ) -> Read:
+        """The segments as read with those of these numbers that change what is read.
 
         The effect of a sensor's cause depends on the corrections before it. With a clock that is
         one second late, the antenna's columns are one second late too, and two clocks would seem to
@@ -156,7 +163,6 @@ class Trial:
         if noise_factor is not None:
             wide = ref.held(noise_factor, remainder or Remainder())
         cut, moved, observed = self.readings.of(ref, self.record, self.rows, numbers)
-        cut = replace(cut, factors=factors(ref.model.causes, numbers))
         whole = np.concatenate((ref.theta, ref.columns.numbers(dict(numbers))))
         about = ref.about(cut, self.grid)
         if isinstance(near, Point):

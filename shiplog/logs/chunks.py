@@ -119,10 +119,10 @@ def message_counts(sound: Chunk) -> Counter[int]:
     return counts
 
 
-def sound(opened_chunk: Chunk) -> bool:
-    """Whether an opened chunk holds records from its first byte to its last."""
+def holds_records(sound: Chunk) -> bool:
+    """Whether an opened chunk is records from its first byte to its last."""
     try:
-        message_counts(opened_chunk)
+        message_counts(sound)
     except ValueError:
         return False
     return True

@@ -168,7 +168,7 @@ class _Walk:
                 continue
             _, length, _ = head(self.stream, loss.offset, self.found.size)
             whole = self._open(loss.offset, length, vouched=False)
-            if isinstance(whole, Sound) and chunks.sound(whole.chunk):
+            if isinstance(whole, Sound) and chunks.holds_records(whole.chunk):
                 self.found.losses[i] = Loss("crc", loss.offset, UNVOUCHED)
                 yield self._take(whole, whole.end)
 

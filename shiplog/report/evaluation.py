@@ -57,6 +57,7 @@ class EvaluatedRuns:
         return {name: float(values.mean()) for name, values in self.baseline_losses.items()}
 
     def judgement(self, run: Run) -> Judgement:
+        """One run against both baselines, and its errors in lengths of the ship."""
         errors = self.errors.filter(pl.col("run") == run.name)
         length = self.runs[0].profile.ship.length_m
         return judge(run.name, errors, self.baseline_losses, length, self.runs[0].config.window)

@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.profile import Profile
 
 ACCELERATION = np.array([0.08, 0.05, 0.03])
+NO_GRID: Any = None  # the knots are given: nobody asks where they stand
 TWIN = straight.PROFILE  # two rudders at -1.5 m, one screw
 
 
@@ -64,6 +66,11 @@ def knots(state=None, controls=None, share=None, wind=None, seed: int = 0) -> Kn
     share = rng.uniform(size=(*shape, 1)) if share is None else share
     wind = rng.standard_normal((*shape, 2)) if wind is None else wind
     return Knots(state, np.concatenate((controls, share, wind), -1))
+
+
+def segments_of(factors: dict) -> Any:
+    """Segments of which only these factors are asked for."""
+    return SimpleNamespace(factors=factors)
 
 
 def products(name: str, of: Profile, at: Knots) -> np.ndarray:
@@ -285,7 +292,7 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
     assert columns.tolist() == list(range(7, 7 + found.count))
 
     monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: at)
-    accelerations = found.accelerations(SimpleNamespace(factors={}), None)  # type: ignore[arg-type]
+    accelerations = found.accelerations(segments_of({}), NO_GRID)
     assert accelerations.shape == (4, 15, found.count)
     features = np.concatenate([f.features(at) for f in found.families], -1)
     for channel in range(3):
@@ -294,8 +301,8 @@ def test_columns_follow_and_accelerations_are_in_units_of_the_process_noise(monk
 
 
 def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one_error(monkeypatch):
-    """A wind pressed down by 1/1.2 has 1/1.2² of the force, and so of each product of U_A² with an
-    angle: what the model gets wrong must not tell the two apart."""
+    """A wind that is 1.2 times weaker has 1/1.2² of the force, and so of each product of U_A² with
+    an angle: what the model gets wrong must not tell the two apart."""
     at = knots(state=np.zeros((4, 5, 6)), seed=8)
     found = discrepancy.of(TWIN, ACCELERATION, 0, SEEN, at)
     driven = at.driven.copy()
@@ -303,7 +310,7 @@ def test_a_wind_force_of_another_size_and_an_anemometer_of_another_scale_are_one
 
     def of(there: Knots, factors: dict) -> np.ndarray:
         monkeypatch.setattr(discrepancy.segment_nodes, "at_knots", lambda cut, g: there)
-        return found.accelerations(SimpleNamespace(factors=factors), None)  # type: ignore[arg-type]
+        return found.accelerations(segments_of(factors), NO_GRID)
 
     scale = of(Knots(at.state, driven), {})
     force = of(at, {"wind": np.full(3, 1.2**-2)})

@@ -234,7 +234,7 @@ def test_causes_converge_from_where_they_converged_before(compass):
 
 
 def test_the_models_error_in_the_wind_tells_no_wind_force_from_an_anemometers_scale(sea):
-    """Both are the same force: 1/1.2² of it, or a wind that is 1.2 times as strong as measured."""
+    """A wind that is measured 1.2 times too strong has 1/1.2² of the force that the model gives."""
     trial, scale = sea.done.trial, {"wind_speed_scale": np.array([0.2])}
     force = {"wind_force": np.full(3, 1.2**-2 - 1.0)}
     path = trial.at(scale).path

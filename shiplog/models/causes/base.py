@@ -211,8 +211,8 @@ class Cause:
         return None
 
     def scales(self, p: np.ndarray) -> Mapping[str, np.ndarray]:
-        """Family of the discrepancy → factor [3] of all forces that depend on its inputs: what the
-        model gets wrong of them grows with them."""
+        """Family of the discrepancy → factor [3] (1) of X, Y and N that depend on its inputs, with
+        numbers p [count], SI: what the model gets wrong of a force grows with it."""
         return {}
 
     # --- words ---

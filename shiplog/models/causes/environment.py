@@ -101,7 +101,8 @@ class WindForce(Cause):
         return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
 
     def scales(self, p: np.ndarray) -> dict[str, np.ndarray]:
-        """The ship's wind force is so many times the true one of before, not the model's."""
+        """All wind force grows, what the model describes of it and what it does not; where the
+        model has none, nothing of it grows."""
         return {} if self.lacking else {"wind": 1.0 + np.asarray(p)}
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
