@@ -25,7 +25,8 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
     from shiplog import files
 
     if json_to == "-":
-        typer.echo(text, err=True)
+        if text:
+            typer.echo(text, err=True)
         typer.echo(files.json_text(content))
         return
     if text:

@@ -37,6 +37,8 @@ def voyages(
     from shiplog.voyages import catalogue
 
     if not store.exists():
+        if json_to:  # for machines: no store holds no voyage
+            answer("", {"contract": 1, "voyages": []}, json_to)
         raise ShiplogError(
             f"There is no store {store}.",
             hint="ingest logs first: shiplog ingest LOG... --store DIR.",

@@ -176,6 +176,12 @@ def test_a_bad_log_does_not_stop_the_others(logs, tmp_path):
     assert code == 1 and not (tmp_path / "other").exists()
 
 
+def test_no_store_is_an_empty_list_to_a_machine_and_a_message_to_a_reader(tmp_path):
+    code, reported, said = call("voyages", "--store", tmp_path / "none", "--json", "-")
+    assert code == 1 and json.loads(reported) == {"contract": 1, "voyages": []}
+    assert "There is no store" in said and not (tmp_path / "none").exists()
+
+
 def test_an_unforeseen_fault_in_one_log_does_not_stop_the_others(logs, tmp_path, monkeypatch):
     """Its trace is kept, and its sentence says where."""
     from pipelines import prepare
