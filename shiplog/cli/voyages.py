@@ -37,12 +37,15 @@ def voyages(
     from shiplog.voyages import catalogue
 
     if not store.exists():
-        if json_to:  # for machines: no store holds no voyage
-            answer("", {"contract": 1, "voyages": []}, json_to)
-        raise ShiplogError(
+        missing = ShiplogError(
             f"There is no store {store}.",
             hint="ingest logs first: shiplog ingest LOG... --store DIR.",
         )
+        if not json_to:
+            raise missing
+        typer.echo(missing, err=True)  # for machines, no store holds no voyage
+        answer("", {"contract": 1, "voyages": []}, json_to)
+        raise typer.Exit(1)
     if catalogue.unfinished(store):
         from shiplog.voyages.store import Store  # it loads polars, which takes 0.3 s
 
