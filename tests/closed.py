@@ -91,11 +91,10 @@ def record(
     speed = np.hypot(*felt.T) * wind_scale
     angle = np.arctan2(felt[:, 1], felt[:, 0]) + wind_angle
     count = len(t)
-    starts = np.zeros(count, dtype=bool)
-    starts[0] = True
     return Record(
         profile=profile, names=("one",), voyage=np.zeros(count, dtype=int), time=t,
-        share=(np.arange(count) + 0.5) / count, starts=starts, measured=np.ones(count, dtype=bool),
+        share=(np.arange(count) + 0.5) / count, starts=np.arange(count) == 0,
+        measured=np.ones(count, dtype=bool),
         state=np.stack((x0, surge, y0, sway, compass, gyro), -1),
         actuator=controls(t, len(profile.actuators)),
         wind=np.stack((speed * np.cos(angle), speed * np.sin(angle)), -1),

@@ -64,10 +64,8 @@ def converge(
         near, stood = point, numbers
         if lowest > -np.inf:  # of one that joins; without one, the others' evidence must fall
             lowest = max(lowest, base.evidence - STEP_NATS)
-        kept, steady = (
-            steady,
-            held or (lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY),
-        )
+        settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
+        kept, steady = steady, held or settled
         noise_factor = lately = base.noise_factor
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit diverged
@@ -78,10 +76,8 @@ def converge(
         if far < AT_REST:
             if kept and not held:
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
-                numbers, noise_factor = (
-                    _within_bounds(trial, base.numbers, base.covariance),
-                    base.noise_factor,
-                )
+                numbers = _within_bounds(trial, base.numbers, base.covariance)
+                noise_factor = base.noise_factor
             trial.converged[key] = (numbers, point.path, noise_factor)
             break
     assert point is not None

@@ -8,6 +8,7 @@ import pytest
 from made_logs import protobuf_log
 
 from shiplog.logs import preflight, rerun_route
+from shiplog.logs.read import read
 
 
 @pytest.fixture(scope="module")
@@ -31,3 +32,15 @@ def by_rerun(monkeypatch):
     monkeypatch.setattr(rerun_route, "read_most", watched)
     monkeypatch.setattr(preflight, "candidates", lambda tables: [])  # none is decoded before
     return given
+
+
+@pytest.fixture
+def reading(tmp_path):
+    """Reads bytes as a log."""
+
+    def build(data: bytes, name: str = "log.mcap"):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return read(path)
+
+    return build

@@ -2,103 +2,37 @@
 
 from __future__ import annotations
 
-import json
 import random
 import struct
 import zlib
-from collections import Counter
 
 import mcap_bytes as mcap
 import pytest
 import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from salvaged_logs import (
+    CHUNK_AT,
+    CHUNKS,
+    EACH,
+    GOOD,
+    SECOND,
+    START,
+    TOPICS,
+    changed,
+    described,
+    file,
+    numbers,
+    packed,
+    parts,
+    payload,
+    places,
+    without,
+)
 
 from shiplog.exceptions import LogUnreadable
-from shiplog.logs import chunks, records, scan
+from shiplog.logs import scan
 from shiplog.logs.read import contents, read
-
-TOPICS = ("/gyro", "/wind", "/rudder")
-SECOND = 1_000_000_000
-START = 1_700_000_000 * SECOND
-CHUNKS, EACH = 10, 12  # messages of a chunk, on each topic in turn
-
-
-def payload(k: int) -> bytes:
-    return json.dumps({"x": k, "text": "a" * (k % 7)}).encode()
-
-
-def packed(raw: bytes, first: int, last: int, kind: str = "zstd", **claims) -> bytes:
-    data = zstandard.ZstdCompressor().compress(raw) if kind == "zstd" else raw
-    return mcap.chunk(raw, START + first * SECOND, START + last * SECOND, data, kind, **claims)
-
-
-def described(topics=TOPICS) -> bytes:
-    return b"".join(
-        mcap.record(mcap.CHANNEL, mcap.channel(n, 0, t, "json")) for n, t in enumerate(topics, 1)
-    )
-
-
-def parts(topics=TOPICS, kind: str = "zstd") -> list[tuple[int, bytes]]:
-    """The records of the data section; message k comes k seconds after the start."""
-    made = [(mcap.HEADER, mcap.text("") + mcap.text("test"))]
-    for number in range(CHUNKS):
-        first = number * EACH
-        raw, pairs = described(topics) if number == 0 else b"", {}
-        for k in range(first, first + EACH):
-            channel = k % len(topics) + 1
-            pairs.setdefault(channel, []).append((START + k * SECOND, len(raw)))
-            body = mcap.message(channel, k, START + k * SECOND, START + k * SECOND, payload(k))
-            raw += mcap.record(mcap.MESSAGE, body)
-        made.append((mcap.CHUNK, packed(raw, first, first + EACH - 1, kind)))
-        for channel, entries in pairs.items():
-            inside = b"".join(struct.pack("<QQ", *pair) for pair in entries)
-            made.append((mcap.MESSAGE_INDEX, struct.pack("<H", channel) + mcap.text(inside)))
-    return made
-
-
-def file(made: list[tuple[int, bytes]], summary: bytes = b"", ended: bool = True) -> bytes:
-    data = mcap.MAGIC + b"".join(mcap.record(*one) for one in made)
-    if not ended:
-        return data
-    data += mcap.record(mcap.DATA_END, bytes(4))
-    start = len(data) if summary else 0
-    footer = struct.pack("<BQ", mcap.FOOTER, 20) + struct.pack("<QQ", start, 0)
-    crc = zlib.crc32(summary + footer) if summary else 0
-    return data + summary + footer + struct.pack("<I", crc) + mcap.MAGIC
-
-
-def places(data: bytes, opcode: int) -> list[tuple[int, int]]:
-    return [(at, length) for kind, at, length in mcap.records(data) if kind == opcode]
-
-
-@pytest.fixture
-def reading(tmp_path):
-    def build(data: bytes, name: str = "log.mcap"):
-        path = tmp_path / name
-        path.write_bytes(data)
-        return read(path)
-
-    return build
-
-
-def numbers(found) -> list[int]:
-    """The messages that were read, by their number; several of one number stay several."""
-    return sorted(int(x) for frame in found.frames.values() for x in frame["x"])
-
-
-def without(*lost: int) -> list[int]:
-    """All messages but those of the chunks `lost`."""
-    return [k for k in range(CHUNKS * EACH) if k // EACH not in lost]
-
-
-GOOD = file(parts())
-CHUNK_AT = places(GOOD, mcap.CHUNK)
-
-
-def changed(data: bytes, at: int, new: bytes) -> bytes:
-    return data[:at] + new + data[at + len(new) :]
-
 
 DAMAGE = {  # the file, and the chunks of which nothing can be read
     "whole": (GOOD, ()),
@@ -376,88 +310,6 @@ def test_a_log_whose_payloads_are_all_spoilt_is_refused_with_the_reason(reading)
     raw = described(("/a",)) + mcap.record(mcap.MESSAGE, mcap.message(1, 0, START, START, b"{"))
     with pytest.raises(LogUnreadable, match="none can be decoded: their bytes do not fit"):
         reading(file([parts()[0], (mcap.CHUNK, packed(raw, 0, 0))]))
-
-
-# --- claims of size
-
-
-def bomb(size: int, head: bytes = b"", stated: int | None = None, crc: int | None = 0) -> bytes:
-    """A chunk of zeros behind `head`, packed to a ten-thousandth."""
-    pack = zstandard.ZstdCompressor().compressobj()
-    body = pack.compress(head) + pack.compress(bytes(size - len(head))) + pack.flush()
-    stated = size if stated is None else stated
-    return struct.pack("<QQQI", START, START, stated, crc or 0) + mcap.text("zstd") + (
-        struct.pack("<Q", len(body)) + body)  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "made",
-    [bomb(200 << 20), bomb(200 << 20, stated=1000), bomb(64 << 20, stated=2 << 30)],
-    ids=["of nothing", "that states less", "that states more"],
-)
-def test_a_chunk_that_unpacks_to_nothing_is_lost_and_is_never_held(reading, made, monkeypatch):
-    held = []
-    whole = chunks._pieces
-    monkeypatch.setattr(
-        chunks, "_pieces", lambda *a: (held.append(len(p)) or p for p in whole(*a)))  # fmt: skip
-    header, *rest = parts()
-    found = reading(file([header, rest[0], (mcap.CHUNK, made), *rest[1:]]))
-    assert numbers(found) == without()
-    assert [f.kind for f in found.health.findings] == ["crc"]
-    assert max(held) <= chunks.PIECE
-
-
-def test_a_message_that_is_too_large_is_counted_and_left_out(reading):
-    body = mcap.message(1, 7, START, START, b"")
-    size = records.LARGEST_MESSAGE + (1 << 20)
-    head = struct.pack("<BQ", mcap.MESSAGE, size - 9) + body
-    header, *rest = parts()
-    found = reading(file([header, rest[0], (mcap.CHUNK, bomb(size, head)), *rest[1:]]))
-    assert numbers(found) == without()
-    assert found.health.messages_read == CHUNKS * EACH + 1
-    (finding,) = [f for f in found.health.findings if f.kind == "crc"]
-    assert (finding.channel, finding.value) == ("/gyro", 1.0) and "32 MB" in finding.sentence
-
-
-def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(reading, monkeypatch):
-    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 60)
-    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
-    found = reading(GOOD)
-    assert found.health.messages_read == CHUNKS * EACH
-    assert sum(frame.height for frame in found.frames.values()) <= 60
-    assert {f.kind for f in found.health.findings} == {"crc"}
-
-
-def test_a_chunk_of_more_messages_than_a_log_can_hold_is_counted_and_none_is_made(
-    reading, monkeypatch
-):
-    """Empty messages on two channels, packed to nothing; the sound log around them is read."""
-    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 1000)
-    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
-    made = Counter()
-    whole = records.record
-    monkeypatch.setattr(
-        records, "record", lambda opcode, *a: (made.update([opcode]), whole(opcode, *a))[1]
-    )
-    empty = b"".join(
-        mcap.record(mcap.MESSAGE, mcap.message(n, 0, START, START, b"")) for n in (1, 2, 1, 1)
-    )
-    header, *rest = parts()
-    found = reading(file([header, rest[0], (mcap.CHUNK, packed(empty * 5000, 0, 0)), *rest[1:]]))
-    assert numbers(found) == without()
-    assert found.health.messages_read == CHUNKS * EACH + 20_000
-    assert made[mcap.MESSAGE] == CHUNKS * EACH
-    told = {f.channel: f for f in found.health.findings if f.kind == "crc"}
-    assert {topic: f.value for topic, f in told.items()} == {"/gyro": 15_000, "/wind": 5000}
-    assert "are more than a log of this size can hold; left out" in told["/gyro"].sentence
-
-
-def test_unpacking_ends_where_a_log_of_this_size_cannot_go_on(reading, monkeypatch):
-    monkeypatch.setattr(scan, "MOST_WORK", 2000)
-    monkeypatch.setattr(scan, "MOST_RATIO", 0)
-    found = reading(GOOD)
-    assert 0 < found.health.messages_read < CHUNKS * EACH
-    assert "unpacks to far more" in found.health.findings[0].sentence
 
 
 # --- any damage at all
