@@ -97,11 +97,13 @@ def _named(
             continue
         others = _instead(found, best, label)
         assert best.found.covariance is not None
+        numbers = np.asarray(best.found.numbers[label])
+        form = thresholds.FORM_ERROR * numbers  # its equations are no better than that
         given.append(
             Named(
                 by[label], table.alone.get(label, float("nan")),
-                found.names.get(name_of(label), 0.0), np.asarray(best.found.numbers[label]),
-                best.found.covariance[part, part], tuple(others), others,
+                found.names.get(name_of(label), 0.0), numbers,
+                best.found.covariance[part, part] + np.diag(form**2), tuple(others), others,
                 table.trial.reference.freedom,
             )
         )  # fmt: skip

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shiplog.diagnosis import bounds
 from shiplog.diagnosis.campaign_parts import robust_weights, squares
 from shiplog.diagnosis.fitted import ExpectedEvidence, Found, Level, Point
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
@@ -54,7 +55,8 @@ def level(
     total, _ = trial.products.total(point, noise, trial.weight, remainder)
     volume = trial.products.volume(trial.first, noise, trial.weight, remainder)
     found = solve(trial, total, volume, noise, point, included, remainder)
-    return replace(found, value=found.value + noise_prior(noise, trial.nominal_spread, remainder))
+    value = found.value + noise_prior(noise, trial.nominal_spread, remainder)
+    return replace(found, value=value + _within(trial, found, point, included))
 
 
 def solve(
@@ -169,6 +171,9 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
     gained = 0.5 * float(pull @ value) - cost
     unit = trial.reference.columns.unit[columns]
     left = np.linalg.inv(own)
+    low, high = (bound / unit for bound in trial.bounds(label))
+    gained += bounds.log_share(value, np.sqrt(np.diagonal(left)), np.ones(len(unit)), low, high)
+    value = bounds.within(value, left, low, high)
     information = own - np.eye(len(columns))
     shrunk = information @ left
     expected = ExpectedEvidence(
@@ -183,16 +188,41 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
 def numbers_of(
     trial: Trial, one: Level, point: Point, included: Sequence[str]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Numbers and covariance of the included causes; a family's weights come after them."""
-    found: dict[str, np.ndarray] = {}
+    """Numbers and covariance of the included causes, within their bounds."""
+    if not included:
+        return {}, np.zeros((0, 0))
+    mean, covariance = _free(trial, one, point, included)
+    limits = [trial.bounds(name) for name in included]
+    low, high = (np.concatenate(of) for of in zip(*limits, strict=True))
+    found = bounds.within(mean, covariance, low, high)
+    ends = np.cumsum([len(of) for of, _ in limits])[:-1]
+    return dict(zip(included, np.split(found, ends), strict=True)), covariance
+
+
+def _free(
+    trial: Trial, one: Level, point: Point, included: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers [Q] of the included causes and their covariance, were they without bounds; a
+    family's weights come after them."""
     columns = trial.reference.columns
-    at = first = len(trial.reference.pull)
-    units = [np.zeros(0)]
+    unit = np.concatenate([columns.unit[columns.of[name]] for name in included])
+    stood = [point.numbers.get(name, np.zeros(len(columns.of[name]))) for name in included]
+    first = len(trial.reference.pull)
+    own = slice(first, first + len(unit))
+    mean = np.concatenate(stood) + one.solution[own] * unit
+    return mean, one.inverse[own, own] * np.outer(unit, unit)
+
+
+def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> float:
+    """What the causes' bounds add to the log evidence; of the model's own causes nothing."""
+    columns, at, share = trial.reference.columns, 0, 0.0
+    if set(included) <= set(trial.fixed):
+        return share
+    mean, covariance = _free(trial, one, point, included)
+    deviation = np.sqrt(np.diagonal(covariance))
     for name in included:
-        unit = columns.unit[columns.of[name]]
-        stood = point.numbers.get(name, np.zeros(len(unit)))
-        found[name] = stood + one.solution[at : at + len(unit)] * unit
-        units.append(unit)
-        at += len(unit)
-    whole = np.concatenate(units)
-    return found, one.inverse[first:at, first:at] * np.outer(whole, whole)
+        size = columns.unit[columns.of[name]]
+        own, at = slice(at, at + len(size)), at + len(size)
+        if name not in trial.fixed:
+            share += bounds.log_share(mean[own], deviation[own], size, *trial.bounds(name))
+    return share

@@ -210,9 +210,11 @@ class Modes:
         part = md / (self.felt + noise_factor**-2.0)[..., None]
         return Gram(dd - np.swapaxes(md, 1, 2) @ part, self.log_volume(noise_factor))
 
-    def log_volume(self, noise_factor: float = 1.0) -> float:
-        """log |C| of all segments, by itself."""
-        return self.logdet + float(np.log1p(noise_factor**2 * self.felt).sum())
+    def log_volume(self, noise_factor: float = 1.0, weight: np.ndarray | None = None) -> float:
+        """log |C| of all segments, by itself; of the noise that a factor changes, each segment with
+        its weight [S]."""
+        each = np.log1p(noise_factor**2 * self.felt).sum(-1)
+        return self.logdet + float(each.sum() if weight is None else weight @ each)
 
 
 @dataclass(frozen=True)

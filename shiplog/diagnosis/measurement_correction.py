@@ -40,6 +40,24 @@ def factors(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> dict[
     return found
 
 
+def water(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> np.ndarray:
+    """[2] velocity of the water along x₀ and y₀ [m/s], label → numbers, SI: the sum over causes."""
+    found = np.zeros(2)
+    for cause in causes:
+        if (values := numbers.get(cause.label)) is None:
+            continue
+        if (moving := cause.water(np.asarray(values))) is not None:
+            found += np.asarray(moving, dtype=float)
+    return found
+
+
+def as_hypothesised(
+    cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]
+) -> Cut:  # fmt: skip
+    """The segments with what the causes' numbers do to size and inputs of the discrepancy."""
+    return replace(cut, factors=factors(causes, numbers), water=water(causes, numbers))
+
+
 def read(
     model: Extended,
     setting: Setting,
@@ -53,7 +71,7 @@ def read(
     sizes = {c.label: c.sizes(setting) for c in model.causes}
     columns = Columns(0, model.causes, np.concatenate([*sizes.values(), np.zeros(0)]))
     base = segments.cut(corrected(model.causes, record, given), rows)
-    base = replace(base, factors=factors(model.causes, given))
+    base = as_hypothesised(base, model.causes, given)
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
     observed = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it

@@ -142,14 +142,15 @@ def learn(
     count = 1 + len(known)
     parts = [reduced(g[:count, :count], deviation)[0] for g in every]
     voyage = made.linear.cut.voyage[[rows[0] for rows in made.rows]]
-    if len(np.unique(voyage)) == 1:
-        voyage = np.arange(len(parts))
+    own = np.zeros(len(known))
+    if len(np.unique(voyage)) == 1:  # its parts share its deviation, which another voyage has not
+        voyage, own = np.arange(len(parts)), found.apart * deviation
     voyages, _ = campaign_prior.of_voyages(parts, voyage, found.apart * deviation)
-    information, pull = prior(voyages, size**-2.0, held, np.zeros(len(known)), found.share)
+    information, pull = prior(voyages, size**-2.0, held, own, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
         information, pull, held, 1.0 / found.share, made.linear, modes,
-        nominal_reference.freedom(len(made.rows)),
+        nominal_reference.freedom(len(voyages)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
     )  # fmt: skip

@@ -16,8 +16,10 @@ from typing import Protocol
 
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import result as decisions
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.posterior import Posterior
+from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.search import Search
 from shiplog.simulation.error_reduction import Gain
@@ -36,12 +38,14 @@ class Judge(Protocol):
 
 
 def _in_doubt(search: Search, found: Posterior, decision: Decision) -> bool:
-    """Whether a remainder is stated that is more than an error of the causes' equations, and is no
-    device, which has a name and is in the noise of the likelihood."""
+    """Whether it is stated that there is a remainder, of whatever kind, that is more than an error
+    of the causes' equations, and is no device, which has a name and is in the noise of the
+    likelihood."""
     if decision.side_force is not None:
         return False
     best = posteriors.best_with(found, [one.cause.name for one in decision.named])
-    return found.remainder is not None and not posteriors.slight(search.table, best)
+    remains = 1.0 - found.kinds.get(NOMINAL, 0.0)
+    return remains >= thresholds.STATED and not posteriors.slight(search.table, best)
 
 
 def judged(

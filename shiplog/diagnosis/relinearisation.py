@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from shiplog.diagnosis import evidence
 from shiplog.diagnosis.fitted import Found, Point
@@ -70,14 +69,12 @@ def converge(
         if not all(np.isfinite(values).all() for values in base.numbers.values()):
             base = replace(base, evidence=-np.inf)  # the fit diverged
             break
-        moved = _within_bounds(trial, base.numbers, base.covariance)
-        far = trial.reference.apart(moved, numbers)
-        numbers = moved
+        far = trial.reference.apart(base.numbers, numbers)
+        numbers = base.numbers
         if far < AT_REST:
             if kept and not held:
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
-                numbers = _within_bounds(trial, base.numbers, base.covariance)
-                noise_factor = base.noise_factor
+                numbers, noise_factor = base.numbers, base.noise_factor
             trial.converged[key] = (numbers, point.path, noise_factor)
             break
     assert point is not None
@@ -107,33 +104,3 @@ def _half_way(
     if stood is None:
         return {**numbers, last: 0.5 * numbers[last]}
     return {n: 0.5 * (values + stood[n]) for n, values in numbers.items()}
-
-
-def _within_bounds(
-    trial: Trial, numbers: Mapping[str, np.ndarray], covariance: np.ndarray | None
-) -> dict[str, np.ndarray]:
-    """Numbers of a hypothesis as its causes allow them."""
-    by = {cause.label: cause for cause in trial.reference.model.causes}
-    if not numbers:
-        return {}
-    assert covariance is not None
-    bounds = [by[name].bounds(trial.reference.setting) for name in numbers]
-    low, high = (np.concatenate(of) for of in zip(*bounds, strict=True))
-    found = within(np.concatenate(list(numbers.values())), covariance, low, high)
-    ends = np.cumsum([len(values) for values in numbers.values()])[:-1]
-    return dict(zip(numbers, np.split(found, ends), strict=True))
-
-
-def within(
-    mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others."""
-    if ((mean >= low) & (mean <= high)).all():
-        return mean
-    unit = np.sqrt(np.diagonal(covariance))
-    try:
-        root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(unit, unit)))
-    except np.linalg.LinAlgError:  # no covariance any more: each by itself
-        return np.clip(mean, low, high)
-    found = lsq_linear(root, root @ (mean / unit), (low / unit, high / unit), method="bvls").x
-    return np.clip(found * unit, low, high)

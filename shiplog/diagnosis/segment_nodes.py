@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shiplog import frames
 from shiplog.diagnosis.linearisation import resampled
 from shiplog.diagnosis.segments import Cut, SegmentGrid
 
@@ -14,8 +15,8 @@ from shiplog.diagnosis.segments import Cut, SegmentGrid
 class Knots:
     """What went on at the knots of S segments.
 
-    state   [S, J, 6]
-    driven  [S, J, A + 3]  actuators, share of the campaign, true wind
+    state   [S, J, 6]      velocities through the water
+    driven  [S, J, A + 3]  actuators, share of the campaign, wind over the water
     """
 
     state: np.ndarray
@@ -26,7 +27,16 @@ def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
     centre = (np.arange(g.bins) + 0.5) * g.seconds / g.bins
     every = round(g.knot / (g.step * g.every))
     state = resampled(centre, segments.y, np.arange(g.knots) * g.knot)
-    return Knots(state, segments.driven[:, ::every])
+    driven = segments.driven[:, ::every]
+    if segments.water.any():
+        north, east = segments.water
+        c, s = np.cos(state[..., 4]), np.sin(state[..., 4])
+        ahead, starboard = frames.in_body_axes(north, east, c, s)
+        state[..., 1] -= ahead
+        state[..., 3] -= starboard
+        driven = driven.copy()
+        driven[..., -2:] += segments.water  # the apparent wind stays as it is
+    return Knots(state, driven)
 
 
 def in_each_channel(waves: np.ndarray) -> np.ndarray:

@@ -26,6 +26,8 @@ class Cut:
     used    [S, B, 6]      bool
     driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' nodes
     voyage  [S]
+    water    [2] velocity of the water along x₀ and y₀ [m/s]; the discrepancy depends on the motion
+             through it
     factors  family of the discrepancy → factor [3] of the forces that depend on its inputs; none
              where they are as on the nominal voyages
     """
@@ -36,6 +38,7 @@ class Cut:
     driven: np.ndarray
     voyage: np.ndarray
     step: float
+    water: np.ndarray = field(default_factory=lambda: np.zeros(2))
     factors: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:

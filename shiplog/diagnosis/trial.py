@@ -21,12 +21,12 @@ from shiplog.diagnosis import (
     segment_nodes,
     segments,
 )
-from shiplog.diagnosis.campaign_parts import parts_of
+from shiplog.diagnosis.campaign_parts import PART, parts_of
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.measurement_correction import factors, read
+from shiplog.diagnosis.measurement_correction import as_hypothesised, read
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.remainder import LEAST_SPREAD, Remainder
@@ -45,9 +45,10 @@ class Readings:
         self._known: list[tuple[Numbers, Read]] = []
 
     def of(self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers) -> Read:
-        """The segments as read with these numbers, and the factors of all of them."""
+        """The segments as read with these numbers, and the effects of all of them on the inputs
+        and size of the discrepancy."""
         cut, moved, observed = self._read(reference, record, rows, numbers)
-        return replace(cut, factors=factors(reference.model.causes, numbers)), moved, observed
+        return as_hypothesised(cut, reference.model.causes, numbers), moved, observed
 
     def _read(
         self, reference: Reference, record: Record, rows: np.ndarray, numbers: Numbers
@@ -115,7 +116,9 @@ class Trial:
         unseen = discrepancy.of(
             record.profile, reference.process_noise.acceleration, known, discrepancy.UNSEEN, knots
         )
-        parts = tuple(parts_of(record.voyage[rows]))
+        # as long as those from which the campaign knows how far parts differ
+        longest = max((len(part) for part in campaign.rows), default=PART)
+        parts = tuple(parts_of(record.voyage[rows], longest, fewest=1))
         voyage = record.voyage[rows[[part[0] for part in parts]]]
         products = Products(campaign, unseen, grid, parts, voyage)
         weight = np.ones(len(rows))
@@ -136,6 +139,11 @@ class Trial:
     def nominal_spread(self) -> float:
         """Standard deviation of the logarithm of the process noise from campaign to campaign."""
         return max(self.campaign.noise, LEAST_SPREAD)
+
+    def bounds(self, label: str) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest numbers [Q] of a cause, SI."""
+        (cause,) = (c for c in self.reference.model.causes if c.label == label)
+        return cause.bounds(self.reference.setting)
 
     def process_noise(self, remainder: Remainder) -> ProcessNoise:
         """The nominal one; with an intermittent force in it, where one remains."""

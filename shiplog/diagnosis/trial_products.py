@@ -142,7 +142,7 @@ class Products:
         if key not in self._volumes:
             modes, by = self.modes(first, noise_factor, remainder)
             total = self.total(first, noise_factor, weight, remainder)
-            self._volumes[key] = modes.log_volume(by) + total[1]
+            self._volumes[key] = modes.log_volume(by, weight) + total[1]
         return self._volumes[key]
 
 

@@ -39,13 +39,19 @@ def test_one_name(trial):
     assert found.fit.included == ("drag",)
 
 
-def test_two_names_each_with_its_own_part_of_the_covariance(trial):
+def test_two_names_each_with_its_own_part_of_the_covariance(trial, monkeypatch):
+    """And with the form error of its own numbers, 2 % of them unless it is said to be none."""
     made = weighed.search(trial, {(("drag", "two"), NOMINAL): 1.0})
     whole = np.array([[4.0, 1.0, 2.0], [1.0, 9.0, 3.0], [2.0, 3.0, 16.0]])
     made.table.found[("drag", "two"), NOMINAL].found.covariance[:] = whole
     decision, _ = decide(made)
     assert named(decision) == ["drag", "two"]
     drag, two = decision.named
+    form = [np.square(0.02 * one.numbers) for one in (drag, two)]
+    assert drag.covariance == pytest.approx(4.0 + np.diag(form[0]))
+    assert two.covariance == pytest.approx(whole[1:, 1:] + np.diag(form[1]))
+    monkeypatch.setattr(thresholds, "FORM_ERROR", 0.0)
+    drag, two = decide(made)[0].named
     assert drag.covariance.tolist() == [[4.0]]
     assert two.covariance.tolist() == whole[1:, 1:].tolist()
 

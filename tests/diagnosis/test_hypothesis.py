@@ -39,7 +39,8 @@ def test_each_further_cause_is_rarer_by_a_factor_and_by_its_own_prior():
     for one, other in combinations((c.label for c in CAUSES), 2):
         alone, other_alone = priors.causes((one,)), priors.causes((other,))
         some = math.log(1.0 - thresholds.NO_CHANGE)
-        wanted = alone + other_alone - some + math.log(thresholds.ANOTHER_CAUSE)
+        # each pair comes in two orders: of N causes, N²/2 pairs are one in ten together
+        wanted = alone + other_alone - some + math.log(2.0 * thresholds.ANOTHER_CAUSE)
         assert priors.causes((one, other)) == pytest.approx(wanted)
         assert priors.causes((one, other)) == pytest.approx(priors.causes((other, one)))
 

@@ -6,6 +6,8 @@ import pytest
 from shiplog.simulation.error_reduction import RUNAWAY, gain, parts
 from shiplog.simulation.scoring import window_loss
 
+WIDER = 6.313752 / 1.644854 * 2.0**0.5  # of two blocks
+
 
 def even(*losses: float) -> np.ndarray:
     """L by channel [N, 3]: half in surge, half in sway."""
@@ -13,27 +15,45 @@ def even(*losses: float) -> np.ndarray:
 
 
 def test_reduction_and_interval_of_two_voyages():
-    """Voyage a halves, voyage b falls to a tenth. Drawn twice: aa 50 %, ab 70 %, bb 90 %."""
+    """Voyage a halves, voyage b falls to a tenth. Drawn twice: aa 50 %, ab 70 %, bb 90 %. Student's
+    t of one degree is 6.314 where a Gaussian's is 1.645, and a variance of two is half: from 0.7
+    the interval reaches 0.2 · 6.314 / 1.645 · √2, and no error is below zero."""
     found = gain(even(10, 10, 10, 10), even(5, 5, 1, 1), ["a", "a", "b", "b"])
     assert (found.before, found.after) == (10.0, 3.0)
     assert found.reduction == pytest.approx(0.7)
-    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(0.9))
-    assert found.real and found.windows == 4
+    assert (found.low, found.high) == (pytest.approx(0.7 - 0.2 * WIDER), pytest.approx(1.0))
+    assert not found.real and found.windows == 4
     assert found.channels["surge"] == pytest.approx(0.7)
 
 
 def test_windows_in_a_row_are_drawn_together():
-    """One block of two windows: whatever is drawn is the same, and the interval has no width."""
+    """One block of two windows: whatever is drawn is the same, so that it says nothing of how
+    blocks differ. Nothing is excluded: neither no error at all nor twice the error."""
     found = gain(even(10, 10), even(1, 9), ["a", "a"])
-    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(0.5))
+    assert found.reduction == pytest.approx(0.5)
+    assert (found.low, found.high) == (pytest.approx(-1.0), pytest.approx(1.0))
+    assert gain(even(10), even(30), ["a"]).low == pytest.approx(-2.0)
 
 
 def test_a_block_never_joins_two_voyages():
     found = gain(even(10, 10), even(1, 9), ["a", "b"])
-    assert (found.low, found.high) == (pytest.approx(0.1), pytest.approx(0.9))
-    # three and one: blocks of 2, 1 and 1 windows, so that b is drawn alone
+    assert found.low == pytest.approx(0.5 - 0.4 * WIDER)
+    # three and one: blocks of 2, 1 and 1 windows, so that b is drawn alone: 0, 1/4, .. 2/3 of it
     found = gain(even(10, 10, 10, 10), even(10, 10, 10, 0), ["a", "a", "a", "b"])
-    assert (found.low, found.high) == (pytest.approx(0.0), pytest.approx(2 / 3))
+    three = 2.919986 / 1.644854 * 1.5**0.5
+    assert found.low == pytest.approx(0.25 - 0.25 * three)
+    assert found.high == pytest.approx(0.25 + (2 / 3 - 0.25) * three)
+
+
+def test_of_many_blocks_the_interval_is_that_of_their_mean():
+    """A hundred blocks, even ones 8, odd ones 12 of 10: 1.645 · 0.2 / √99 about 0."""
+    after = np.where(np.arange(100) % 2, 12.0, 8.0)
+    found = gain(even(*[10.0] * 100), even(*after), [str(i) for i in range(100)])
+    reach = 1.660391 * 0.2 / 99**0.5
+    assert (found.low, found.high) == (
+        pytest.approx(-reach, rel=0.1),
+        pytest.approx(reach, rel=0.1),
+    )
 
 
 def test_the_mean_is_of_losses_and_not_of_ratios():

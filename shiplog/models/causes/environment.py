@@ -197,13 +197,16 @@ class Bank(Cause):
     separated_by = {"shallow_water": "the same run farther from the bank"}
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
-        lines = [[*a, *b] for line in setting.profile.site.banks for a, b in pairwise(line)]
+        banks = setting.profile.site.banks
+        lines = [[*a, *b] for bank in banks for a, b in pairwise(bank)]
+        of = [i for i, bank in enumerate(banks) for _ in pairwise(bank)]
         ship = setting.profile.ship
         breadth = ship.breadth_m or 0.15 * setting.scale["length"]
         draught = ship.draught_m or 0.07 * setting.scale["length"]
         density = setting.profile.site.density or 1000.0
         return {
             "bank.lines": np.array(lines),
+            "bank.same": np.equal.outer(of, of).astype(float),
             "bank.ship": np.array([setting.scale["length"], breadth, draught, density]),
         }
 
@@ -216,7 +219,7 @@ class Bank(Cause):
         to = a + jnp.clip(part, 0.0, 1.0)[..., None] * along - here
         distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
         gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
-        near = 1.0 / (1.0 + (gap / (3.0 * length)) ** 3)
+        near = _nearest(distance, at["bank.same"]) / (1.0 + (gap / (3.0 * length)) ** 3)
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
         ahead = (c * to[..., 0] + s * to[..., 1]) / distance
         starboard = (c * to[..., 1] - s * to[..., 0]) / distance
@@ -232,3 +235,14 @@ class Bank(Cause):
             f"The bank attracts the ship with {strength:.2f} times the suction of the reference "
             "formula."
         )
+
+
+def _nearest(distance: Any, same: Any) -> Any:
+    """[..., n] share 1 of the piece of each bank that is nearest, shared where pieces are as near:
+    a wall attracts as much however many points its line has.
+
+    distance  [..., n] of the pieces of all banks; same [n, n] whether two are of one bank
+    """
+    others = jnp.where(same > 0.0, distance[..., None, :], jnp.inf).min(-1)
+    nearest = jnp.where(distance <= others, 1.0, 0.0)
+    return nearest / (nearest @ same)
