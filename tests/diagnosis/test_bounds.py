@@ -34,12 +34,10 @@ def test_bounds_are_worth_the_ratio_of_two_integrals(mean, deviation):
     spread = (deviation**-2 - size**-2) ** -0.5  # of the likelihood
     centre = mean * spread**2 / deviation**2
 
-    def likelihood(p: float) -> float:
-        return norm.pdf(centre, p, spread)
+    def both(p: float) -> float:
+        return norm.pdf(centre, p, spread) * norm.pdf(p, 0.0, size)
 
-    inside = quad(lambda p: likelihood(p) * norm.pdf(p, 0.0, size), low, high, points=[0.01, 0.3])[
-        0
-    ]
+    inside, _ = quad(both, low, high, points=[0.01, 0.3])
     inside /= norm.cdf(high / size) - norm.cdf(low / size)
     free = norm.pdf(centre, 0.0, math.hypot(spread, size))
     found = log_share(*(np.array([x]) for x in (mean, deviation, size, low, high)))
