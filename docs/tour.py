@@ -8,7 +8,8 @@
 import shiplog
 
 # %% [markdown]
-# MCAP logs become voyages in a store: one 10 Hz table a voyage, reduced to midship, faults marked.
+# MCAP logs become voyages in a store: one 10 Hz table per voyage, reduced to midship, with faults
+# marked.
 
 # %%
 taken = shiplog.ingest("sample_logs", "tour/store")

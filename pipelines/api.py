@@ -55,12 +55,12 @@ class Ingested(_Printed):
 class Evaluation(_Printed):
     """Runs on measured voyages.
 
-    errors     one row a run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et al.
-               2024), RMSE of surge and sway [m/s] and yaw rate [deg/s], and how far off the end
+    errors     one row per run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et
+               al. 2024), RMSE of surge and sway [m/s] and yaw rate [deg/s], and how far off the end
                is [m], [deg]
-    rollouts   one row a run, seed, voyage, window and second: time [s], the simulated state
-               (m, m/s, rad, rad/s) and the error d of Eq. 6
-    coverage   one row a window: share of its seconds inside the training data
+    rollouts   one row per run, seed, voyage, window and second: time [s], the simulated
+               state (m, m/s, rad, rad/s) and the error d of Eq. 6
+    coverage   one row per window: share of its seconds inside the training data
     """
 
     errors: pl.DataFrame
@@ -88,8 +88,8 @@ class Diagnosis(_Printed):
     """What the simulation gets wrong, and why.
 
     verdict    named, none, undecided, unknown, coverage or external, with its sentence
-    causes     one row a named cause: name, probability and sentence
-    ranking    one row a hypothesis: name and probability
+    causes     one row per named cause: name, probability and sentence
+    ranking    one row per hypothesis: name and probability
     report     the page, as Markdown; recording: its pictures, where there are any
     extended   the run with the causes in it, where `extend` was given and a cause is named
     """
@@ -111,7 +111,7 @@ def ingest(
     """MCAP logs, or folders of them, into a store: a 10 Hz table a voyage, its faults marked.
 
     profile   a shipped profile's name or a TOML's path; found by the log's topics unless given
-    correct   also put right what the sensors say of each other for certain
+    correct   also correct each fault of a sensor that the other sensors make certain
 
     Raises ShiplogError where no log could be taken.
     """
@@ -134,7 +134,7 @@ def train(store: Store | str | Path, out: str | Path, **options: Any) -> Run:
     """A model of the voyages, as the run folder `out`. The options are those of `TrainOptions`, as
     `shiplog train` has them:
 
-        shiplog.train(store, "runs/mmg", model="mmg", voyages=["trial_*"])
+        shiplog.train(store, "runs/mmg", model="mmg", voyages=["june_*"])
 
     Raises ShiplogError for voyages that cannot be trained on, for options that exclude each other
     and for a folder that is taken; TypeError for an option that there is not.

@@ -73,7 +73,7 @@ def draft(path: Path, vessel: str | None = None) -> str:
 
 
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
-    check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table a topic")
+    check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table per topic")
     ship = profile.ship.name if profile else path.stem
     target = out / f"{path.stem if path.is_file() else path.name}.mcap"
     if is_bag(path):

@@ -192,7 +192,7 @@ TABLE_CHANNELS = {
 TABLE_LABELS = {  # columns of a table that say whose row it is, and when
     "time": "the row's time",
     "date": "belongs to a `time` that is a time of day",
-    "voyage": "cuts the table into one log a value",
+    "voyage": "cuts the table into one log per value",
     "vessel": "tells the ships of a table apart",
 }
 
@@ -248,7 +248,9 @@ class Actuator(Source):
         "next to it at the same place"
     )
     limits: tuple[Number, Number] | None = Field(
-        default=None, description="[least, most], in `unit`; values beyond them are marked"
+        default=None,
+        description="[least, most], in `unit`; values beyond them are marked. `mmg` "
+        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm",
     )
     position_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
@@ -259,7 +261,9 @@ class Actuator(Source):
         le=360.0,
         description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
-    diameter_m: Length | None = Field(default=None, description="of a screw, m")
+    diameter_m: Length | None = Field(
+        default=None, description="of a propeller, m; `mmg` and `hybrid` need it"
+    )
     area_m2: Area | None = Field(default=None, description="of a rudder, m²; estimated")
     span_m: Length | None = Field(default=None, description="of a rudder, m; estimated")
 

@@ -6,9 +6,9 @@
 
 T, K and T_v hold at any speed as T' = T U/L, K' = K L/U and T'_v = T_v U/L. U does not vanish:
 1 % of √(gL) stands under its root. The rudder meets the flow U_R² = u² + s (nD)², so that it steers
-at rest with the screw ahead; sin δ stands for δ, since harbour orders are large. Two rudders are
-their mean. Thrusters, and screws off the centre line, turn a ship whose radius of gyration is L/4.
-No wind and no side force of a screw acts on it.
+at rest with the propeller ahead; sin δ stands for δ, since harbour orders are large. Two rudders
+are their mean. Thrusters, and propellers off the centre line, turn a ship whose radius of gyration
+is L/4. No wind and no side force of a propeller acts on it.
 
 K. Nomoto, T. Taguchi, K. Honda and S. Hirano, On the Steering Qualities of Ships, International
 Shipbuilding Progress 4 (35), 1957.
@@ -38,7 +38,10 @@ from shiplog.profile import Profile
 TABLE = {  # the entry of each coefficient, and where it starts: a merchant ship's
     "steering.k": (Entry("K'", "turning ability", 0.5, 0.2, 0.0, 10.0), 1.2),
     "steering.t": (Entry("T'", "time constant of turning", 0.5, 0.2, 0.05, 20.0), 1.5),
-    "steering.slipstream": (Entry("s", "rudder inflow from the screw", 1.0, 0.1, 0.0, 5.0), 0.3),
+    "steering.slipstream": (
+        Entry("s", "rudder inflow from the propeller", 1.0, 0.1, 0.0, 5.0),
+        0.3,
+    ),
     "sway.x_p": (Entry("x'_P", "pivot point ahead of midship", 0.5, 0.1, -1.0, 2.0), 0.4),
     "sway.t": (Entry("T'_v", "time constant of drifting", 0.5, 0.2, 0.05, 20.0), 0.7),
     "surge.a": (Entry("a'", "resistance", 0.5, 0.03, 0.0, 2.0), 0.08),
@@ -166,6 +169,6 @@ def opened(profile: Profile, settings: Settings, arrays: Mapping[str, np.ndarray
 
 MODEL = PhysicalModel(
     begin, opened,
-    lacks="a K-T model has no forces of hull, screw and rudder in newtons: causes that change "
+    lacks="a K-T model has no forces of hull, propeller and rudder in newtons: causes that change "
     "forces cannot be identified",
 )  # fmt: skip

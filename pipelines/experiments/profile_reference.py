@@ -104,7 +104,8 @@ def text() -> str:
             "\n### Channels of a table\n",
             _channels(),
             "\n## Units\n",
-            "Factors to SI; shafts are in rev/s.\n",
+            "Factors to SI; propellers are in rev/s. `pwm` is a servo pulse in µs: `offset` is the "
+            "neutral pulse, and\n400 µs more or less is full command, 1 or -1.\n",
             _units(),
             "\n## Shipped profiles\n",
             ", ".join(f"`{name}`" for name in profile_file.shipped())

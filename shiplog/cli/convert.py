@@ -15,7 +15,7 @@ def convert(
     tables: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV or Parquet tables, folders of one table a topic, NMEA 0183 text, ROS bags."
+            help="CSV or Parquet tables, folders of one table per topic, NMEA 0183 text, ROS bags."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],
@@ -28,9 +28,9 @@ def convert(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables, NMEA 0183 text and ROS bags to contract MCAP.
+    """Tables, NMEA 0183 text and ROS bags to MCAP logs that shiplog reads.
 
-    Example: shiplog convert trials/*.parquet --profile esso-osaka --out logs
+    Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """
     from shiplog.paths import check_writable
 

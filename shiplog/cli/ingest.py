@@ -17,11 +17,14 @@ def ingest(
     store: StoreOption = STORE,
     correct: Annotated[
         bool,
-        typer.Option("--correct", help="Put right what the sensors say of each other for certain."),
+        typer.Option(
+            "--correct", help="Correct each fault of a sensor that the other sensors make certain."
+        ),
     ] = False,
     json_to: JsonOption = None,
 ) -> None:
-    """Logs into the store: aligned, reduced to midship, faults marked. Idempotent by content.
+    """Logs into the store: aligned, reduced to midship, faults marked. The same log again changes
+    nothing.
 
     Example: shiplog ingest sample_logs --store store
     """

@@ -35,7 +35,12 @@ WindInput = Annotated[
     typer.Option(help="angle (default of the paper's recipe) or components (of the fast one)."),
 ]
 Fit = Annotated[
-    bool, typer.Option("--fit/--no-fit", help="Physical models: identify, or as published.")
+    bool,
+    typer.Option(
+        "--fit/--no-fit",
+        help="Physical models: identify the coefficients, or take the published or estimated ones "
+        "as they are.",
+    ),
 ]
 Parameters = Annotated[
     Path | None, typer.Option(help="Physical models: TOML of coefficients to start from.")
@@ -84,7 +89,9 @@ def train(
     """Train a model; interrupted, give the same command again and it goes on.
 
     Example: shiplog train --data ref --seeds 3 --out runs/ref
-    Example: shiplog train --model mmg --voyages 'trial_*' --out runs/mmg
+
+    Example: shiplog train --model mmg --voyages 'june_*' --out runs/mmg
+
     Example: shiplog train --again runs/mmg --out runs/mmg-2
     """
     from shiplog.paths import check_run, check_writable, refuse_taken

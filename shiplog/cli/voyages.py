@@ -22,6 +22,7 @@ def voyages(
     """What is in the store; with --sensors, what several voyages together say of the instruments.
 
     Example: shiplog voyages --store store
+
     Example: shiplog voyages --sensors --voyages 'zigzag_*'
     """
     from dataclasses import asdict

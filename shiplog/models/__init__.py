@@ -74,7 +74,7 @@ MODELS = {
         NETWORK,
     ),
     "mmg": Kind(
-        "hull, screws, rudders and wind on a rigid body, identified from the logs",
+        "hull, propellers, rudders and wind on a rigid body, identified from the logs",
         PHYSICS, "shiplog.models.mmg",
     ),
     "hybrid": Kind(

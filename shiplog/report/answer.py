@@ -31,7 +31,7 @@ class DiagnosedTrial:
 
     simulated  trial and decision of the simulated model; of a network, not those of its MMG
     whole   that trial, linearised on overlapping segments
-    held    the held-out windows; None where no interval is long enough for one
+    held    the held-out windows; None where no stretch is long enough for one
     after   the extended model; None without a named cause
     """
 
@@ -220,7 +220,7 @@ def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     short = max(least - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
     sentence = (
         f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {least:.0f} s are "
-        f"needed in unbroken intervals of {recorded.timescale.seconds:.0f} s. "
+        f"needed in unbroken stretches of {recorded.timescale.seconds:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."
     )

@@ -106,7 +106,7 @@ def _errors(verdict: Verdict) -> list[str]:
             *[f"- {u['variable']}: {u['sentence']}" for u in verdict.unseen], "",
         ]  # fmt: skip
     if verdict.intervals:
-        lines += ["## Intervals left out, or outside the training data", ""]
+        lines += ["## Stretches left out, or outside the training data", ""]
         lines += [
             f"- {i.voyage}, {i.start_s:.0f} to {i.end_s:.0f} s ({i.kind}): {i.sentence}"
             for i in verdict.intervals

@@ -242,7 +242,7 @@ def sentence(
     if verdict == "coverage":
         return "Not trained in these conditions: record data there first, then diagnose again."
     if verdict == "external":
-        return "The ship was pushed, held or towed: no force of its own explains these intervals."
+        return "The ship was pushed, held or towed: no force of its own explains these stretches."
     text = (
         "No change found: the errors are those that the model already has on its nominal voyages."
     )

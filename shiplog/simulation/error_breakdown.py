@@ -219,7 +219,7 @@ def _controls(data: WindowSeries, profile: Profile) -> Iterator[Regime]:
         values = data.actuator[..., drives]
         part = values / np.maximum(np.abs(values).max((0, 1)), 1e-9)
         still = (np.abs(part) < 0.05).all(-1)
-        name = "screw" if profile.actuators[drives[0]].kind == "propeller" else "thruster"
+        name = "propeller" if profile.actuators[drives[0]].kind == "propeller" else "thruster"
         name += "s" if len(drives) > 1 else ""
         astern = (part.mean(-1) < 0.0) & ~still
         strong = ~still & ~astern & (part.max(-1) >= 0.7)

@@ -41,7 +41,7 @@ def test_what_a_ferry_cannot_be_asked(cause):
 def test_a_ship_without_screw_has_no_thrust_to_lose():
     profile = SINGLE.model_copy(update={"actuators": SINGLE.actuators[:1]})
     for label in ("thrust_loss", "thrust_drift"):
-        assert "screw" in (BY[label].missing(setting(profile)) or "")
+        assert "propeller" in (BY[label].missing(setting(profile)) or "")
 
 
 # --- every cause that is called testable changes something ----------------------------------------
@@ -140,7 +140,7 @@ def test_what_the_model_leaves_out_cannot_be_tested():
         assert label not in catalogue.testable(plain)[1]
         assert untested[label] == "the ship has no rudder"
     bare = catalogue.testable(replace(plain, parts=("hull",)))[1]
-    assert "screw" in bare["thrust_loss"] and "screw" in bare["thrust_drift"]
+    assert "propeller" in bare["thrust_loss"] and "propeller" in bare["thrust_drift"]
 
 
 def test_fitted_to_the_voyages_in_question_a_model_has_absorbed_its_coefficients():

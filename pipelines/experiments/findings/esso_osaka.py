@@ -25,7 +25,8 @@ COLUMNS = {  # kind and channel of an estimate → its column
 
 
 def sensors(folder: Path, out: Path) -> str:
-    """A row a voyage: what its instruments say of each other, in brackets where it may be none."""
+    """One row per voyage: what its instruments say of each other, in brackets what is not
+    reported (`_cell`)."""
     store = trials_store(folder, out)
     reported = {name: _estimates(store, name) for name in trials(store)}
     rows = [
@@ -59,7 +60,8 @@ def _estimates(store: Store, name: str) -> dict[tuple[str, str], Estimate]:
 
 
 def _cell(e: Estimate | None) -> str:
-    """Value and 90 % interval; in brackets where it is not reported, since it may be none."""
+    """Value and 90 % interval; in brackets where it is not reported, since it differs from no
+    fault by no more than its practical size, or than the width of its interval."""
     if e is None:
         return "-"
     digits = 2 if e.unit == "s" else 3

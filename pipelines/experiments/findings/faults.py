@@ -102,7 +102,7 @@ def _table(
                 diagnose_run(run, store, names, folder)
             reported = json.loads((folder / "verdict.json").read_text("utf-8"))
             rows.append((fault, size(share), *_reported(reported, fault)))
-    return tables.table(("written", "size", "reported", "smallest detectable size"), rows)
+    return tables.table(("written", "size", "reported", "smallest detectable change"), rows)
 
 
 def written(store: Store, log: Path, profile: Profile, label: str, write, share: float) -> str:

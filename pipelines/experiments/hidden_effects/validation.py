@@ -65,6 +65,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     parts = [
         "# Validation on hidden effects",
         _head(found, answers, of),
+        LEGEND,
         "## What went wrong",
         *(part for place, given in there.items() for part in (f"### {place.capitalize()}",
                                                               misses(given))),
@@ -84,10 +85,17 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     return Page("\n\n".join(parts), reliability.svg(beliefs))
 
 
+LEGEND = """\
+- **Home** is the simulator's MMG ship; **abroad** are ships of other equations, by family.
+- **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it.
+- **Named but wrong**: the verdict names a cause that is not hidden in the case.
+- **Null** is a method that always answers `none`.
+- **Random** is a method that draws `none` or a cause of the catalogue, all equally likely.
+- **FIA** is the mean probability that a method gives to the true cause in cases that it detects.
+- **m_utl** is 1 less the share of all components that a repair by the answer tests in vain."""
 INTERVAL = (
     "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
-    f"at {100 * LEVEL:.0f} %. Home is the simulator's MMG ship; abroad are ships of other "
-    "equations."
+    f"at {100 * LEVEL:.0f} %."
 )
 PARAMETERS = (
     "Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; "
@@ -119,8 +127,9 @@ def _once(answers: Sequence[Answer]) -> None:
 
 def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
     lines = [
-        f"Program: `{of}`. Output of `python -m pipelines.experiments.hidden_effects scores`; "
-        "every verdict was sealed before its key was opened.",
+        f"Program: `{of}`. Output of `python -m pipelines.experiments.hidden_effects scores DIR "
+        "[DIR ...] --markdown docs/validation.md`; every verdict was sealed before its key was "
+        "opened.",
         "",
     ]
     for score in found:

@@ -55,7 +55,7 @@ def folder_to_series(folder: Path, profile: Profile | None) -> list[Series]:
     if not parts:
         raise ChannelMissing(
             f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
-            hint="give one table a topic, each with a column of times such as log_time_ns, or a "
+            hint="give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table.",
         )
     return parts

@@ -96,7 +96,7 @@ NEEDS: Mapping[str, Callable[[Setting], str | None]] = {
         "the ship has no rudder",
     ),
     "thrust": _unless(
-        lambda s: bool(s.columns("propeller", "thruster")), "the ship has no screw or thruster"
+        lambda s: bool(s.columns("propeller", "thruster")), "the ship has no propeller or thruster"
     ),
     "bank": _unless(lambda s: bool(s.profile.site.banks), "the profile's [site] shows no bank"),
 }

@@ -30,7 +30,8 @@ class HeadingOffset(Cause):
     parameters = (Parameter("angle", "deg", np.radians(2.5), np.radians(0.25)),)
     separated_by = {
         "current": "one full slow turn, or the same course out and back",
-        "rudder_offset": "hover and coasting with the screw stopped: the rudders' offset vanishes",
+        "rudder_offset": "hover and coasting with the propeller stopped: the offset of the rudders "
+        "vanishes",
     }
 
     @property

@@ -71,7 +71,8 @@ class Fouling(_Factor):
     scaled = ("hull.x_0f", "hull.x_0a")
     parameters = (Parameter("factor", "1", 0.45, 0.06, low=-1.0),)
     separated_by = {
-        "thrust_loss": "bollard pull (high revolutions at rest) against coasting (screw stopped)"
+        "thrust_loss": "bollard pull (high revolutions at rest) against coasting (propeller "
+        "stopped)"
     }
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
@@ -90,7 +91,7 @@ class CrossFlowDrag(_Factor):
     parameters = (Parameter("factor", "1", 0.25, 0.03, low=-1.0),)
     separated_by = {
         "shallow_water": "the same manoeuvre at two places",
-        "payload": "step of the screw from rest (inertia) against a pure decay of sway",
+        "payload": "step of the propeller from rest (inertia) against a pure decay of sway",
     }
 
     def compatible(self, label: str) -> bool:
@@ -138,8 +139,8 @@ class ThrustLoss(Cause):
     equation = "K_T·{factor:.2f}"
     parameters = (Parameter("factor", "1", 0.3, 0.02, low=-1.0),)
     separated_by = {
-        "fouling": "bollard pull (high revolutions at rest) against coasting (screw stopped)",
-        "payload": "step of the screw from rest (inertia) against steady speed",
+        "fouling": "bollard pull (high revolutions at rest) against coasting (propeller stopped)",
+        "payload": "step of the propeller from rest (inertia) against steady speed",
         "thrust_drift": "the same run at the beginning and at the end",
         "thrust_loss": "the same step by one unit after the other, the others stopped",
     }
@@ -213,8 +214,8 @@ class Payload(Cause):
         Parameter("moment", "kg m", 0.05, 0.004, of="moment"),
     )
     separated_by = {
-        "thrust_loss": "step of the screw from rest (inertia) against steady speed",
-        "cross_flow_drag": "step of the screw from rest (inertia) against a pure decay of sway",
+        "thrust_loss": "step of the propeller from rest (inertia) against steady speed",
+        "cross_flow_drag": "step of the propeller from rest (inertia) against a pure decay of sway",
     }
 
     @property
@@ -280,7 +281,7 @@ class RudderOffset(_OnRudders):
     equation = "δ = δ_recorded + offset"
     parameters = ()
     separated_by = {
-        "heading_offset": "hover and coasting with the screw stopped: the offset then vanishes"
+        "heading_offset": "hover and coasting with the propeller stopped: the offset then vanishes"
     }
 
     @property
