@@ -15,6 +15,7 @@ from shiplog.diagnosis import (
     likelihood,
     nominal_campaign,
     nominal_fit,
+    nominal_reference,
     segments,
     voyage_effects,
 )
@@ -133,6 +134,30 @@ def test_a_campaign_knows_what_is_nominal_of_a_cause(learned):
     spread = np.sqrt(np.linalg.inv(made.reference.information)[at, at])
     assert 0.01 < spread < 0.5
     assert made.reference.mean[at] == pytest.approx(1.0, abs=4.0 * spread)  # in units of 0.5
+
+
+def test_degrees_of_freedom_are_those_of_voyages_and_parts_of_one_share_its_deviation(
+    learned, model
+):
+    """Two voyages leave two, the least, however many parts they have. One voyage alone has a
+    deviation of its own, which its parts cannot average out: θ is no better known than that."""
+    found, made = learned
+    assert made.reference.freedom == nominal_reference.freedom(2) == 2.0
+    assert nominal_reference.freedom(6) == 5.0
+    record = straight.sailed(24, voyages=1)
+    columns = nominal_fit.columns_of(model, SETTING, START)
+    given = straight.passed(record, columns, np.zeros(len(columns.unit)), sensitivity=0.3)
+    at = Converged(np.zeros(2), given.path, PROCESS_NOISE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_characteristics, "read", lambda *_: (given.cut, None, None))
+        patch.setattr(campaign_characteristics.linearisation, "linear", lambda *_: given)
+        one = nominal_campaign.learn(
+            model, SETTING, START, record, at, replace(found, path=given.path, apart=0.8)
+        )
+    least = 0.8 * one.effects.deviation
+    spread = np.sqrt(np.diagonal(np.linalg.inv(one.reference.information)))
+    assert (spread >= least).all() and (least > 0.0).any()
+    assert one.reference.freedom == float(len(one.parts) - 1)
 
 
 def test_characteristics_say_every_group_once(learned):

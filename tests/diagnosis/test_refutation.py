@@ -76,6 +76,16 @@ def test_with_a_remainder_an_unsure_gain_names_nothing(trial, interval):
     assert f"by {interval[0]:.1%} to {interval[1]:.1%}" in decision.rejected["drag"]
 
 
+def test_a_remainder_of_which_the_kind_is_unsure_asks_for_the_same_proof(trial):
+    """Motion or raised noise, neither of them sure: that something remains is."""
+    made = weighed.search(trial, {(DRAG, RAISED): 0.5, (DRAG, "motion"): 0.5} | RAISED_ALONE)
+    decision, found, _, _ = judged(made, HeldOut({DRAG: UNSURE}))
+    assert found.remainder is None and found.kinds[NOMINAL] < 0.01
+    assert decision.named == () and "drag" in decision.rejected
+    named, _, _, _ = judged(made, HeldOut({DRAG: BETTER}))
+    assert [one.cause.label for one in named.named] == ["drag"]
+
+
 @pytest.mark.parametrize(("adds", "verdict"), [(1.9, "named"), (2.5, "unknown")])
 def test_a_remainder_that_adds_little_is_an_error_of_the_equations(trial, adds, verdict):
     """The cause explains 100 nats; a remainder of 2 % is a seventh of its force."""

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from toy_ship import GRID, RECORD, ROWS
 
-from shiplog.diagnosis import segments
+from shiplog.diagnosis import discrepancy, segment_nodes, segments
+from shiplog.diagnosis.measurement_correction import as_hypothesised, water
+from shiplog.models.causes import Current, WindForce
 from shiplog.voyages.timescale import NODE_ROWS
 
 
@@ -31,6 +33,38 @@ def test_a_bin_is_the_mean_of_what_was_measured():
     whole = 0.4 + 0.02 * (t + 1.0) - 1.2 / 0.05 * (np.cos(0.05 * (t + 2)) - np.cos(0.05 * t)) / 2.0
     assert cut.y[..., 4] == pytest.approx(whole, abs=1e-5)
     assert cut.used.all() and cut.step == pytest.approx(0.2)
+
+
+def test_the_discrepancy_sees_the_motion_through_the_water_and_the_wind_over_it():
+    """A ship that drifts with a current is still in the water, and the wind that it feels is what
+    an anemometer shows, whatever the water does."""
+    heading = 0.7
+    north, east = 0.3, -0.2
+    drift = np.array([
+        0.0, north * np.cos(heading) + east * np.sin(heading),
+        0.0, east * np.cos(heading) - north * np.sin(heading), heading, 0.0,
+    ])  # fmt: skip
+    cut = segments.cut(replace(RECORD, state=np.tile(drift, (len(RECORD), 1))), ROWS)
+    driven = cut.driven.copy()
+    over_ground = segment_nodes.at_knots(cut, GRID)
+    wet = segment_nodes.at_knots(replace(cut, water=np.array([north, east])), GRID)
+    assert wet.state[..., [1, 3, 5]] == pytest.approx(np.zeros((4, GRID.knots, 3)), abs=1e-12)
+    assert wet.state[..., [0, 2, 4]] == pytest.approx(over_ground.state[..., [0, 2, 4]])
+    assert wet.driven[..., -2:] - over_ground.driven[..., -2:] == pytest.approx(
+        np.tile((north, east), (4, GRID.knots, 1))
+    )
+    assert discrepancy.apparent_flow(wet) == pytest.approx(discrepancy.apparent_flow(over_ground))
+    assert (cut.driven == driven).all()
+
+
+def test_the_water_is_the_sum_of_the_causes_that_move_it():
+    causes = (Current(), WindForce())
+    numbers = {"current": np.array([0.3, -0.2]), "wind_force": np.array([0.2, 0.0, -0.1])}
+    assert water(causes, numbers).tolist() == [0.3, -0.2]
+    assert water(causes, {}).tolist() == [0.0, 0.0]
+    found = as_hypothesised(segments.cut(RECORD, ROWS), causes, numbers)
+    assert found.water.tolist() == [0.3, -0.2]
+    assert found.factors["wind"] == pytest.approx([1.2, 1.0, 0.9])
 
 
 def test_bins_that_were_hardly_measured_do_not_count():

@@ -72,6 +72,19 @@ def test_numbers_are_the_dense_posteriors(trial):
     assert found["drag"][0] == pytest.approx(DRAG, abs=4.0 * math.sqrt(covariance[2, 2]))
 
 
+@pytest.mark.parametrize(("count", "sizes"), [(3, [3]), (7, [7]), (12, [6, 6]), (24, [12, 12])])
+def test_parts_are_as_long_as_those_whose_differences_are_known(count, sizes):
+    """The nominal parts have ten segments. Twelve in a voyage are one part, as six are; two
+    voyages never share one."""
+    columns = straight.columns_of(straight.CAUSES)
+    record = straight.sailed(40)
+    given = straight.passed(record, columns, np.zeros(len(columns.unit)))
+    made = straight.campaign(record, given, columns, parts=4)
+    later = straight.sailed(count, voyages=min(count // 6, 2) or 1, seed=1)
+    found = straight.Straight.of(made, later)
+    assert [len(part) for part in found.parts] == sizes
+
+
 def test_a_fixed_cause_stays_where_it_is(made):
     """As an extended model has it: no prior of its own pulls it back, and no data move it."""
     trial = straight.trial(*made, ("drag",))

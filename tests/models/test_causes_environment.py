@@ -25,7 +25,7 @@ from cause_ships import (
 )
 
 from shiplog.models import mmg
-from shiplog.models.causes.environment import Current, WindForce
+from shiplog.models.causes.environment import Bank, Current, WindForce, _nearest
 
 # --- current --------------------------------------------------------------------------------------
 
@@ -164,6 +164,30 @@ def test_a_bank_draws_in_and_turns_the_bow_out():
     gap = (2.0 - 0.5 * 0.489) / 9.0
     q = 0.5 * 1000.0 * 3.0 * 0.201
     assert north[1] == pytest.approx(0.15 * q * 0.36 / (1.0 + gap**3), rel=1e-4)
+
+
+def test_a_wall_attracts_as_much_however_many_points_its_line_has():
+    """In one piece, in sixty, and abeam of a point that two pieces share; a second wall adds."""
+    distance = np.array([5.0, 2.0, 2.0, 3.0])
+    one = np.ones((4, 4))
+    assert _nearest(distance, one).tolist() == [0.0, 0.5, 0.5, 0.0]
+    two = np.kron(np.eye(2), np.ones((2, 2)))
+    assert _nearest(distance, two).tolist() == [0.0, 1.0, 1.0, 0.0]
+    assert _nearest(np.array([4.0]), np.ones((1, 1))).tolist() == [1.0]
+
+    def pull(points: int) -> np.ndarray:
+        wall = tuple((float(x), 40.0) for x in np.linspace(-30.0, 30.0, points))
+        here = setting()
+        site = here.profile.site.model_copy(update={"banks": (wall,)})
+        profile = here.profile.model_copy(update={"site": site})
+        at = Bank().constants(replace(here, profile=profile))
+        state = np.array([[0.1, 0.6, 38.0, 0.0, 0.0, 0.0]])
+        return np.asarray(Bank().force(np.ones(1), state, at))[0]
+
+    whole = pull(2)
+    assert whole[0] == pytest.approx(0.0, abs=1e-9)
+    for points in (3, 4, 61):
+        assert pull(points) == pytest.approx(whole, rel=1e-3, abs=1e-3 * abs(whole[1]))
 
 
 def test_shallow_water_acts_where_it_is_shallow():
