@@ -202,6 +202,15 @@ def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
     assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
 
 
+def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path):
+    """By hand: GLL and VTG differ from GGA and RMC, and stand before them."""
+    lines = ["$GPGLL,6300.0000,N,01000.0000,E,101010.00,A,A", "$GPVTG,10.0,T,,M,9.0,N,,K,A", *BURST]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    topics = {s.topic: s.columns for s in read_nmea(tmp_path / "a.nmea")[0]}
+    assert topics["/gnss/fix"]["altitude"].tolist() == [2.9]  # only GGA has one
+    assert topics["/gnss/velocity"]["cog_deg"].tolist() == [90.0]
+
+
 def test_headings_between_two_fixes_are_spread_over_the_time_between_them(tmp_path):
     lines = []
     for second in range(3):
