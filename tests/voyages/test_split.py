@@ -1,11 +1,13 @@
 """Whole voyages apart: the user's split, the paper's, or a sensible one that is reported."""
 
+import numpy as np
 import pytest
 import sailing
 
 from pipelines.train_networks import train_run
 from shiplog.exceptions import StoreError
 from shiplog.training.run_config import Config
+from shiplog.voyages.ingest import ingest
 from shiplog.voyages.parts import overlap, parse
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.split_settings import Split
@@ -72,6 +74,21 @@ def test_one_voyage_is_split_in_time(tmp_path):
     assert rows["time"].is_unique().all()
     whole = store.seconds(["only"], store.profile(["only"]))
     assert whole.height - 3 <= rows.height <= whole.height  # a second at each seam may be cut
+
+
+def test_parts_in_time_count_from_the_voyages_first_row(tmp_path):
+    """300 s without a velocity in the first 100: of the other 200, 70 % train and 15 % test."""
+    logged = sailing.series(300.0)
+    logged["/velocity"].columns["sog_kn"][:1000] = np.nan
+    store = Store(tmp_path / "store")
+    store.add(ingest(sailing.write(tmp_path / "only.mcap", logged), sailing.profile()))
+    split = choose_split(store, (), (), "ref", 10)
+    sides = [*split.training, *split.validation, *split.test]
+    found = [parse(name) for name in sides]
+    assert [found[0].end, found[1].end, found[2].end] == pytest.approx([240, 270, 300], abs=2)
+    rows = store.seconds(sides, store.profile(sides))
+    lengths = dict(rows.group_by("voyage").len().iter_rows())
+    assert [lengths[name] for name in sides] == pytest.approx([140, 30, 30], abs=2)
 
 
 @pytest.mark.parametrize(("size", "left"), ((40, 19), (100, 19)))
