@@ -110,6 +110,7 @@ psi = { channel = "heading", unit = "deg" }
 sog = "sog"
 cog = { channel = "cog", unit = "deg" }
 """
+RUNS = PROFILE + 'run = "voyage"\n'
 
 
 def test_a_missing_yaw_rate_is_differentiated_and_reported(tmp_path, caplog):
@@ -157,6 +158,31 @@ def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     done = convert([tmp_path / "t.csv"], profile, tmp_path)
     assert "goes back in time 29 times" in caplog.text
     assert ingest(done.logs[0], profile).table["x0"].is_sorted()
+
+
+@pytest.mark.parametrize(
+    ("runs", "names"),
+    [
+        (["1.1", "1.2", "1.2"], {"1.1", "1.2"}), (["1.0", "2.0", "2.0"], {"1", "2"}),
+        (["1.5", "2.0", "2.0"], {"1.5", "2.0"}), (["a", "b", "b"], {"a", "b"}),
+    ],
+)  # fmt: skip
+def test_voyages_are_called_as_the_table_calls_them(tmp_path, runs, names):
+    rows = [f"{i},{i},0,1,0,5,{run}" for i, run in enumerate(runs)]
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi,run", *rows]))
+    done = convert([tmp_path / "t.csv"], profiles.parse(RUNS, "mine"), tmp_path)
+    assert {path.stem for path in done.logs} == names and not done.lost
+
+
+def test_rows_of_no_voyage_are_counted_as_lost(tmp_path):
+    for name, runs in (("some", ["a", "", '" "', "a"]), ("none", ["", "", '" "', ""])):
+        rows = [f"{i},{i},0,1,0,5,{run}" for i, run in enumerate(runs)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["t,x,y,u,v,psi,run", *rows]))
+    done = convert([tmp_path / "some.csv", tmp_path / "none.csv"],
+                   profiles.parse(RUNS, "mine"), tmp_path)  # fmt: skip
+    assert done.lost == {str(tmp_path / "some.csv"): "2 rows whose voyage is blank"}
+    assert [path.stem for path in done.logs] == ["a"]
+    assert "run is blank in every row" in done.refused[str(tmp_path / "none.csv")]
 
 
 def test_a_topic_of_the_contract_keeps_its_schema_and_another_gets_one_of_its_own():
