@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import polars as pl
 
+from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import StoreError, listed
 from shiplog.voyages import one_hertz, windows
 from shiplog.voyages.augmentation import AUGMENTATIONS
@@ -21,7 +22,16 @@ log = logging.getLogger(__name__)
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
 HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
-SHORTER_WINDOWS = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed instead
+SHORTER_WINDOWS = (
+    80,
+    60,
+    50,
+    40,
+    30,
+    20,
+    10,
+    LEAST_WINDOW,
+)  # s, windows that may be proposed instead
 
 
 def choose_split(
@@ -138,11 +148,12 @@ def _in_time(store: Store, rows: pl.DataFrame, name: str, size: int) -> Split:
         for a, b in pairwise(at)
     ]
     if len(named) < 3 or min(longest) < size:
+        shorter = f"choose --window {min(longest)} or shorter, or "
         raise StoreError(
             f"{name} is the only voyage with a window of {size} s, and too short to be split in "
             f"time: the {', '.join(map(str, longest))} s in a row that are to train, validate and "
             "test do not all hold one.",
-            hint=f"choose --window {max(min(longest), 2)} or shorter, or ingest a second voyage.",
+            hint=f"{shorter if min(longest) >= LEAST_WINDOW else ''}ingest a second voyage.",
         )
     return Split(
         training=(named[0],), validation=(named[1],), test=(named[2],),

@@ -101,6 +101,13 @@ def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, lef
     assert len(split.training) == len(split.validation) == len(split.test) == 1
 
 
+def test_no_window_is_proposed_that_would_be_refused(tmp_path):
+    """A voyage of 30 s is split into 20, 4 and 4 s, which no window fits into."""
+    with pytest.raises(StoreError, match="the only voyage") as caught:
+        choose_split(sailing.store_of(tmp_path, ["only"], seconds=30.0), (), (), "ref", 10)
+    assert caught.value.hint == "ingest a second voyage."
+
+
 def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_path, caplog):
     store = sailing.store_of(tmp_path, ["a", "b", "c"])
     short = sailing.store_of(tmp_path, ["d"], seconds=35.0)
