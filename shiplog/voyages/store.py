@@ -68,7 +68,8 @@ class Store:
 
         In the order of the patterns, then by name. Raises StoreError where one matches nothing.
         """
-        names = [entry.name for entry in self.entries()]
+        lengths = {entry.name: entry.seconds for entry in self.entries()}
+        names = list(lengths)
         if not names:
             raise StoreError(
                 f"There is no voyage in the store {self.path}.",
@@ -83,6 +84,8 @@ class Store:
                     f"In the store {self.path}: {listed(names)}.",
                     hint="`shiplog voyages` lists them; patterns such as 'trial_*' are allowed.",
                 )
+            for name in matching:
+                _refuse_beyond(name, lengths)
             chosen.update(dict.fromkeys(matching))
         return list(chosen)
 
@@ -286,6 +289,17 @@ def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:
+    """Raises StoreError for a part that begins where its voyage has ended."""
+    part = None if name in lengths else parts.parse(name)
+    if part is not None and part.begin >= lengths[part.whole]:
+        raise StoreError(
+            f"{name} begins after the end of {part.whole}, which is "
+            f"{lengths[part.whole]:.0f} s long.",
+            hint=f"choose seconds from 0 to {lengths[part.whole]:.0f}.",
+        )
 
 
 def _whole(folder: Path, facts: dict) -> bool:

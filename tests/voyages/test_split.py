@@ -152,6 +152,14 @@ def test_a_name_that_looks_like_a_part_is_itself_where_it_is_stored(tmp_path):
         store.select(["other[0:60]"])
 
 
+def test_a_part_beyond_the_end_of_its_voyage_is_refused(tmp_path):
+    store = sailing.store_of(tmp_path, ["trip"], seconds=30.0)
+    assert store.select(["trip[29:100]"]) == ["trip[29:100]"]
+    with pytest.raises(StoreError, match="after the end of trip, which is 30 s long") as caught:
+        store.select(["trip[30:100]"])
+    assert caught.value.hint == "choose seconds from 0 to 30."
+
+
 # --- of a physical model: no voyage is needed to stop its training
 
 SIX = [f"voyage_{i}" for i in range(1, 7)]
