@@ -210,7 +210,8 @@ def refuse_no_test(split: Split) -> None:
         raise StoreError(
             f"There is no voyage left to test on: training {listed(split.training)}, validation "
             f"{listed(split.validation)}.",
-            hint="ingest another voyage, or leave --validation out.",
+            hint="ingest another voyage, leave --validation out, or name fewer with --voyages: "
+            "those that neither train nor validate are the test.",
         )
 
 
