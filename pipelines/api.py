@@ -56,7 +56,7 @@ class Evaluation(_Printed):
     """Runs on measured voyages.
 
     errors     one row per run, seed and window: voyage, elapsed [s], loss (L, Eq. 8 of Wakita et
-               al. 2024), RMSE of surge and sway [m/s] and yaw rate [deg/s], and how far off the end
+               al. 2024), RMSE of surge and sway [m/s] and yaw rate [rad/s], and how far off the end
                is [m], [deg]
     rollouts   one row per run, seed, voyage, window and second: time [s], the simulated
                state (m, m/s, rad, rad/s) and the error d of Eq. 6

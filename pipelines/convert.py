@@ -93,7 +93,10 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         yield _written(target, parts, profile, ship, path)
     else:
         profile = columns.required(profile, path)
-        for name, part in columns.voyages(read_table(path, profile.table), profile, path):
+        voyages, nameless = columns.voyages(read_table(path, profile.table), profile, path)
+        if nameless:
+            done.lost[str(path)] = f"{nameless} rows whose voyage is blank"
+        for name, part in voyages:
             series = columns.series(part, profile)
             yield _written(out / f"{name}.mcap", series, profile, ship, path)
 

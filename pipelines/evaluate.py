@@ -13,6 +13,7 @@ from pipelines.bars import reach, staged
 from shiplog.channels import STATE
 from shiplog.exceptions import listed
 from shiplog.models.causes import user
+from shiplog.paths import refuse_same_names
 from shiplog.report.comparison_data import BAND, ComparisonData, DrawnActuator
 from shiplog.report.evaluation import EvaluatedRuns
 from shiplog.simulation import baselines, prediction_interval, scoring
@@ -38,6 +39,7 @@ def evaluate_runs(
 
     cause_files   Python files of the causes of the user's own that are in these runs
     """
+    refuse_same_names(paths)
     causes = user.load(cause_files)
     opened = tuple(load_model.load(path, causes) for path in paths)
     first = opened[0]

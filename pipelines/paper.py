@@ -28,7 +28,7 @@ from shiplog.training.run_checks import refuse_none_trained, refuse_other_settin
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import parts
-from shiplog.voyages.split import choose_split, refuse_no_test, say
+from shiplog.voyages.split import choose_split, plan, refuse_no_test, say
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
@@ -107,8 +107,11 @@ def choose_voyages(
     store: Store, voyages: Sequence[str], validation: Sequence[str], size: int
 ) -> Voyages:
     """As in the paper's Table 4 where there are six voyages; else the training voyages are halved
-    in time, and the reference set has the first half. Raises StoreError without a test voyage."""
+    in time, and the reference set has the first half. Where the user names those that validate,
+    all that are not used otherwise test. Raises StoreError without a test voyage."""
     whole = choose_split(store, voyages, validation, "d-ref", size)
+    if validation:
+        whole = whole.model_copy(update={"test": _unused(store, whole, size)})
     refuse_no_test(whole)
     first = choose_split(store, voyages, validation, "ref", size)
     reference, chosen_by = first.training, whole.chosen_by
@@ -116,6 +119,16 @@ def choose_voyages(
         reference = _first_half(store, whole.training)
         chosen_by += "; the reference set has the first half of the training voyages"
     return Voyages(reference, whole.training, whole.validation, whole.test, chosen_by)
+
+
+def _unused(store: Store, split: Split, size: int) -> tuple[str, ...]:
+    """Voyages with a window that neither train nor validate. Raises StoreError for two ships."""
+    used = (*split.training, *split.validation)
+    names = [name for name in store.select() if not parts.overlapping([name], used)]
+    if not names:
+        return ()
+    rows = store.seconds(names, store.profile([*used, *names]))
+    return tuple(plan(rows, "ref", size)["voyage"].unique(maintain_order=True))
 
 
 def _first_half(store: Store, names: Sequence[str]) -> tuple[str, ...]:

@@ -93,6 +93,20 @@ def check_run(path: Path) -> None:
     raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
 
 
+def refuse_same_names(runs: Sequence[Path]) -> None:
+    """Raises RunError for runs of one name: what is said of them goes by their names."""
+    for at, run in enumerate(runs):
+        other = next((r for r in runs[:at] if r.name == run.name), None)
+        if other is not None:
+            same = other.absolute() == run.absolute()
+            raise RunError(
+                f"{run} is given twice." if same else f"{other} and {run} have the same name.",
+                hint="name each run once."
+                if same
+                else "rename one of the two folders: runs are told apart by their folders' names.",
+            )
+
+
 def check_causes(paths: Sequence[Path]) -> None:
     """Raises RunError for a --cause that is no Python file."""
     for path in paths:

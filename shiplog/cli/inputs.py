@@ -35,9 +35,10 @@ def check_runs(
     causes: Sequence[Path] | None,
 ) -> None:
     """Raises ShiplogError for a run, voyage or file that is not there."""
-    from shiplog.paths import check_causes, check_run
+    from shiplog.paths import check_causes, check_run, refuse_same_names
 
     for run in runs:
         check_run(run)
+    refuse_same_names(runs)
     check_causes(causes or ())
     check_voyages(store, voyages)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from shiplog.channels import LEAST_WINDOW
+
 
 def _ask_json(json_to: str | None) -> str | None:
     """Whether --json can be written is known before the work."""
@@ -34,7 +36,7 @@ Causes = Annotated[
     list[Path] | None,
     typer.Option("--cause", help="A Python file with causes of your own; several times."),
 ]
-Window = Annotated[int, typer.Option(min=2, help="Samples in a window, at 1 Hz.")]
+Window = Annotated[int, typer.Option(min=LEAST_WINDOW, help="Samples in a window, at 1 Hz.")]
 Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
 Epochs = Annotated[
     int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")

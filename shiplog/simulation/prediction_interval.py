@@ -42,7 +42,7 @@ def calibrate(
 
     groups   voyages they are of. The quantile is that of a split conformal interval (Vovk et al.
              2005) with each voyage one observation, since the wind and water of a voyage
-             affect all of its windows; with few voyages no further than MOST.
+             affect all of its windows; with few voyages no further than FEW_VOYAGES_QUANTILE.
 
     Rollouts that diverged are left out: no band would hold them.
     """
@@ -52,7 +52,7 @@ def calibrate(
     error, spread = error[good], spread[good]
     square = error**2
     excess = np.maximum((square - spread**2).mean(0), 0.05 * square.mean(0))
-    kernel = np.ones(SMOOTHED)
+    kernel = np.ones(min(SMOOTHED, len(excess) - 1 + len(excess) % 2))  # odd, within the rollout
     norm = np.convolve(np.ones(len(excess)), kernel, "same")
     smooth = np.stack([np.convolve(c, kernel, "same") / norm for c in excess.T], 1)
     growth = np.sqrt(smooth)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import UsageError, listed, nearest
 from shiplog.models import MODELS, PHYSICS, taking
 from shiplog.training.run_config import RECIPES, WIND_INPUTS, Config
@@ -71,6 +72,11 @@ class TrainOptions:
                     f"{option} {value!r} does not exist{nearest(value, allowed)}.",
                     hint=f"{option} can be {listed(allowed)}.",
                 )
+        if self.window < LEAST_WINDOW:
+            raise UsageError(
+                f"A window of {self.window} s is too short to compare velocities in.",
+                hint=f"choose --window {LEAST_WINDOW} or longer.",
+            )
         kind = MODELS[self.model]
         for name in filter(taking, self.given()):
             flag = "--no-fit" if name == "fit" else f"--{name.replace('_', '-')}"

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
+from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import UnreadableError, listed
 from shiplog.models import FAMILIES, MODELS, NETWORK, ModelFamily
 from shiplog.toml_section import Section
@@ -72,7 +73,7 @@ class Config(Section):
 
     model: str = "feedforward"
     data: str = "ref"
-    window: int = Field(default=100, ge=2)
+    window: int = Field(default=100, ge=LEAST_WINDOW)
     recipe: Literal["paper", "fast"] = "fast"
     seeds: tuple[int, ...] = (0,)
     split: Split

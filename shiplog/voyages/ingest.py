@@ -1,11 +1,12 @@
 """One log to one 10 Hz table at midship, with a mark on every row and a finding for every fault.
 
 Value columns are SI, angles in (-π, π]; a value that was not measured is null. The marks are
-`channels.Quality`; what they mean for the 1 Hz averages stands in `table`.
+`channels.Quality`; what they mean for the 1 Hz averages stands in `one_hertz`.
 """
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, replace
 
@@ -31,6 +32,9 @@ RESOLVED = {  # of a sensor: the channel whose unit its resolution has
 # Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
 # rows (100 s) are no voyage. A million rows, 28 hours, take 100 MB, whatever they hold.
 LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
+NEAR_DEG = 1.0  # from the median position: (0, 0) before the first fix is further away than that
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -221,6 +225,10 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     samples = resampling.ordered(times, value, sensor.tolerance_s)
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
+    elif kind == "geodetic":  # 179.99 and -179.99 deg are neighbours, not a way round the earth
+        latitude, longitude = samples.value.T
+        longitude = np.unwrap(longitude, period=360.0)
+        samples = replace(samples, value=np.stack((latitude, longitude), axis=1))
     metric = _metric(samples.value, kind)
     spike = fault_detection.spikes(metric, profile.sensors.noise(name))
     return replace(samples, spike=spike, resolution=fault_detection.resolution(metric))
@@ -269,7 +277,7 @@ def _differentiated(heading: resampling.Samples) -> resampling.Samples:
 
 
 def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> tuple[float, float]:
-    """The log's own datum, else the profile's, else the first fix."""
+    """The log's own datum, else the profile's, else the first fix that lies near the others."""
     text = reading.contents.metadata.get("voyage", {}).get("datum", "")
     try:
         latitude, longitude = (float(part) for part in text.split(","))
@@ -284,7 +292,16 @@ def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> 
             f"{profile.sensors.position.topic}.",
             hint="check the fields in the profile; `shiplog check` lists the topics.",
         )
-    return float(position.value[0, 0]), float(position.value[0, 1])
+    away = np.abs(position.value - np.median(position.value, axis=0)).max(axis=1)
+    first = int(np.argmax(away < NEAR_DEG))  # 0 where none is near
+    if first:
+        log.warning(
+            "%s: the datum is position %d, not the first, which lies %.0f degrees from the median "
+            "of all, as of a receiver before its first fix",
+            reading.contents.path.name, first + 1, away[0],
+        )  # fmt: skip
+    latitude, longitude = map(float, position.value[first])
+    return latitude, longitude - 360.0 * round(longitude / 360.0)
 
 
 def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None:

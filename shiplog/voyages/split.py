@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import polars as pl
 
+from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import StoreError, listed
 from shiplog.voyages import one_hertz, windows
 from shiplog.voyages.augmentation import AUGMENTATIONS
@@ -21,7 +22,16 @@ log = logging.getLogger(__name__)
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
 HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
-SHORTER_WINDOWS = (80, 60, 50, 40, 30, 20, 10, 5)  # s, windows that may be proposed instead
+SHORTER_WINDOWS = (
+    80,
+    60,
+    50,
+    40,
+    30,
+    20,
+    10,
+    LEAST_WINDOW,
+)  # s, windows that may be proposed instead
 
 
 def choose_split(
@@ -94,7 +104,7 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
         groups.setdefault(twin.get(name, name), []).append(name)
     _say_what_is_left_out(rows, names, usable, size)
     if len(groups) == 1:
-        return _in_time(rows, usable[0], size)
+        return _in_time(store, rows, usable[0], size)
     if not groups:
         raise StoreError(
             f"No voyage has a window of {size} s without a gap.",
@@ -121,10 +131,13 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     )
 
 
-def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
+def _in_time(store: Store, rows: pl.DataFrame, name: str, size: int) -> Split:
     """One voyage by time: its first part trains, then validates, its last part tests. Windows are
     cut in each part by itself, so that none crosses."""
-    own = one_hertz.with_elapsed(rows.filter(pl.col("voyage") == name))
+    own = rows.filter(pl.col("voyage") == name).with_columns(
+        # parts count from the voyage's first row, which may be long before its first usable one
+        elapsed=(pl.col("time") - store.begins(name)).dt.total_nanoseconds().clip(0) * 1e-9
+    )
     elapsed = own["elapsed"].to_numpy()
     used = np.arange(1, len(elapsed) + 1) / len(elapsed)  # share of the usable seconds
     ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]
@@ -135,11 +148,12 @@ def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
         for a, b in pairwise(at)
     ]
     if len(named) < 3 or min(longest) < size:
+        shorter = f"choose --window {min(longest)} or shorter, or "
         raise StoreError(
             f"{name} is the only voyage with a window of {size} s, and too short to be split in "
             f"time: the {', '.join(map(str, longest))} s in a row that are to train, validate and "
             "test do not all hold one.",
-            hint=f"choose --window {max(min(longest), 2)} or shorter, or ingest a second voyage.",
+            hint=f"{shorter if min(longest) >= LEAST_WINDOW else ''}ingest a second voyage.",
         )
     return Split(
         training=(named[0],), validation=(named[1],), test=(named[2],),
@@ -196,7 +210,8 @@ def refuse_no_test(split: Split) -> None:
         raise StoreError(
             f"There is no voyage left to test on: training {listed(split.training)}, validation "
             f"{listed(split.validation)}.",
-            hint="ingest another voyage, or leave --validation out.",
+            hint="ingest another voyage, leave --validation out, or name fewer with --voyages: "
+            "those that neither train nor validate are the test.",
         )
 
 

@@ -24,6 +24,7 @@ import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,7 +45,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
     from shiplog.voyages.ingest import Voyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
-INGEST_VERSION = 5  # raised when the same log would become another table or report
+INGEST_VERSION = 6  # raised when the same log would become another table or report
 SILENT_WAIT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)
@@ -67,7 +68,8 @@ class Store:
 
         In the order of the patterns, then by name. Raises StoreError where one matches nothing.
         """
-        names = [entry.name for entry in self.entries()]
+        lengths = {entry.name: entry.seconds for entry in self.entries()}
+        names = list(lengths)
         if not names:
             raise StoreError(
                 f"There is no voyage in the store {self.path}.",
@@ -82,6 +84,8 @@ class Store:
                     f"In the store {self.path}: {listed(names)}.",
                     hint="`shiplog voyages` lists them; patterns such as 'trial_*' are allowed.",
                 )
+            for name in matching:
+                _refuse_beyond(name, lengths)
             chosen.update(dict.fromkeys(matching))
         return list(chosen)
 
@@ -229,6 +233,10 @@ class Store:
             )
         return pl.scan_parquet(folder / "table.parquet", hive_partitioning=False)
 
+    def begins(self, name: str) -> datetime:
+        """The time of a voyage's first row, usable or not: its parts count from there."""
+        return self._table(name).select(pl.col("time").min()).collect().item()
+
     def _part(self, name: str) -> parts.Part | None:
         """None where the name is that of a whole voyage, whatever it looks like."""
         return None if self._folder(name).is_dir() else parts.parse(name)
@@ -281,6 +289,17 @@ def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:
+    """Raises StoreError for a part that begins where its voyage has ended."""
+    part = None if name in lengths else parts.parse(name)
+    if part is not None and part.begin >= lengths[part.whole]:
+        raise StoreError(
+            f"{name} begins after the end of {part.whole}, which is "
+            f"{lengths[part.whole]:.0f} s long.",
+            hint=f"choose seconds from 0 to {lengths[part.whole]:.0f}.",
+        )
 
 
 def _whole(folder: Path, facts: dict) -> bool:

@@ -122,8 +122,9 @@ def _too_long(seconds: pl.DataFrame, size: int) -> tuple[str, str]:
     if lengths.height == 0:
         return "No usable second is left in these voyages.", "see `shiplog check` for why."
     voyage, _, longest = lengths.row(0)
+    shorter = f"choose --window {max(longest // 2, channels.LEAST_WINDOW)} or shorter, or "
     return (
         f"A window of {size} samples is longer than every segment; the longest, of {voyage}, has "
         f"{longest} seconds without a gap.",
-        f"choose --window {max(longest // 2, 2)} or shorter, or ingest longer voyages.",
+        f"{shorter if longest >= channels.LEAST_WINDOW else ''}ingest longer voyages.",
     )

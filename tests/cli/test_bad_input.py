@@ -208,7 +208,8 @@ OPTIONS = {
         "convert", d.table(), "--out", d.path("x")]),
     "--seeds -1": (2, ["--seeds"], lambda d: d.train("--seeds", "-1")),
     "--seeds three": (2, ["--seeds"], lambda d: d.train("--seeds", "three")),
-    "--window 1": (2, ["--window"], lambda d: d.train("--window", "1")),
+    "--window 5": (2, ["--window", "greater than or equal to 6"],
+                   lambda d: d.train("--window", "5")),
     "--width 0": (2, ["--width"], lambda d: d.train("--width", "0")),
     "--epochs 0": (2, ["--epochs"], lambda d: d.train("--epochs", "0")),
     "--folds -1": (2, ["--folds"], lambda d: d.train("--folds", "-1")),
@@ -246,7 +247,7 @@ FOLDERS = {
     "ingest: the store cannot be made": (1, ["/proc/shiplog"], lambda d: [
         "ingest", d.log, "--profile", d.profile(), "--store", "/proc/shiplog"]),
     "train: --out cannot be made": (1, ["/proc/"], lambda d: [
-        "train", "--store", d.store, "--out", "/proc/shiplog", "--window", "5"]),
+        "train", "--store", d.store, "--out", "/proc/shiplog", "--window", "6"]),
     "convert: --out cannot be made": (1, ["/proc/shiplog"], lambda d: [
         "convert", d.table(), "--profile", "kvlcc2", "--out", "/proc/shiplog"]),
     "--json cannot be written": (1, ["/proc/a.json"], lambda d: [

@@ -148,6 +148,9 @@ CASES = {
         "compare", "mmg", d.another_ship())),
     "compare: two windows": (["windows of 20 s, short of 15 s"], lambda d: d.on(
         "compare", "mmg", "short")),
+    "compare: two runs of one name": (["mmg have the same name", "rename one"], lambda d: d.on(
+        "compare", "mmg", shutil.copytree(d.sea / "mmg", d.path("mmg")))),
+    "compare: one run twice": (["mmg is given twice"], lambda d: d.on("compare", "mmg", "mmg")),
     "compare: --save in no folder": (["there is no folder"], lambda d: [
         *d.on("compare", "mmg"), "--save", d.path("none") / "a.rrd"]),
     "compare: --save a folder": (["it is a folder"], lambda d: [

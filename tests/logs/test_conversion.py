@@ -110,6 +110,7 @@ psi = { channel = "heading", unit = "deg" }
 sog = "sog"
 cog = { channel = "cog", unit = "deg" }
 """
+RUNS = PROFILE + 'run = "voyage"\n'
 
 
 def test_a_missing_yaw_rate_is_differentiated_and_reported(tmp_path, caplog):
@@ -159,6 +160,31 @@ def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     assert ingest(done.logs[0], profile).table["x0"].is_sorted()
 
 
+@pytest.mark.parametrize(
+    ("runs", "names"),
+    [
+        (["1.1", "1.2", "1.2"], {"1.1", "1.2"}), (["1.0", "2.0", "2.0"], {"1", "2"}),
+        (["1.5", "2.0", "2.0"], {"1.5", "2.0"}), (["a", "b", "b"], {"a", "b"}),
+    ],
+)  # fmt: skip
+def test_voyages_are_called_as_the_table_calls_them(tmp_path, runs, names):
+    rows = [f"{i},{i},0,1,0,5,{run}" for i, run in enumerate(runs)]
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi,run", *rows]))
+    done = convert([tmp_path / "t.csv"], profiles.parse(RUNS, "mine"), tmp_path)
+    assert {path.stem for path in done.logs} == names and not done.lost
+
+
+def test_rows_of_no_voyage_are_counted_as_lost(tmp_path):
+    for name, runs in (("some", ["a", "", '" "', "a"]), ("none", ["", "", '" "', ""])):
+        rows = [f"{i},{i},0,1,0,5,{run}" for i, run in enumerate(runs)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["t,x,y,u,v,psi,run", *rows]))
+    done = convert([tmp_path / "some.csv", tmp_path / "none.csv"],
+                   profiles.parse(RUNS, "mine"), tmp_path)  # fmt: skip
+    assert done.lost == {str(tmp_path / "some.csv"): "2 rows whose voyage is blank"}
+    assert [path.stem for path in done.logs] == ["a"]
+    assert "run is blank in every row" in done.refused[str(tmp_path / "none.csv")]
+
+
 def test_a_topic_of_the_contract_keeps_its_schema_and_another_gets_one_of_its_own():
     assert schema_of("/gyro", ["yaw_rate_degps"]) == "shiplog.Gyro"
     assert schema_of("/gyro", ["yaw_rate_degps", "volts"]) == "shiplog.table.gyro"
@@ -200,6 +226,15 @@ def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
     assert {int(t) for s in series for t in s.time} == {1_744_366_210_000_000_000}
     done = convert([tmp_path / "a.nmea"], None, tmp_path)
     assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
+
+
+def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path):
+    """By hand: GLL and VTG differ from GGA and RMC, and stand before them."""
+    lines = ["$GPGLL,6300.0000,N,01000.0000,E,101010.00,A,A", "$GPVTG,10.0,T,,M,9.0,N,,K,A", *BURST]
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    topics = {s.topic: s.columns for s in read_nmea(tmp_path / "a.nmea")[0]}
+    assert topics["/gnss/fix"]["altitude"].tolist() == [2.9]  # only GGA has one
+    assert topics["/gnss/velocity"]["cog_deg"].tolist() == [90.0]
 
 
 def test_headings_between_two_fixes_are_spread_over_the_time_between_them(tmp_path):

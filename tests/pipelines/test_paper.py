@@ -94,6 +94,17 @@ def test_without_a_test_voyage_there_is_no_experiment(tmp_path):
         choose_voyages(store, (), (), 20)
 
 
+def test_with_voyages_to_validate_on_the_unused_ones_test(store):
+    """v0 to v4: what trains is halved as ever; without --voyages nothing is left."""
+    chosen = choose_voyages(store, ("v0", "v1"), ("v3",), 20)
+    assert (chosen.reference, chosen.d_ref) == (("v0",), ("v0", "v1"))
+    assert (chosen.validation, chosen.test) == (("v3",), ("v2", "v4"))
+    assert chosen.of("ref").training == ("v0",)
+    with pytest.raises(StoreError, match="no voyage left to test on") as caught:
+        choose_voyages(store, (), ("v3",), 20)
+    assert "fewer with --voyages" in caught.value.hint
+
+
 def test_one_long_voyage_is_halved_for_the_reference_set(tmp_path):
     store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
     chosen = choose_voyages(store, (), (), 20)

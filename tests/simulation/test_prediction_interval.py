@@ -65,6 +65,15 @@ def test_rollouts_that_diverged_widen_no_band():
     assert same.factor.tolist() == plain.factor.tolist()
 
 
+@pytest.mark.parametrize("size", [2, 3, 6, 10])
+def test_a_rollout_shorter_than_the_smoothing_has_a_band(size):
+    """Errors of 1 all along: whatever of them is averaged, the growth is 1."""
+    learnt = prediction_interval.calibrate(np.ones((5, size, 6)), np.zeros((5, size, 6)), 20)
+    assert learnt.growth[0].tolist() == [0.0] * 6
+    assert learnt.growth[1:] == pytest.approx(np.ones((size - 1, 6)))
+    assert learnt.factor == pytest.approx(np.ones(6))
+
+
 def test_the_share_inside_is_counted_without_the_first_samples():
     error = np.zeros((2, 3, 6))
     error[:, 0] = 9.0  # where a rollout begins there is no error to speak of

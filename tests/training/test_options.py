@@ -1,7 +1,8 @@
-"""Options of `train`: how many seeds a model has a use for."""
+"""Options of `train`: how many seeds a model has a use for, and how short a window may be."""
 
 import pytest
 
+from shiplog.exceptions import UsageError
 from shiplog.training.options import TrainOptions
 
 
@@ -17,3 +18,10 @@ def test_one_seed_is_no_matter_to_report(caplog):
     caplog.set_level("INFO")
     one = TrainOptions(model="mmg")
     assert one.without_idle_seeds() == one and not caplog.records
+
+
+def test_a_window_in_which_no_velocities_can_be_compared_is_refused():
+    TrainOptions(window=6).check()
+    with pytest.raises(UsageError, match="A window of 5 s is too short") as refused:
+        TrainOptions(window=5).check()
+    assert refused.value.hint == "choose --window 6 or longer."

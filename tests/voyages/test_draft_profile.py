@@ -173,6 +173,25 @@ def test_a_table_drafts_what_converts_it(tmp_path):
     assert table["pwm_1"][10] == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("word", ["---", "n/a", ""])
+def test_a_word_among_numbers_changes_nothing_in_a_draft(tmp_path, word):
+    own = "\n".join(TABLE.splitlines()[:4])
+    rows = [own, *(f"219;2024-05-01T00:00:0{3 + i};59,3;10,3;4,0;12;99;{102 + i};0,02;5;5,0;0,1;"
+                   "1600" for i in range(4))]  # fmt: skip
+    (tmp_path / "good.csv").write_text("\n".join(rows))
+    gone = f"219;2024-05-01T00:00:07;59,3;10,3;4,0;12;99;{word};{word};5;{word};{word};1600"
+    (tmp_path / "words.csv").write_text("\n".join([*rows, gone]))
+    good, words = (profiles.parse(draft_table(tmp_path / f"{name}.csv"), "draft")
+                   for name in ("good", "words"))  # fmt: skip
+    assert words.table == good.table and words.actuators == good.actuators
+
+
+def test_a_heading_in_words_alone_is_drafted_and_left_to_its_reader(tmp_path):
+    lines = ["time,lat,lon,heading,yaw_rate", *(f"{i},59.1,10.1,NNE,1.0" for i in range(4))]
+    (tmp_path / "w.csv").write_text("\n".join(lines))
+    assert "'NNE'" in draft_table(tmp_path / "w.csv")
+
+
 def test_a_draft_without_actuators_is_ingested_and_refused_by_train(tmp_path):
     profile = profiles.parse(
         '[ship]\nname = "drifter"\nlength_m = 3.0\n'

@@ -1,11 +1,13 @@
 """Whole voyages apart: the user's split, the paper's, or a sensible one that is reported."""
 
+import numpy as np
 import pytest
 import sailing
 
 from pipelines.train_networks import train_run
 from shiplog.exceptions import StoreError
 from shiplog.training.run_config import Config
+from shiplog.voyages.ingest import ingest
 from shiplog.voyages.parts import overlap, parse
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.split_settings import Split
@@ -74,6 +76,21 @@ def test_one_voyage_is_split_in_time(tmp_path):
     assert whole.height - 3 <= rows.height <= whole.height  # a second at each seam may be cut
 
 
+def test_parts_in_time_count_from_the_voyages_first_row(tmp_path):
+    """300 s without a velocity in the first 100: of the other 200, 70 % train and 15 % test."""
+    logged = sailing.series(300.0)
+    logged["/velocity"].columns["sog_kn"][:1000] = np.nan
+    store = Store(tmp_path / "store")
+    store.add(ingest(sailing.write(tmp_path / "only.mcap", logged), sailing.profile()))
+    split = choose_split(store, (), (), "ref", 10)
+    sides = [*split.training, *split.validation, *split.test]
+    found = [parse(name) for name in sides]
+    assert [found[0].end, found[1].end, found[2].end] == pytest.approx([240, 270, 300], abs=2)
+    rows = store.seconds(sides, store.profile(sides))
+    lengths = dict(rows.group_by("voyage").len().iter_rows())
+    assert [lengths[name] for name in sides] == pytest.approx([140, 30, 30], abs=2)
+
+
 @pytest.mark.parametrize(("size", "left"), ((40, 19), (100, 19)))
 def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, left):
     with pytest.raises(StoreError, match="the only voyage") as caught:
@@ -82,6 +99,13 @@ def test_one_voyage_that_is_too_short_says_which_window_fits(tmp_path, size, lef
     assert window == pytest.approx(left, abs=1)
     split = choose_split(Store(tmp_path / "store"), (), (), "ref", window - 2)
     assert len(split.training) == len(split.validation) == len(split.test) == 1
+
+
+def test_no_window_is_proposed_that_would_be_refused(tmp_path):
+    """A voyage of 30 s is split into 20, 4 and 4 s, which no window fits into."""
+    with pytest.raises(StoreError, match="the only voyage") as caught:
+        choose_split(sailing.store_of(tmp_path, ["only"], seconds=30.0), (), (), "ref", 10)
+    assert caught.value.hint == "ingest a second voyage."
 
 
 def test_voyages_without_a_window_are_named_and_a_shorter_one_is_proposed(tmp_path, caplog):
@@ -126,6 +150,14 @@ def test_a_name_that_looks_like_a_part_is_itself_where_it_is_stored(tmp_path):
     assert hashes["trip[0:60]"] == hashes["trip"] is not None
     with pytest.raises(StoreError):
         store.select(["other[0:60]"])
+
+
+def test_a_part_beyond_the_end_of_its_voyage_is_refused(tmp_path):
+    store = sailing.store_of(tmp_path, ["trip"], seconds=30.0)
+    assert store.select(["trip[29:100]"]) == ["trip[29:100]"]
+    with pytest.raises(StoreError, match="after the end of trip, which is 30 s long") as caught:
+        store.select(["trip[30:100]"])
+    assert caught.value.hint == "choose seconds from 0 to 30."
 
 
 # --- of a physical model: no voyage is needed to stop its training

@@ -48,8 +48,9 @@ def required(profile: Profile | None, path: Path) -> Profile:
 
 def voyages(
     table: DelimitedTable, profile: Profile, path: Path
-) -> Iterator[tuple[str, pl.DataFrame]]:
-    """The table in SI, a column a channel and `time` in ns, one part a voyage.
+) -> tuple[Iterator[tuple[str, pl.DataFrame]], int]:
+    """The table in SI, a column a channel and `time` in ns, one part a voyage; and how many rows
+    are of no voyage, since that column is blank.
 
     Rows without a time are dropped, and reported; without a voyage column the file is one voyage.
     Raises ChannelMissing for columns that are not there, ProfileError for what cannot be read.
@@ -79,17 +80,28 @@ def voyages(
             f"{path.name}: no row of {listed(_named(present, 'time'))} holds a time.",
             hint="correct `unit` or `format` of that column in [table].",
         )
-    parts = [((path.stem,), si)]
-    if "voyage" in si.columns:
-        parts = list(
-            si.filter(pl.col("voyage").is_not_null()).group_by("voyage", maintain_order=True)
+    if "voyage" not in si.columns:
+        return _in_order([(path.stem, si)], path), 0
+    named = si.filter(pl.col("voyage").str.strip_chars() != "")
+    if named.height == 0:
+        raise ProfileError(
+            f"{path.name}: {listed(_named(present, 'voyage'))} is blank in every row.",
+            hint="fill that column, or take it out of [table]: the file is then one voyage.",
         )
-    for (name,), part in parts:
+    parts = [(str(name), part) for (name,), part in named.group_by("voyage", maintain_order=True)]
+    return _in_order(parts, path), si.height - named.height
+
+
+def _in_order(
+    parts: list[tuple[str, pl.DataFrame]], path: Path
+) -> Iterator[tuple[str, pl.DataFrame]]:
+    """Each voyage's rows in the order of time, under a name that a file can have."""
+    for name, part in parts:
         back = int((part["time"].diff() < 0).sum())
         if back:
             log.warning("%s: %s goes back in time %d times; sorted", path.name, name, back)
         part = part.sort("time", maintain_order=True)
-        yield re.sub(r'[\\/:*?"<>|]', "_", str(name)), part.drop("voyage", strict=False)
+        yield re.sub(r'[\\/:*?"<>|]', "_", name), part.drop("voyage", strict=False)
 
 
 def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
@@ -269,7 +281,9 @@ def _si(values: pl.Series, column: Column, path: Path) -> pl.Series:
 
 
 def text_of(values: pl.Series) -> pl.Series:
-    """Names of voyages or vessels: a whole number has no decimals."""
+    """Names of voyages or vessels: where all are whole numbers, none has decimals."""
     if values.dtype.is_float():
-        values = values.cast(pl.Int64, strict=False)
+        values = values.fill_nan(None)
+        whole = bool((values.drop_nulls() % 1 == 0).all())
+        values = values.cast(pl.Int64, strict=False) if whole else values
     return values.cast(pl.String)

@@ -208,9 +208,8 @@ class _Reader:
         there = {kind for kind, _ in self.rows}
         wanted = {kind: kind for kind in there if kind.startswith("/")}
         for topic, kinds in INSTEAD.items():
-            wanted |= {
-                kind: topic for kind in kinds if kind in there and topic not in wanted.values()
-            }
+            best = [kind for kind in kinds if kind in there][:1]
+            wanted |= dict.fromkeys(best, topic)
         topics: dict[str, Rows] = {}
         for (kind, talker), rows in self.rows.items():
             if kind not in wanted:

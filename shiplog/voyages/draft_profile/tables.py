@@ -104,6 +104,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
         if label.channel == "vessel" and vessel is not None:
             rows = frame.filter(text_of(frame[label.column]) == vessel)
     taken = {f.column for f in labels}
+    rows = _of_numbers(rows, taken)
     found: dict[str, list[FoundColumn]] = {}
     for channel, (pattern, unit) in CHANNEL_COLUMNS.items():
         names = _matching(frame, pattern, channel, taken)
@@ -131,6 +132,17 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     if unused := [n for n in frame.columns if n not in mentioned]:
         parts.append("# Columns not used: " + listed(unused, most=60) + "\n")
     return "\n".join(parts)
+
+
+def _of_numbers(rows: pl.DataFrame, labels: set[str]) -> pl.DataFrame:
+    """Columns of numbers with a word among them as numbers; `convert` leaves the words out, too."""
+    numbers = []
+    for values in rows:
+        if values.dtype == pl.String and values.name not in labels:
+            number = clock.number_of(values)
+            if number.null_count() < len(number) / 2:
+                numbers.append(number)
+    return rows.with_columns(numbers)
 
 
 def _matching(frame: pl.DataFrame, pattern: str, channel: str, taken: Iterable[str]) -> list[str]:
@@ -216,6 +228,8 @@ def _choose_turning(
     time = next((f for f in labels if f.channel == "time"), None)
     rates, headings = found["yaw_rate"], found["heading"]
     if time is None or not rates or not headings or "unit" not in rates[0].check:
+        return
+    if not all(rows[f.column].dtype.is_numeric() for f in (rates[0], headings[0])):
         return
     try:
         seconds = clock.instants(rows[time.column], time.unit).cast(pl.Float64).to_numpy() * 1e-9
