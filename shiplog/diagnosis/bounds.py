@@ -10,8 +10,11 @@ from scipy.special import log_ndtr
 def within(
     mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others."""
+    """[Q] a Gaussian's most probable numbers between bounds; one at its bound moves others. Numbers
+    of a fit that diverged stay as they are."""
     if ((mean >= low) & (mean <= high)).all():
+        return mean
+    if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
         return mean
     unit = np.sqrt(np.diagonal(covariance))
     try:

@@ -172,7 +172,7 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
     unit = trial.reference.columns.unit[columns]
     left = np.linalg.inv(own)
     low, high = (bound / unit for bound in trial.bounds(label))
-    gained += bounds.log_share(value, np.sqrt(np.diagonal(left)), np.ones(len(unit)), low, high)
+    gained += bounds.log_share(value, _deviation(left), np.ones(len(unit)), low, high)
     value = bounds.within(value, left, low, high)
     information = own - np.eye(len(columns))
     shrunk = information @ left
@@ -188,10 +188,10 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
 def numbers_of(
     trial: Trial, one: Level, point: Point, included: Sequence[str]
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Numbers and covariance of the included causes, within their bounds."""
-    if not included:
-        return {}, np.zeros((0, 0))
+    """Numbers of the included causes within their bounds, and covariance."""
     mean, covariance = _free(trial, one, point, included)
+    if not included:
+        return {}, covariance
     limits = [trial.bounds(name) for name in included]
     low, high = (np.concatenate(of) for of in zip(*limits, strict=True))
     found = bounds.within(mean, covariance, low, high)
@@ -205,12 +205,18 @@ def _free(
     """Numbers [Q] of the included causes and their covariance, were they without bounds; a
     family's weights come after them."""
     columns = trial.reference.columns
-    unit = np.concatenate([columns.unit[columns.of[name]] for name in included])
+    none = np.zeros(0)
+    unit = np.concatenate([none, *(columns.unit[columns.of[name]] for name in included)])
     stood = [point.numbers.get(name, np.zeros(len(columns.of[name]))) for name in included]
     first = len(trial.reference.pull)
     own = slice(first, first + len(unit))
-    mean = np.concatenate(stood) + one.solution[own] * unit
+    mean = np.concatenate([none, *stood]) + one.solution[own] * unit
     return mean, one.inverse[own, own] * np.outer(unit, unit)
+
+
+def _deviation(covariance: np.ndarray) -> np.ndarray:
+    """[Q] standard deviations; of a covariance that is none, as of numbers that are known."""
+    return np.sqrt(np.maximum(np.diagonal(covariance), 1e-30))
 
 
 def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> float:
@@ -219,7 +225,7 @@ def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> 
     if set(included) <= set(trial.fixed):
         return share
     mean, covariance = _free(trial, one, point, included)
-    deviation = np.sqrt(np.diagonal(covariance))
+    deviation = _deviation(covariance)
     for name in included:
         size = columns.unit[columns.of[name]]
         own, at = slice(at, at + len(size)), at + len(size)

@@ -22,6 +22,9 @@ def test_a_number_held_at_a_bound_moves_the_others():
     inside = np.array([3.0, 2e-3])
     assert within(inside, covariance, low, high) is inside
     apart = np.array([[1.0, 0.9], [0.9, 1.0]])
+    lost = np.array([np.nan, -1.0])
+    assert within(lost, covariance, low, high) is lost
+    assert within(mean := -np.ones(2), np.full((2, 2), np.inf), low, high) is mean
     freed = within(np.array([-0.1, -2.0]), apart, low, high)
     assert freed == pytest.approx([-0.1 + 0.9 * 2.0, 0.0], abs=1e-9)
 
