@@ -84,7 +84,9 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
-        parts = folder_to_series(path, profile)
+        parts, left_out = folder_to_series(path, profile)
+        if left_out:
+            done.lost[str(path)] = " ".join(left_out)
         yield _written(target, parts, profile, ship, path)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
