@@ -88,11 +88,12 @@ def check_file(path: Path, option: str) -> None:
 
 def check_run(path: Path) -> None:
     """Raises RunError for what is no finished run."""
-    if (path / "config.toml").is_file():
+    begun = path.name.endswith(".partial")
+    if (path / "config.toml").is_file() and not begun:
         return
-    if path.with_name(f"{path.name}.partial").is_dir():
+    if (path if begun else path.with_name(f"{path.name}.partial")).is_dir():
         raise RunError(
-            f"The run {path} is not finished.",
+            f"The run {path.with_name(path.name.removesuffix('.partial'))} is not finished.",
             hint="give the same `shiplog train` again: it goes on.",
         )
     if path.exists():
