@@ -179,13 +179,16 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     return trial_voyages.record_of(store, there, profile)
 
 
-def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
-    """Report, verdict, provenance and pictures. An earlier diagnosis leaves no picture beside a
-    report that has none."""
+def _write(done: DiagnosedTrial) -> None:
     done.folder.mkdir(parents=True, exist_ok=True)
-    files.remove(done.folder / answer.RECORDING)
     files.write_text(done.folder / "report.md", inert(page.markdown(done.verdict)))
     files.write_json(done.folder / "verdict.json", done.verdict.as_json())
+
+
+def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
+    """Report, verdict, provenance and pictures; those of an earlier diagnosis do not stay."""
+    _write(done)
+    files.remove(done.folder / answer.RECORDING)
     files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
     if done.recording is not None:
         diagnosis_pictures.save(done, done.recording)
