@@ -141,12 +141,12 @@ def train(store: Store | str | Path, out: str | Path, **options: Any) -> Run:
     """
     from pipelines.train import train_command
 
-    names = {name: tuple(_names(options.pop(name, ()))) for name in ("voyages", "validation")}
-    patterns = {name: tuple(options.pop(name, ())) for name in ("without", "free")}
+    several = ("voyages", "validation", "without", "free")
+    names = {name: tuple(_names(options.pop(name, ()))) for name in several}
     if (given := options.pop("parameters", None)) is not None:
         options["parameters"] = Path(given)
     into = Path(out)
-    train_command(_path(store), into, TrainOptions(**names, **patterns, **options))
+    train_command(_path(store), into, TrainOptions(**names, **options))
     return load_model.load(into)
 
 

@@ -47,7 +47,7 @@ def _resample_one(
 
 
 def do(tasks: Sequence[Task], address: str) -> dict[str, str]:
-    """Do all trainings (tasks of `train.tasks_of`) there. Returns those that failed, and why."""
+    """Do all trainings (of `train_networks.tasks_of`) there. Returns those that failed, and why."""
     places = {
         task.name: (
             load_model.network(run_folder.open_folder(task.arguments[0])),

@@ -12,7 +12,7 @@ from pipelines.bars import drawable, tracked
 from shiplog import files
 from shiplog.exceptions import ShiplogError
 from shiplog.logs import reading_limits
-from shiplog.logs.bags import bag_to_log, is_bag
+from shiplog.logs.bags import bag_to_log, bags_once, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
@@ -43,7 +43,7 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
     profile  says what a single table's columns are; NMEA, bags and folders do without
     """
     done = Converted()
-    for path in tracked(sources, "converting"):
+    for path in tracked(bags_once(sources), "converting"):
         try:
             reading_limits.begin(path)
             with nullcontext() if drawable() else saying(f"{path.name}: converting"):
@@ -68,7 +68,10 @@ def draft(path: Path, vessel: str | None = None) -> str:
         if not (is_bag(path) or is_nmea(path) or path.is_dir()):
             return draft_log(path, vessel)
         with files.temporary_folder() as folder:
-            (target,) = _each(path, None, folder, Converted())
+            done = Converted()
+            (target,) = _each(path, None, folder, done)
+            for what in done.lost.values():
+                log.warning("%s: left out: %s", path.name, what)
             return draft_log(target, vessel)
 
 
@@ -84,7 +87,9 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
-        parts = folder_to_series(path, profile)
+        parts, left_out = folder_to_series(path, profile)
+        if left_out:
+            done.lost[str(path)] = " ".join(left_out)
         yield _written(target, parts, profile, ship, path)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)

@@ -13,7 +13,7 @@ from pipelines.identify import identify_run
 from pipelines.prepare import ingest_logs
 from pipelines.train_networks import train_run
 from shiplog.exceptions import listed
-from shiplog.paths import refuse_none_ingested, sample_logs
+from shiplog.paths import refuse_no_season, refuse_none_ingested, sample_logs
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.store import Store
@@ -43,7 +43,10 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     store = Store(out / "store")
     log.info("1/4 ingesting %s", folder)
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
+    for refused, why in done.refused.items():
+        log.warning("%s refused: %s", Path(refused).name, why)
     refuse_none_ingested(done.reports, folder)
+    refuse_no_season(store.select(), NEXT_SEASON, folder)
     paths = []
     for data in DATASETS:
         path = out / "runs" / data
@@ -92,4 +95,5 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
     content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
+    content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
     return Demo(ending, content, result.recording)

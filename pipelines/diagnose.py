@@ -73,19 +73,13 @@ def diagnose_run(
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
     nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
-    if not answer.enough(recorded):
+    if answer.enough(recorded):
+        if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
+            nominal = None
+        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
+        done = _decided(campaign, out, causes)
+    else:
         done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
-        _write(done)
-        return done
-    if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
-        nominal = None
-    campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
-    try:
-        done = _diagnosed(campaign, out, causes)
-    except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
-        detailed = log.isEnabledFor(logging.DEBUG)
-        log.info("no path of the model can be computed: %s", error, exc_info=detailed)
-        done = DiagnosedTrial(answer.runs_away(run, before_effect), out)
     _save(done, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
@@ -106,6 +100,16 @@ class Campaigns:
     recorded: Record
     nominal: Record | None
     before_effect: bool
+
+
+def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
+    """What was found; where no path of the model can be computed, that it runs away."""
+    try:
+        return _diagnosed(of, out, causes)
+    except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
+        detailed = log.isEnabledFor(logging.DEBUG)
+        log.info("no path of the model can be computed: %s", error, exc_info=detailed)
+        return DiagnosedTrial(answer.runs_away(of.run, of.before_effect), out)
 
 
 def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
@@ -182,7 +186,9 @@ def _write(done: DiagnosedTrial) -> None:
 
 
 def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
+    """Report, verdict, provenance and pictures; those of an earlier diagnosis do not stay."""
     _write(done)
+    files.remove(done.folder / answer.RECORDING)
     files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
     if done.recording is not None:
         diagnosis_pictures.save(done, done.recording)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import os
 from collections.abc import Sequence, Sized
 from pathlib import Path
@@ -31,6 +32,15 @@ def refuse_none_ingested(reports: Sized, folder: Path) -> None:
     """Raises ShiplogError where no log of the folder became a voyage."""
     if not reports:
         raise ShiplogError(f"No log in {folder} could be ingested.", hint="see the messages above.")
+
+
+def refuse_no_season(names: Sequence[str], season: str, folder: Path) -> None:
+    """Raises ShiplogError where none of the voyages is of the season that the demo diagnoses."""
+    if not fnmatch.filter(names, season):
+        raise ShiplogError(
+            f"Of {folder} no log {season} was ingested, and the demo ends with their diagnosis.",
+            hint="leave --logs out, or give it a folder like the checkout's sample_logs.",
+        )
 
 
 def refuse_taken(path: Path, option: str = "--out") -> None:
@@ -78,11 +88,12 @@ def check_file(path: Path, option: str) -> None:
 
 def check_run(path: Path) -> None:
     """Raises RunError for what is no finished run."""
-    if (path / "config.toml").is_file():
+    begun = path.name.endswith(".partial")
+    if (path / "config.toml").is_file() and not begun:
         return
-    if path.with_name(f"{path.name}.partial").is_dir():
+    if (path if begun else path.with_name(f"{path.name}.partial")).is_dir():
         raise RunError(
-            f"The run {path} is not finished.",
+            f"The run {path.with_name(path.name.removesuffix('.partial'))} is not finished.",
             hint="give the same `shiplog train` again: it goes on.",
         )
     if path.exists():

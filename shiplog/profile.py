@@ -20,8 +20,8 @@ FINEST = 1e-9  # in `unit`: a smaller accuracy than this, but for 0, is a slip
 FACTORS = (1e-12, 1e6)  # of a raw value: from 1e-7 deg of a receiver to a count of thousands
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]  # in whatever unit an instrument counts
 
-# What can be at all, so that a slip of the decimal point or of the unit is reported, not computed
-# with. The largest ship has 460 m and 660 000 t; models of ships begin at half a metre.
+# What can be at all, so that a slip of the decimal point is reported: the largest ship has 460 m
+# and 660 000 t, models of ships begin at half a metre.
 SHORTEST_M, LONGEST_M, LIGHTEST_KG, HEAVIEST_KG = 0.1, 1_000.0, 0.01, 2e9
 Length = Annotated[float, Field(ge=1e-3, le=LONGEST_M)]
 Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]  # of a ship's part, from midship
@@ -248,10 +248,9 @@ class Actuator(Source):
         "next to it at the same place"
     )
     limits: tuple[Number, Number] | None = Field(
-        default=None,
-        description="[least, most], in `unit`; values beyond them are marked. `mmg` "
-        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm",
-    )
+        default=None, description="[least, most], in `unit`; values beyond them are marked. `mmg` "
+        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm"
+    )  # fmt: skip
     position_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
     )
@@ -261,9 +260,7 @@ class Actuator(Source):
         le=360.0,
         description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
-    diameter_m: Length | None = Field(
-        default=None, description="of a propeller, m; `mmg` and `hybrid` need it"
-    )
+    diameter_m: Length | None = Field(None, description="of a propeller, m; for `mmg`, `hybrid`")
     area_m2: Area | None = Field(default=None, description="of a rudder, m²; estimated")
     span_m: Length | None = Field(default=None, description="of a rudder, m; estimated")
 

@@ -31,8 +31,9 @@ def shipped() -> tuple[str, ...]:
 
 def load(name_or_path: str | Path) -> Profile:
     """A shipped profile by its name, or any by its path. Raises ProfileError."""
-    path = Path(name_or_path)
-    if path.suffix == ".toml" or path.exists():
+    path, name = Path(name_or_path), str(name_or_path)
+    own = path.is_file() or (path.exists() and name not in shipped())  # a folder hides no shipped
+    if path.suffix == ".toml" or own:
         if not path.is_file():
             raise ProfileError(
                 f"The profile {path} is a folder, not a file."
@@ -49,7 +50,6 @@ def load(name_or_path: str | Path) -> Profile:
                 hint="save it as UTF-8 text, in a file that you may read.",
             ) from error
     else:
-        name = str(name_or_path)
         if name not in shipped():
             raise ProfileError(
                 f"There is no profile named {name!r}{nearest(name, shipped())}.",

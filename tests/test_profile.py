@@ -182,3 +182,12 @@ def test_what_a_log_does_not_have_is_reported_with_what_records_it(sensors, word
         profile_file.parse(text, "circle.toml")
     assert words in str(refused.value)
     assert ("record a gyro or a GNSS compass" in str(refused.value)) == ("heading" not in sensors)
+
+
+def test_a_folder_of_its_name_hides_no_shipped_profile(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kvlcc2").mkdir()
+    (tmp_path / "mine").mkdir()
+    assert profile_file.load("kvlcc2").source == "kvlcc2"
+    with pytest.raises(ProfileError, match="mine is a folder"):
+        profile_file.load("mine")

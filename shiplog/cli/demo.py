@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.options import JsonOption
-from shiplog.cli.output import answer, show
+from shiplog.cli.output import LOST, answer, show
 from shiplog.exceptions import ShiplogError
 
 
@@ -40,3 +40,5 @@ def demo(
             show(result.recording, web=False)
         except ShiplogError as error:  # the job is done; only the window is missing
             typer.echo(f"The viewer was not opened: {error.message}", err=True)
+    if result.content["refused"]:  # named while they were ingested
+        raise typer.Exit(LOST)

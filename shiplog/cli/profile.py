@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from shiplog.cli.options import JsonOption
+from shiplog.cli.output import answer
+
 
 def profile(
     log: Annotated[
@@ -16,6 +19,7 @@ def profile(
     vessel: Annotated[
         str | None, typer.Option(help="Which ship, where the log holds many: its MMSI or name.")
     ] = None,
+    json_to: JsonOption = None,
 ) -> None:
     """Draft a ship profile from a log's topics, or a table's columns.
 
@@ -30,8 +34,8 @@ def profile(
     from pipelines.convert import draft
 
     text = draft(log, vessel)
-    if out is None:
-        typer.echo(text)
-    else:
+    content = {"contract": 1, "profile": text, "written": None if out is None else str(out)}
+    if out is not None:
         files.write_text(out, text)
-        typer.echo(f"draft written to {out}: look over every line that says CHECK")
+        text = f"draft written to {out}: look over every line that says CHECK"
+    answer(text, content, json_to)

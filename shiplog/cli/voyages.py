@@ -21,7 +21,7 @@ def voyages(
 ) -> None:
     """What is in the store; with --sensors, what several voyages together say of the instruments.
 
-    Example: shiplog voyages --store store
+    Example: shiplog voyages --store store --voyages 'zigzag_*'
 
     Example: shiplog voyages --sensors --voyages 'zigzag_*'
     """
@@ -52,5 +52,11 @@ def voyages(
 
         Store(store).mend(wait=False)
     entries = catalogue.entries(store)
+    if voyages:
+        from shiplog.voyages import parts
+        from shiplog.voyages.store import Store
+
+        chosen = parts.overlapping([e.name for e in entries], Store(store).select(voyages))
+        entries = [entry for entry in entries if entry.name in chosen]
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
     answer(text_table.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)

@@ -80,12 +80,6 @@ class Reference:
         """log|information|."""
         return float(np.linalg.slogdet(self.information)[1])
 
-    @cached_property
-    def nominal_coefficients(self) -> np.ndarray:
-        """[P] coefficients."""
-        base = self.columns.base
-        return self.theta + self.mean[:base] * self.columns.unit[:base]
-
     def apart(self, one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> float:
         """The most that a number differs, in units of its size; of the same causes."""
         columns = self.columns

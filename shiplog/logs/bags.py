@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from mcap.writer import CompressionType, IndexType, Writer
@@ -14,6 +15,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from shiplog import files
 from shiplog.exceptions import LogUnreadable, listed
 from shiplog.logs.write import CHUNK_BYTES, LOG_CONTRACT
+from shiplog.unexpected import MENDABLE
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +31,16 @@ def is_bag(path: Path) -> bool:
     if path.is_dir():
         return (path / "metadata.yaml").is_file() and any(path.glob(f"*{SQLITE}*"))
     return path.suffix.lower() in (BAG, SQLITE) and path.is_file()
+
+
+def bags_once(sources: Iterable[Path]) -> list[Path]:
+    """The sources, each once: the .db3 files of one metadata.yaml are parts of one, the folder."""
+    once: dict[Path, Path] = {}
+    for path in sources:
+        if path.suffix.lower() == SQLITE and is_bag(path.parent):
+            path = path.parent if path.parent.name.strip(".") else path.parent.resolve()
+        once.setdefault(path.resolve(), path)
+    return list(once.values())
 
 
 def bag_to_log(path: Path, target: Path, ship: str) -> dict[str, str]:
@@ -53,6 +65,8 @@ def bag_to_log(path: Path, target: Path, ship: str) -> dict[str, str]:
             stream.flush()
             os.fsync(stream.fileno())
     except (AnyReaderError, Reader1Error, Reader2Error, OSError) as error:
+        if isinstance(error, OSError) and error.errno in MENDABLE and error.filename == str(target):
+            raise  # it is the log that cannot be written
         raise LogUnreadable(
             f"{path.name} cannot be read as a ROS bag: {error}.",
             hint="a ROS 2 bag is the folder with its metadata.yaml; `ros2 bag reindex` makes one "

@@ -21,6 +21,7 @@ from shiplog.training.load_model import Run
 from shiplog.voyages import timescale
 from shiplog.voyages.recording import Record
 
+RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
 
@@ -47,7 +48,7 @@ class DiagnosedTrial:
     @property
     def recording(self) -> Path | None:
         """Path of the Rerun recording; None where nothing was compared."""
-        return None if self.decision is None else self.folder / "diagnosis.rrd"
+        return None if self.decision is None else self.folder / RECORDING
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ class RunFolder:
         return run_files.table(self.path / "windows.parquet")
 
     def training(self) -> pl.DataFrame:
-        """The 1 Hz rows the run was trained on, sorted, as `table.resample` gave them."""
+        """The 1 Hz rows the run was trained on, sorted, as `one_hertz.resample` gave them."""
         return run_files.table(self.path / "training.parquet")
 
     def validation(self) -> pl.DataFrame:

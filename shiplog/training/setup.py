@@ -82,9 +82,7 @@ def prepare(
         whole = plan(held, "ref", config.window)
         _refuse_none(whole, config.window, config.split.validation)
         unseen = windows.cut(held, whole, config.window, *names)
-    twin: dict[str, str] = {}
-    for left, right, _ in one_hertz.shared_rows(learnt).iter_rows():
-        twin[str(right)] = twin.get(str(left), str(left))
+    twin = one_hertz.twins(learnt)
     first = dict(
         learnt.group_by("voyage").agg(pl.col("time").min().dt.strftime("%Y-%m-%d")).iter_rows()
     )

@@ -1,7 +1,7 @@
 """Sensors against each other over a whole campaign: what one short voyage cannot tell, several can.
 
-All voyages of a campaign share one set of parameters (`parity`), fitted to their stretches at once.
-A voyage whose own estimate is far from the campaign's is named: it deviates.
+All voyages of a campaign share one set of parameters, those of `sensor_consistency`, fitted to
+all at once. A voyage whose own estimate is far from the campaign's is named: it deviates.
 """
 
 from __future__ import annotations

@@ -124,6 +124,14 @@ def with_elapsed(seconds: pl.DataFrame) -> pl.DataFrame:
     return seconds.with_columns(elapsed=(pl.col("time") - first).dt.total_nanoseconds() * 1e-9)
 
 
+def twins(seconds: pl.DataFrame) -> dict[str, str]:
+    """Voyage → the first of those that hold the same data under other names."""
+    first: dict[str, str] = {}
+    for left, right, _ in shared_rows(seconds).iter_rows():
+        first[str(right)] = first.get(str(left), str(left))
+    return first
+
+
 def shared_rows(seconds: pl.DataFrame, least: int = 10) -> pl.DataFrame:
     """Pairs of voyages with identical rows: left, right, rows. The same data under two names.
 

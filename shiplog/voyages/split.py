@@ -96,9 +96,7 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     counts = dict(whole.iter_rows())
     first = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())
     usable = sorted((n for n in names if n in counts), key=lambda n: (first[n], n))
-    twin = {}  # the same data under two names stays on one side
-    for left, right, _ in one_hertz.shared_rows(rows).iter_rows():
-        twin[right] = twin.get(left, left)
+    twin = one_hertz.twins(rows)  # the same data under two names stays on one side
     groups: dict[str, list[str]] = {}
     for name in usable:
         groups.setdefault(twin.get(name, name), []).append(name)

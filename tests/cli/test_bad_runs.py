@@ -133,6 +133,8 @@ CASES = {
     "a file that is no run": (["is no run"], lambda d: d.on("evaluate", d.file("r"))),
     "a run that was not finished": (["is not finished"], lambda d: d.on(
         "evaluate", d.dir("r.partial").with_name("r"))),
+    "a begun run by its own name": (["/r is not finished"], lambda d: d.on(
+        "evaluate", shutil.copytree(d.sea / "mmg", d.path("r.partial")))),
     "evaluate: unknown voyage": (["did you mean 'trip_"], lambda d: d.on(
         "evaluate", "mmg", voyages="trp_3")),
     "compare: unknown voyage": (["did you mean 'trip_"], lambda d: d.on(
@@ -303,3 +305,16 @@ def test_a_refused_diagnosis_leaves_nothing(desk, capsys):
     judge([*desk.on("diagnose", "mmg"), "--out", desk.path("out"), "--extend", desk.dir("r")],
           1, ["exists already"], capsys)  # fmt: skip
     assert not desk.path("out").exists()
+
+
+def test_a_diagnosis_of_too_little_replaces_an_earlier_one_and_extends_nothing(
+    desk, capsys, caplog
+):
+    caplog.set_level("INFO")
+    out = desk.file_in("out", "diagnosis.rrd")
+    judge([*desk.on("diagnose", "mmg"), "--out", out, "--extend", desk.path("r")], 0,
+          ["Too little"], capsys)  # fmt: skip
+    assert sorted(p.name for p in out.iterdir()) == [
+        "provenance.json", "report.md", "verdict.json",
+    ]  # fmt: skip
+    assert f"{desk.path('r')} is not written" in caplog.text and not desk.path("r").exists()

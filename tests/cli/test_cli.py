@@ -65,6 +65,25 @@ def test_voyages_lists_the_store(store):
     assert reported.count("trip_") == 3 and "known ship" in reported
 
 
+def test_voyages_lists_those_that_are_named(store):
+    code, reported, _ = call("voyages", "--store", store, "--voyages", "trip_[13]", "--json", "-")
+    assert code == 0
+    assert [v["name"] for v in json.loads(reported)["voyages"]] == ["trip_1", "trip_3"]
+    assert call("voyages", "--store", store, "--voyages", "trp_1")[0] == 1
+
+
+def test_a_draft_can_be_had_as_json(logs, tmp_path):
+    code, text, _ = call("profile", logs / "trip_1.mcap")
+    assert code == 0
+    code, reported, _ = call("profile", logs / "trip_1.mcap", "--json", "-")
+    assert code == 0
+    assert json.loads(reported) == {"contract": 1, "profile": text[:-1], "written": None}
+    out, to = tmp_path / "p.toml", tmp_path / "a.json"
+    assert call("profile", logs / "trip_1.mcap", "--out", out, "--json", to)[0] == 0
+    assert json.loads(to.read_text()) == {"contract": 1, "profile": out.read_text(),
+                                          "written": str(out)}  # fmt: skip
+
+
 def test_json_to_stdout_is_json_alone(store):
     code, reported, _ = call("voyages", "--store", store, "--json", "-")
     assert code == 0 and len(json.loads(reported)["voyages"]) == 3

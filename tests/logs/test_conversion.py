@@ -191,6 +191,15 @@ def test_a_topic_of_the_contract_keeps_its_schema_and_another_gets_one_of_its_ow
     assert schema_of("/2nd engine", ["speed"]) == "shiplog.table._2nd_engine"
 
 
+def test_a_table_of_a_folder_that_cannot_be_read_is_lost(tmp_path):
+    (tmp_path / "dump").mkdir()
+    (tmp_path / "dump" / "a.csv").write_text("stamp_ns,x\n1000000000,1\n2000000000,2\n")
+    (tmp_path / "dump" / "b.parquet").write_bytes(b"PAR1x")
+    done = convert([tmp_path / "dump"], None, tmp_path)
+    assert [path.name for path in done.logs] == ["dump.mcap"] and not done.refused
+    assert "b.parquet cannot be read" in done.lost[str(tmp_path / "dump")]
+
+
 def test_a_table_without_rows_or_profile_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("t,x\n")
     assert "no row" in str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path))

@@ -1,5 +1,6 @@
 """NMEA sentences and ROS bags, each written by hand, converted and equal to the same voyage."""
 
+import errno
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -22,6 +23,8 @@ from circle_layouts import (
     same,
 )
 
+from pipelines.convert import convert
+from shiplog import files
 from shiplog import profile_file as profiles
 from shiplog.logs.read import read
 
@@ -160,6 +163,15 @@ def ros_bag(v: Voyage, writer, store) -> None:
                 writer.write(lines[topic], ns, encode(message, kind))
 
 
+def ros2_bag(source: Path, v: Voyage) -> Path:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    writer = Writer(source, version=8, storage_plugin=StoragePlugin.SQLITE3)
+    ros_bag(v, writer, get_typestore(Stores.ROS2_HUMBLE))
+    return source
+
+
 def ros_known(folder: Path, v: Voyage) -> pl.DataFrame:
     merged = profile_of("position", "sog_cog", "heading", "yaw_rate")
     return direct(folder, merged, v)
@@ -168,20 +180,35 @@ def ros_known(folder: Path, v: Voyage) -> pl.DataFrame:
 @pytest.mark.parametrize("generation", [1, 2])
 def test_5_and_6_ros_bags_of_a_usv(tmp_path, generation):
     """ROS 1 .bag and ROS 2 .db3 of unmanned boats (Heron, WAM-V, Otter): a topic an instrument."""
-    from rosbags.rosbag1 import Writer as Writer1
-    from rosbags.rosbag2 import StoragePlugin
-    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
     v = Voyage()
     if generation == 1:
         source = tmp_path / "usv.bag"
-        ros_bag(v, Writer1(source), get_typestore(Stores.ROS1_NOETIC))
+        ros_bag(v, Writer(source), get_typestore(Stores.ROS1_NOETIC))
     else:
-        source = tmp_path / "usv"
-        writer = Writer2(source, version=8, storage_plugin=StoragePlugin.SQLITE3)
-        ros_bag(v, writer, get_typestore(Stores.ROS2_HUMBLE))
+        source = ros2_bag(tmp_path / "usv", v)
     (path,) = converted(tmp_path, source, None)
     assert read(path).frames["/imu/data"]["log_time"].to_list() == v.ns.tolist()
     profile = profiles.parse(ROS_PROFILE + DATUM, "usv")
     same(path, profile, ros_known(tmp_path, v))
+
+
+def test_the_files_of_a_bag_are_one_log(tmp_path):
+    source = ros2_bag(tmp_path / "usv", Voyage())
+    (first,) = source.glob("*.db3")
+    (source / "usv_1.db3").write_bytes(first.read_bytes())  # as a bag that was split has them
+    done = convert([*sorted(source.glob("*.db3")), source], None, tmp_path)
+    assert done.logs == [tmp_path / "usv.mcap"] and not done.refused and not done.lost
+
+
+def test_a_full_disk_is_no_fault_of_the_bag(tmp_path, monkeypatch):
+    source = ros2_bag(tmp_path / "usv", Voyage())
+
+    def refuse(_path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "flush", refuse)
+    (why,) = convert([source], None, tmp_path).refused.values()
+    assert "usv.mcap: No space left on device" in why and "ROS bag" not in why

@@ -4,9 +4,12 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+from commands import call
 from rerun.chunk import RrdReader
 
 from pipelines import demo
+from shiplog.exceptions import ShiplogError
 from shiplog.paths import sample_logs
 from shiplog.training.run_config import Fast
 from shiplog.voyages.store import Store
@@ -19,6 +22,23 @@ def test_the_sample_logs_are_six_voyages_and_three_seasons():
     assert sorted(path.stem for path in sample_logs(None).glob("*.mcap")) == [*seasons, *VOYAGES]
 
 
+def test_logs_without_the_season_that_is_diagnosed_are_refused_before_the_training(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(demo, "train_run", None)
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "voyage_1.mcap").symlink_to(sample_logs(None) / "voyage_1.mcap")
+    with pytest.raises(ShiplogError, match=r"no log season2_\* was ingested"):
+        demo.run_demo(tmp_path / "demo", tmp_path / "logs")
+
+
+@pytest.mark.parametrize(("refused", "code"), [({}, 0), ({"bad.mcap": "no log"}, 3)])
+def test_the_demo_exits_with_3_where_a_log_was_refused(tmp_path, monkeypatch, refused, code):
+    made = demo.Demo("done", {"refused": refused}, tmp_path / "a.rrd")
+    monkeypatch.setattr(demo, "run_demo", lambda *_: made)
+    assert call("demo", "--no-view", "--out", tmp_path / "demo")[0] == code
+
+
 def few_logs(folder: Path) -> Path:
     """The six voyages, and of the seasons half of the one that the demo diagnoses."""
     folder.mkdir()
@@ -28,11 +48,14 @@ def few_logs(folder: Path) -> Path:
     return folder
 
 
-def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monkeypatch):
+def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(demo, "SEEDS", (0,))
     monkeypatch.setattr(demo, "RECIPE", Fast(iterations=4, warm_epochs=2))
     logs = few_logs(tmp_path / "logs")
+    (logs / "bad.mcap").write_bytes(b"no log")
     first = demo.run_demo(tmp_path / "demo", logs)
+    assert list(first.content["refused"]) == [str(logs / "bad.mcap")]
+    assert "bad.mcap refused" in caplog.text
     output = str(RrdReader(str(first.recording)).store().summary())
     for word in ("/track/voyage_6/measured", "/track/voyage_6/simulated", "/hist/wind/training",
                  "/error/voyage_6", "/state/voyage_6/surge/measured", "/report"):  # fmt: skip

@@ -12,6 +12,7 @@ import pytest
 from commands import call
 from short_voyages import BOTH, HULL, answer, scored, train
 
+import shiplog
 from pipelines.experiments import simulated_ship
 from shiplog.training import load_model, regularisation
 from shiplog.training import output_error as identification
@@ -238,3 +239,12 @@ def test_wind_coefficients_need_a_wind_sensor(fitted, calm, tmp_path):
     assert not list(tmp_path.iterdir())
     code, reported, _ = train(calm, tmp_path / "r", *given, "--without", "wind")
     assert code == 0 and "without propeller, rudder, wind" in reported
+
+
+def test_from_python_one_name_is_one_name(monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setattr("pipelines.train.train_command", lambda *a: given.append(a[-1]))
+    monkeypatch.setattr("shiplog.training.load_model.load", lambda path: path)
+    shiplog.train("store", tmp_path / "r", without="wind", free="hull.*", voyages="trip_1")
+    (options,) = given
+    assert (options.without, options.free, options.voyages) == (("wind",), ("hull.*",), ("trip_1",))

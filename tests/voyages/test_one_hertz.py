@@ -108,3 +108,5 @@ def test_the_same_data_under_two_names_is_found():
     columns = ["voyage", *names]
     all_rows = pl.concat([original.select(columns), copy.select(columns), other.select(columns)])
     assert one_hertz.shared_rows(all_rows).rows() == [("a", "b", 50)]
+    again = copy.select(columns).with_columns(voyage=pl.lit("d"))
+    assert one_hertz.twins(pl.concat([all_rows, again])) == {"b": "a", "d": "a"}

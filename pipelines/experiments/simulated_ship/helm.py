@@ -13,7 +13,6 @@ from pipelines.experiments.simulated_ship.ship import LIMITS
 Helm = Callable[[float, np.ndarray], tuple[float, float, float]]
 Settings = tuple[float, float, float]  # port [deg], starboard [deg], propeller [rev/s]
 
-POND = 50.0  # m, from the middle to the bank
 TELEGRAPH = (5.0, 6.5, 8.0, 10.0, 11.5, 12.5)  # rev/s, dead slow to full
 TELEGRAPH_WEIGHTS = (0.16, 0.20, 0.22, 0.22, 0.10, 0.10)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.write import Series
 from shiplog.profile import Profile
-
-log = logging.getLogger(__name__)
 
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
 # A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
@@ -35,8 +32,9 @@ LOGGED = (
 UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", "msec": "ms"}
 
 
-def folder_to_series(folder: Path, profile: Profile | None) -> list[Series]:
-    """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field.
+def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
+    """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
+    the reasons of the tables that had to be left out.
 
     A column `log_time_ns` (or of the names above) is the recorder's clock, `stamp_ns` the
     message's; other names and units come from the profile's [table], with channel = "time".
@@ -50,15 +48,13 @@ def folder_to_series(folder: Path, profile: Profile | None) -> list[Series]:
             parts += _one(path, profile)
         except ShiplogError as error:
             reasons.append(error.message)
-    for reason in reasons:
-        log.warning("left out: %s", reason)
     if not parts:
         raise ChannelMissing(
             f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
             hint="give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table.",
         )
-    return parts
+    return parts, reasons
 
 
 def _one(path: Path, profile: Profile | None) -> list[Series]:
