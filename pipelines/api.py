@@ -28,6 +28,7 @@ from shiplog.voyages.store import Store
 
 Paths = str | Path | Iterable[str | Path]
 Names = str | Sequence[str]
+Files = str | Path | Sequence[str | Path]
 
 
 class _Printed:
@@ -150,12 +151,12 @@ def train(store: Store | str | Path, out: str | Path, **options: Any) -> Run:
     return load_model.load(into)
 
 
-def load(path: str | Path, causes: Sequence[str | Path] = ()) -> Run:
+def load(path: str | Path, causes: Files = ()) -> Run:
     """A finished run. `causes`: Python files of its causes that are not in the catalogue, which
     are executed. Raises RunError."""
     from shiplog.models.causes import user
 
-    return load_model.load(Path(path), user.load([Path(cause) for cause in causes]))
+    return load_model.load(Path(path), user.load(_files(causes)))
 
 
 def evaluate(
@@ -190,7 +191,7 @@ def diagnose(
     *,
     out: str | Path = "diagnosis",
     extend: str | Path | None = None,
-    causes: Sequence[str | Path] = (),
+    causes: Files = (),
 ) -> Diagnosis:
     """What the model gets wrong on these voyages, why, and what the causes gain on held-out ones.
 
@@ -199,11 +200,10 @@ def diagnose(
 
     Raises ShiplogError.
     """
-    files = [Path(cause) for cause in causes]
     to = None if extend is None else Path(extend)
     (path,) = _runs(run)
     done = diagnosing.diagnose_run(
-        path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=files
+        path, Store(_path(store)), _names(voyages), Path(out), extend=to, cause_files=_files(causes)
     )
     answer = done.verdict.as_json()
     named = [(c["name"], c.get("probability"), c.get("sentence")) for c in answer["causes"]]
@@ -228,6 +228,10 @@ def _path(store: Store | str | Path) -> Path:
 
 def _names(voyages: Names) -> list[str]:
     return [voyages] if isinstance(voyages, str) else list(voyages)
+
+
+def _files(files: Files) -> list[Path]:
+    return [Path(one) for one in ([files] if isinstance(files, str | Path) else files)]
 
 
 def _runs(runs: Run | str | Path | Sequence[Run | str | Path]) -> list[Path]:

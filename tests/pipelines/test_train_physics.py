@@ -14,6 +14,7 @@ from short_voyages import BOTH, HULL, answer, scored, train
 
 import shiplog
 from pipelines.experiments import simulated_ship
+from shiplog.exceptions import ShiplogError
 from shiplog.training import load_model, regularisation
 from shiplog.training import output_error as identification
 
@@ -248,3 +249,5 @@ def test_from_python_one_name_is_one_name(monkeypatch, tmp_path):
     shiplog.train("store", tmp_path / "r", without="wind", free="hull.*", voyages="trip_1")
     (options,) = given
     assert (options.without, options.free, options.voyages) == (("wind",), ("hull.*",), ("trip_1",))
+    with pytest.raises(ShiplogError, match="mine.py is no Python file"):  # and not "m"
+        shiplog.diagnose("r", "store", causes="mine.py")
