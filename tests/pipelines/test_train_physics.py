@@ -249,5 +249,5 @@ def test_from_python_one_name_is_one_name(monkeypatch, tmp_path):
     shiplog.train("store", tmp_path / "r", without="wind", free="hull.*", voyages="trip_1")
     (options,) = given
     assert (options.without, options.free, options.voyages) == (("wind",), ("hull.*",), ("trip_1",))
-    with pytest.raises(ShiplogError, match="mine.py is no Python file"):  # and not "m"
+    with pytest.raises(ShiplogError, match=r"mine\.py is no Python file"):  # and not "m"
         shiplog.diagnose("r", "store", causes="mine.py")
