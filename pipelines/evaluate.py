@@ -21,7 +21,7 @@ from shiplog.simulation import coverage as covering
 from shiplog.training import load_model
 from shiplog.training.load_model import Run
 from shiplog.training.run_checks import refuse_other_columns, refuse_other_window
-from shiplog.training.voyages_to_test import held_back
+from shiplog.training.voyages_to_test import held_back, say_twins
 from shiplog.voyages import one_hertz, windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -46,10 +46,12 @@ def evaluate_runs(
     for other in opened[1:]:
         refuse_other_window(first, other)
         refuse_other_columns(first, other.profile.columns, other.name)
-    names = held_back(first, store, voyages)
+    names = held_back(opened, store, voyages)
     profile = store.profile(names)
     refuse_other_columns(first, profile.columns, "the chosen voyages")
     rows = one_hertz.with_elapsed(store.seconds(names, profile))
+    for run in opened:
+        say_twins(run, rows)
     size = first.config.window
     planned = plan(rows, "ref", size)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)

@@ -14,7 +14,9 @@ from shiplog.voyages.windows import Windows
 def jittered(windows: Windows, generator: torch.Generator) -> Windows:
     """Normal noise on the velocities of every copy above 0, Eq. 15 with Σ_x of Table 5.
 
-    Actuators and wind stay as measured. Noise is independent in time and between copies.
+    Actuators and wind stay as measured. Noise is independent in time, between copies and between
+    windows: slices that overlap share no noise, where Eqs. 17 and 18 give each second of a copy
+    one value.
     """
     noisy = (windows.plan["copy"] > 0).to_numpy().astype(np.float64)
     noise = torch.randn(windows.state.shape, generator=generator, dtype=torch.float64).numpy()

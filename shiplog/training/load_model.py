@@ -59,6 +59,12 @@ class Run(RunFolder, ABC):
             return self.config.label(self.profile.has_wind)
         return f"{self.config.model} with {listed(c.label for c in self.extension.causes)}"
 
+    @property
+    def fitted_to(self) -> tuple[str, ...]:
+        """Also the voyages that its extension was fitted to."""
+        more = () if self.extension is None else self.extension.shares
+        return tuple(dict.fromkeys((*self.trained_on, *more)))
+
     def models(self) -> dict[int, Any]:
         """Seed → what can be simulated: a network in float64, physics with its numbers, or either
         with causes in it."""
@@ -242,7 +248,9 @@ class PhysicalRun(Run):
     def spread(self, models: Mapping[int, Any], simulated: list[np.ndarray], cut: Windows) -> Any:
         return next(iter(models.values())).spread(cut)
 
-    def forces(self, seconds: pl.DataFrame) -> pl.DataFrame:
+    def forces(self, seconds: pl.DataFrame) -> pl.DataFrame | None:
+        if self.extension is not None:  # its causes are no part of any force of the equations
+            return None
         return force_breakdown.along(self.simulator(self.config.seeds[0]), seconds, self.profile)
 
     def _kept(self, seed: int, count: int, names: Sequence[str]) -> earlier_runs.Kept:

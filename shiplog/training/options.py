@@ -87,10 +87,16 @@ class TrainOptions:
                 )
             if not kind.takes(name):
                 raise UsageError(f"{flag} says nothing to {kind.family.noun}.", hint=hint)
+        if kind.family is PHYSICS and AUGMENTATIONS[self.data].step < AUGMENTATIONS["ref"].step:
+            raise UsageError(
+                f"--data {self.data} is of windows that overlap: an identification would count the "
+                "same seconds several times, and its standard errors would be too small.",
+                hint="choose ref or d-ref.",
+            )
         if AUGMENTATIONS[self.data].copies and not kind.takes("copies"):
             raise UsageError(
                 f"--data {self.data} is of noisy copies, which an identification has no use for.",
-                hint=f"choose {listed(n for n, a in AUGMENTATIONS.items() if not a.copies)}.",
+                hint="choose ref or d-ref.",
             )
 
     def without_idle_seeds(self) -> TrainOptions:

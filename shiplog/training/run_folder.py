@@ -78,6 +78,11 @@ class RunFolder:
         """The voyages it was fitted to, or stopped by."""
         return (*self.config.split.training, *self.config.split.validation)
 
+    @property
+    def fitted_to(self) -> tuple[str, ...]:
+        """The voyages that any of its numbers were fitted to: no test of it."""
+        return self.trained_on
+
     def windows(self) -> pl.DataFrame:
         """The plan of the training windows: voyage, segment, start, copy."""
         return run_files.table(self.path / "windows.parquet")

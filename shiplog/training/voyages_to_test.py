@@ -1,39 +1,66 @@
-"""Which voyages of a store a run can be tested on: those that had no part in its training."""
+"""Which voyages of a store runs can be tested on: those that none of them was fitted to."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
 
+import polars as pl
+
 from shiplog.exceptions import StoreError, listed
 from shiplog.training.run_folder import RunFolder
-from shiplog.voyages import parts
+from shiplog.voyages import one_hertz, parts
 from shiplog.voyages.store import Store
 
 log = logging.getLogger(__name__)
 
 
-def held_back(run: RunFolder, store: Store, voyages: Sequence[str] = ()) -> list[str]:
-    """The user's choice, else the run's own test voyages, else all that it was not trained on.
+def held_back(
+    runs: Sequence[RunFolder], store: Store, voyages: Sequence[str] = ()
+) -> list[str]:  # fmt: skip
+    """The user's choice, else the first run's own test voyages, else all; of the latter two those
+    that no run was fitted to.
 
-    voyages   names or patterns; a warning names those that the run was trained or validated on
+    voyages   names or patterns; a warning names those that a run was fitted to
 
     Raises StoreError where no voyage is left.
     """
     if voyages:
         names = store.select(list(voyages))
-        overlap = parts.overlapping(names, run.trained_on)
-        if overlap:
-            log.warning(
-                "%s was trained or validated on %s: its errors there are no test.",
-                run.name, listed(overlap),
-            )  # fmt: skip
+        for run in runs:
+            _say_fitted(run, parts.overlapping(names, run.fitted_to))
         return names
-    names = store.there(run.config.split.test)
-    names = names or [n for n in store.select() if not parts.overlapping([n], run.trained_on)]
+    used = [name for run in runs for name in run.fitted_to]
+
+    def unused(names: Sequence[str]) -> list[str]:
+        return [name for name in names if not parts.overlapping([name], used)]
+
+    names = unused(store.there(runs[0].config.split.test)) or unused(store.select())
     if not names:
         raise StoreError(
-            f"Every voyage in {store.path} was used to train or validate {run.name}.",
+            f"Every voyage in {store.path} was used to train or validate "
+            f"{listed(run.name for run in runs)}.",
             hint="ingest voyages that it was not trained on, or name some with --voyages.",
         )
     return names
+
+
+def say_twins(run: RunFolder, rows: pl.DataFrame) -> None:
+    """Warn of voyages, among the 1 Hz `rows`, that a run was trained on under another name."""
+    columns = ("voyage", *one_hertz.COMPARED)
+    tested = set(rows["voyage"])
+    tested -= {*parts.overlapping(tested, run.fitted_to)}  # those are named as they are
+    known = run.training().select(columns)
+    both = pl.concat((known, rows.select(columns).filter(pl.col("voyage").is_in(list(tested)))))
+    pairs = one_hertz.shared_rows(both).select("left", "right").rows()
+    trained = set(known["voyage"])
+    twins = {name for pair in pairs if trained & {*pair} for name in tested & {*pair}}
+    _say_fitted(run, sorted(twins))
+
+
+def _say_fitted(run: RunFolder, names: Sequence[str]) -> None:
+    if names:
+        log.warning(
+            "%s was trained or validated on %s: its errors there are no test.",
+            run.name, listed(names),
+        )  # fmt: skip

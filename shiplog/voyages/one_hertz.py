@@ -17,6 +17,7 @@ from shiplog.channels import UNUSABLE, WINDOW, Quality
 ONE_SECOND = pl.duration(seconds=1)
 ONE_DAY = timedelta(days=1)
 LEAST_SAMPLES = 5  # of ten: fewer is not an average over the second
+COMPARED = ("surge", "sway", "heading", "yaw_rate")  # to see whether two voyages are the same data
 
 
 def mean_angle(name: str) -> pl.Expr:
@@ -137,7 +138,7 @@ def shared_rows(seconds: pl.DataFrame, least: int = 10) -> pl.DataFrame:
 
     Two recordings never agree in all of surge, sway, heading and yaw rate to the last digit.
     """
-    key = pl.struct("surge", "sway", "heading", "yaw_rate").hash(seed=1)
+    key = pl.struct(*COMPARED).hash(seed=1)
     keys = seconds.filter(
         (pl.col("surge") != 0) | (pl.col("sway") != 0) | (pl.col("yaw_rate") != 0)
     ).select("voyage", key=key)

@@ -225,8 +225,10 @@ OPTIONS = {
     "--folds of a network": (2, ["says nothing"], lambda d: d.train("--folds", "2")),
     "--no-fit of a hybrid": (2, ["has to be fitted"],
                              lambda d: d.train("--model", "hybrid", "--no-fit")),
-    "noisy copies for mmg": (2, ["choose d-ref, ref, sli10, sli2"],
+    "noisy copies for mmg": (2, ["choose ref or d-ref"],
                              lambda d: d.train("--model", "mmg", "--data", "jit2")),
+    "overlapping windows for mmg": (2, ["windows that overlap", "choose ref or d-ref"],
+                                    lambda d: d.train("--model", "mmg", "--data", "sli10")),
     "unknown voyage": (1, ["did you mean 'one'"], lambda d: d.train("--voyages", "onne")),
     "unknown validation": (1, ["No voyage matches 'x*'"], lambda d: d.train("--validation", "x*")),
     "one voyage for both": (1, ["also a validation voyage"], lambda d: d.train(

@@ -68,8 +68,8 @@ def text(results: Results, chosen_by: str, sizes: pl.DataFrame) -> str:
         tables.table(tuple(sizes.columns), _sizes(sizes)),
         "",
         "L of the test windows; a baseline that holds the velocity has "
-        f"{baselines['hold']:.0f}, quadratic least squares on the reference set "
-        f"{baselines['least_squares']:.0f}.",
+        f"{baselines['hold']:.0f}, quadratic least squares on the data of "
+        f"{named(run.name)} {baselines['least_squares']:.0f}.",
         "",
         tables.table(("set", "seeds", "best validation L, median", "mean test L", "least", "most"),
                      losses),
