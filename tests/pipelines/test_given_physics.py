@@ -5,6 +5,7 @@ import math
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from short_voyages import BOTH, HULL, STATES, WINDOW, scored, train
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
 from shiplog.training import extension_file, load_model
+from shiplog.voyages import one_hertz
 
 # ---------------------------------------------------------------- as published
 
@@ -90,6 +92,21 @@ def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_pa
     kept = extension_file.extend(run, tmp_path / "extended", after, [mine])
     assert load_model.load(kept).extension_numbers()["current"] == pytest.approx([0.1, -0.05])
     assert not list(kept.glob("*.py"))
+
+
+def test_an_extension_was_fitted_to_its_own_voyages_and_shows_no_forces(published, tmp_path):
+    """They test neither it nor a run beside it; the current is no force of the equations."""
+    run = load_model.load(published[0])
+    (current,) = [c for c in CATALOGUE if c.label == "current"]
+    after = run.extended(0).with_causes(
+        [current], {"current": np.array([0.1, -0.05])}, {"current": 1e-4 * np.eye(2)}
+    )
+    after = replace(after, shares={"later": (0.0, 1.0)}, lengths={"later": 150.0})
+    kept = load_model.load(extension_file.extend(run, tmp_path / "extended", after, []))
+    assert run.fitted_to == run.trained_on == kept.trained_on
+    assert kept.fitted_to == (*run.trained_on, "later")
+    rows = one_hertz.with_elapsed(run.training())
+    assert run.forces(rows) is not None and kept.forces(rows) is None
 
 
 def test_a_run_made_before_linear_damping_simulates_what_it_did(published, tmp_path):
