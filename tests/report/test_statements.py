@@ -59,6 +59,21 @@ def test_more_measured_data_is_held_against_the_best_augmented_set():
     assert row["ratio"] == pytest.approx(math.sqrt(1 / 4 * 1.01 / 4.1))
 
 
+def test_more_measured_data_beats_every_augmentation_or_it_is_not_shown():
+    """Surely better than the best, and now better, now worse than another one: not every. Surely
+    worse than one of three is the contrary, whatever the others."""
+    five = [100.0, 101.0, 99.0, 100.0, 102.0]
+    better = {"sli2": five, "sli10": [1.1 * x for x in five], "jit2": [1.3 * x for x in five]}
+    d_ref = [0.5 * x for x in five[:-1]] + [52.0]
+    assert found(losses(d_ref=d_ref, **better), "d-ref")["finding"] == statements.HOLDS
+    noisy = better | {"jit2": [20.0, 900.0, 25.0, 800.0, 100.0]}
+    row = found(losses(d_ref=d_ref, **noisy), "d-ref")
+    assert row["right"] == "sli2" and row["high"] < 1.0
+    assert row["finding"] == statements.UNCLEAR
+    worse = better | {"jit2": [0.25 * x for x in five[:-1]] + [26.0]}
+    assert found(losses(d_ref=d_ref, **worse), "d-ref")["finding"] == statements.FAILS
+
+
 def test_one_seed_has_no_interval_and_shows_nothing():
     row = found(losses(ref=[9], sli2=[1]), "sli2")
     assert row["low"] is None
