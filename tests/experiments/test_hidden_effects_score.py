@@ -258,6 +258,16 @@ def test_medians_and_coverage_are_of_named_causes_by_group():
 # --- probabilities --------------------------------------------------------------------------------
 
 
+def test_lost_thrust_of_another_unit_is_no_estimate_of_it():
+    truth = {"factor": {"value": 0.8, "unit": "1"}, "unit": {"value": "port", "unit": ""}}
+    found = {"factor": {"value": 0.8, "low": 0.79, "high": 0.81, "unit": "1"}}
+    right = compare("thrust_loss", truth, found | {"actuator": {"value": "port"}})
+    assert (right.error, right.covered) == (pytest.approx(0.0), (True,))
+    wrong = compare("thrust_loss", truth, found | {"actuator": {"value": "starboard"}})
+    assert (wrong.error, wrong.covered, wrong.standings) == (1.0, (False,), (math.inf,))
+    assert compare("thrust_loss", truth, found).covered == (True,)
+
+
 def test_calibration_of_ten_bins_by_hand():
     """|0.95 - 1/2| weighs 2 of 4, |0.6 - 1| and |0.05 - 0| weigh 1 of 4 each."""
     reported = [(0.95, True), (0.95, False), (0.6, True), (0.05, False)]
@@ -277,6 +287,28 @@ def test_calibration_of_ten_bins_by_hand():
             TETHER,
             UNKNOWN | {"ranking": [{"name": "unknown:position", "probability": 1}]},
             (1.0, True),
+        ),
+        (  # a cause that is as probable together with the remainder is not the answer
+            TETHER,
+            UNKNOWN
+            | {
+                "ranking": [
+                    {"name": "payload", "probability": 1.0},
+                    {"name": "unknown:position", "probability": 0.97},
+                ]
+            },
+            (0.97, True),
+        ),
+        (
+            CURRENT,
+            UNKNOWN
+            | {
+                "ranking": [
+                    {"name": "current", "probability": 1.0},
+                    {"name": "unknown:position", "probability": 1.0},
+                ]
+            },
+            (1.0, False),
         ),
         (hidden(), NONE, None),
         (hidden(), {"verdict": "failed"}, None),

@@ -61,6 +61,8 @@ class Comparison:
 def compare(name: str, truth: Values, reported: Values) -> Comparison:
     """The error is that of the vector: |reported - true| over |true - none|. What a key says in
     words, such as which unit has lost thrust, is no number and is left out."""
+    unit = _value(truth, "unit", None)  # of several thrusters the one that has lost thrust
+    elsewhere = unit is not None and _value(reported, "actuator", unit) != unit
     truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
     if not any(parameter in reported for parameter in truth):
         return Comparison(None, ())
@@ -69,6 +71,8 @@ def compare(name: str, truth: Values, reported: Values) -> Comparison:
     none = 1.0 if name in FACTORS else 0.0
     away, size = VECTORS.get(name, _plain)(truth, reported, none)
     intervals = list(_intervals(name, truth, reported))
+    if elsewhere:
+        return Comparison(1.0, (False,) * len(intervals), (math.inf,) * len(intervals))
     return Comparison(
         away / size if size > 0.0 else None,
         tuple(within for within, _ in intervals),

@@ -227,9 +227,13 @@ class Answer:
     def belief(self) -> tuple[float, bool] | None:
         """The probability of the answer given, and whether that is right.
 
-        Of a named verdict its first cause; otherwise the first of the ranking, which may be a
-        cause, `none` or `unknown` with its family. None where no probability was given.
+        Of a named verdict its first cause, of `unknown` its family, which may stand behind causes
+        that are as probable together with it; otherwise the first of the ranking. None where no
+        probability was given.
         """
+        if self.word == "unknown" and self.family:
+            probability = self.probability(f"unknown:{self.family}")
+            return None if probability is None else (probability, self.right)
         first = next(iter(self.reported if self.named else self.verdict.get("ranking") or ()), {})
         if first.get("probability") is None:
             return None

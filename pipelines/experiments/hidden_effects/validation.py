@@ -87,6 +87,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
 
 LEGEND = """\
 - **Home** is the simulator's MMG ship; **abroad** are ships of other equations, by family.
+- **Cases of one seed** at home share ship, weather and noise: intervals over them are too narrow.
 - **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it.
 - **Named but wrong**: the verdict names a cause that is not hidden in the case.
 - **Null** is a method that always answers `none`.

@@ -138,12 +138,12 @@ def move(
             wanted = (order[j] - track[i, 6 + j]) / max(one.time, STEP)
             track[i + 1, 6 + j] = track[i, 6 + j] + STEP * min(max(wanted, -one.rate), one.rate)
         behind = _behind(track[: i + 2, 6], i + 0.5 - e.rudder_delay / STEP)
-        acting = (
-            behind
-            if e.rudder_lag <= 0.0
-            else acting + (behind - acting) * (1.0 - math.exp(-STEP / e.rudder_lag))
-        )
-        angle = acting + e.rudder_offset[1]
+        angle = behind
+        if e.rudder_lag > 0.0:  # in the middle of the step, as all controls
+            before = acting
+            acting += (behind - acting) * (1.0 - math.exp(-STEP / e.rudder_lag))
+            angle = 0.5 * (before + acting)
+        angle += e.rudder_offset[1]
         if e.rudder_limit > 0.0:
             angle = min(max(angle, -e.rudder_limit), e.rudder_limit)
         tow = campaign[0] + (campaign[1] - campaign[0]) * share
