@@ -55,12 +55,8 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
             log.info("2/4 %s is trained already", path)
             continue
         split = choose_split(store, (), (), data, 100)
-        log.info(
-            "2/4 training on %s: %s, validating on %s",
-            data,
-            listed(split.training),
-            listed(split.validation),
-        )
+        training, validation = listed(split.training), listed(split.validation)
+        log.info("2/4 training on %s: %s, validating on %s", data, training, validation)
         train_run(Config(data=data, seeds=SEEDS, split=split, fast=RECIPE), store, path)
     path = out / "runs" / "mmg"
     if not path.exists():

@@ -63,7 +63,6 @@ def record(
     sensors = profile.sensors
     compass = path(t)[:, 4] + heading
     gyro = path(t - behind["yaw_rate"])[:, 5] * scale + bias
-
     # the antenna, in the instant that its message speaks of
     p = path(t - behind["position"])
     c, s = np.cos(p[:, 4]), np.sin(p[:, 4])
