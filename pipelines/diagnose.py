@@ -103,7 +103,7 @@ class Campaigns:
 
 
 def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
-    """What was found; where no path of the model can be computed, that it runs away."""
+    """What was found; where no path of the model can be computed, that it diverges."""
     try:
         return _diagnosed(of, out, causes)
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes

@@ -75,10 +75,8 @@ class Priors:
     def causes(self, labels: Sequence[str]) -> float:
         if not labels:
             return math.log(thresholds.NO_CHANGE)
-        # n! orders of n causes are one set
-        further = (len(labels) - 1) * math.log(thresholds.ANOTHER_CAUSE) + math.lgamma(
-            len(labels) + 1.0
-        )
+        further = (len(labels) - 1) * math.log(thresholds.ANOTHER_CAUSE)
+        further += math.lgamma(len(labels) + 1.0)  # n! orders of n causes are one set
         return math.log(1.0 - thresholds.NO_CHANGE) + further + sum(self.each[n] for n in labels)
 
     def of(self, labels: Sequence[str], kind: str) -> float:

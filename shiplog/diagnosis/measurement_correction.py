@@ -51,9 +51,7 @@ def water(causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> np.ndar
     return found
 
 
-def as_hypothesised(
-    cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]
-) -> Cut:  # fmt: skip
+def as_hypothesised(cut: Cut, causes: Sequence[Cause], numbers: Mapping[str, np.ndarray]) -> Cut:
     """The segments with what the causes' numbers do to size and inputs of the discrepancy."""
     return replace(cut, factors=factors(causes, numbers), water=water(causes, numbers))
 

@@ -15,9 +15,7 @@ from shiplog.voyages.store import Store
 log = logging.getLogger(__name__)
 
 
-def held_back(
-    runs: Sequence[RunFolder], store: Store, voyages: Sequence[str] = ()
-) -> list[str]:  # fmt: skip
+def held_back(runs: Sequence[RunFolder], store: Store, voyages: Sequence[str] = ()) -> list[str]:
     """The user's choice, else the first run's own test voyages, else all; of the latter two those
     that no run was fitted to.
 

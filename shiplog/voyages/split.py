@@ -22,16 +22,8 @@ log = logging.getLogger(__name__)
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
 HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
-SHORTER_WINDOWS = (
-    80,
-    60,
-    50,
-    40,
-    30,
-    20,
-    10,
-    LEAST_WINDOW,
-)  # s, windows that may be proposed instead
+# s, windows that may be proposed instead
+SHORTER_WINDOWS = (80, 60, 50, 40, 30, 20, 10, LEAST_WINDOW)
 
 
 def choose_split(
