@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from contextlib import closing
@@ -66,3 +67,31 @@ def test_closing_the_queue_ends_its_processes(tmp_path):
             time.sleep(0.05)
     with pytest.raises(ProcessLookupError):
         os.kill(int(path.read_text(encoding="utf-8")), 0)
+
+
+INTERRUPTED = """
+import multiprocessing.util, signal, sys
+from shiplog.training.queue import Task, cores, work
+
+began = multiprocessing.util.spawnv_passfds
+
+def interrupted(*arguments):
+    child = began(*arguments)
+    if "spawn_main" in str(arguments):  # not multiprocessing's own helper
+        signal.raise_signal(signal.SIGNAL)
+    return child
+
+multiprocessing.util.spawnv_passfds = interrupted
+signal.signal(signal.SIGNAL, lambda number, _: sys.exit(128 + number))
+list(work([Task("a", cores, ())], 1))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_while_a_process_begins_leaves_no_trace(name):
+    """It comes when the child is there and has not been told its work."""
+    script = INTERRUPTED.replace("SIGNAL", name)
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert ended.returncode == 128 + getattr(signal, name)
+    assert ended.stderr == ""
