@@ -98,9 +98,9 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         yield _written(target, parts, profile, ship, path)
     else:
         profile = columns.required(profile, path)
-        voyages, nameless = columns.voyages(read_table(path, profile.table), profile, path)
-        if nameless:
-            done.lost[str(path)] = f"{nameless} rows whose voyage is blank"
+        voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
+        if lost:
+            done.lost[str(path)] = ", ".join(lost)
         for name, part in voyages:
             series = columns.series(part, profile)
             yield _written(out / f"{name}.mcap", series, profile, ship, path)

@@ -73,19 +73,23 @@ def _limits(verdict: Verdict) -> list[str]:
         return []
     lines = [
         "## Smallest detectable sizes", "",
-        "A cause below this size may be present and not found: each number alone, and all "
-        "numbers together as a share of the realistic size.", "",
+        "A cause below this size may be present and not found: the change of each number alone, "
+        "and all numbers together as a share of the realistic size.", "",
         "| cause | detectable from | of realistic size |", "| --- | --- | ---: |",
     ]  # fmt: skip
     for one in verdict.limits:
         numbers = ", ".join(
-            f"{k.replace('_', ' ')} {v['value']:.2g} {v['unit']}".removesuffix(" 1")
-            for k, v in one["parameters"].items()
+            f"{k.replace('_', ' ')} {_change(**v)}" for k, v in one["parameters"].items()
         )
         label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
         share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
         lines.append(f"| {label} | {numbers} | {share} |")
     return [*lines, ""]
+
+
+def _change(value: float, unit: str) -> str:
+    """Of a factor or a share in per cent."""
+    return f"{100 * value:.2g}%" if unit == "1" else f"{value:.2g} {unit}"
 
 
 def _errors(verdict: Verdict) -> list[str]:

@@ -151,6 +151,13 @@ def test_words_among_numbers_are_blanks_and_reported(tmp_path, caplog):
     assert not done.refused
 
 
+def test_rows_without_a_time_are_lost_and_blank_rows_are_none(tmp_path):
+    rows = [f"{i / 10 if i != 3 else ''},{i},0,1,0,5" for i in range(30)]
+    (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *rows, ",,,,,", ",,,,,"]))
+    done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "mine"), tmp_path)
+    assert done.lost == {str(tmp_path / "t.csv"): "1 row without a time"}
+
+
 def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     rows = [f"{i / 10},{i},0,1,0,5" for i in range(30)]
     (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *reversed(rows)]))

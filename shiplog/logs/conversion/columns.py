@@ -48,11 +48,11 @@ def required(profile: Profile | None, path: Path) -> Profile:
 
 def voyages(
     table: DelimitedTable, profile: Profile, path: Path
-) -> tuple[Iterator[tuple[str, pl.DataFrame]], int]:
-    """The table in SI, a column a channel and `time` in ns, one part a voyage; and how many rows
-    are of no voyage, since that column is blank.
+) -> tuple[Iterator[tuple[str, pl.DataFrame]], list[str]]:
+    """The table in SI, a column a channel and `time` in ns, one part a voyage; and which rows are
+    in none, since their time or their voyage is blank. Rows that are blank throughout are no rows.
 
-    Rows without a time are dropped, and reported; without a voyage column the file is one voyage.
+    Without a voyage column the file is one voyage.
     Raises ChannelMissing for columns that are not there, ProfileError for what cannot be read.
     """
     if not profile.table:
@@ -72,16 +72,19 @@ def voyages(
             columns.append(_si(frame[name], column, path))
         elif column.channel == "voyage":
             columns.append(text_of(frame[name]).rename("voyage"))
-    si = pl.DataFrame(columns).filter(pl.col("time").is_not_null())
-    if si.height < frame.height:
-        log.warning("%s: %d rows without a time left out", path.name, frame.height - si.height)
+    every = pl.DataFrame(columns)
+    si = every.filter(pl.col("time").is_not_null())
+    timeless = every.filter(pl.col("time").is_null() & pl.any_horizontal(
+        pl.exclude("time", "voyage").is_finite()
+    )).height  # fmt: skip
+    lost = [f"{timeless} row{'s' * (timeless > 1)} without a time"] if timeless else []
     if si.height == 0:
         raise ProfileError(
             f"{path.name}: no row of {listed(_named(present, 'time'))} holds a time.",
             hint="correct `unit` or `format` of that column in [table].",
         )
     if "voyage" not in si.columns:
-        return _in_order([(path.stem, si)], path), 0
+        return _in_order([(path.stem, si)], path), lost
     named = si.filter(pl.col("voyage").str.strip_chars() != "")
     if named.height == 0:
         raise ProfileError(
@@ -89,7 +92,9 @@ def voyages(
             hint="fill that column, or take it out of [table]: the file is then one voyage.",
         )
     parts = [(str(name), part) for (name,), part in named.group_by("voyage", maintain_order=True)]
-    return _in_order(parts, path), si.height - named.height
+    if nameless := si.height - named.height:
+        lost.append(f"{nameless} rows whose voyage is blank")
+    return _in_order(parts, path), lost
 
 
 def _in_order(
