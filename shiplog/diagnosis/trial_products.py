@@ -19,7 +19,6 @@ from shiplog.diagnosis.likelihood import Modes, Weighed
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
-from shiplog.diagnosis.voyage_effects import reduced
 
 KEPT_MODES = 4  # 20 MB each
 KEPT_TOTALS = 41  # one point needs about a dozen levels, and again for each family
@@ -120,12 +119,11 @@ class Products:
         self, point: Point, noise: float, weight: np.ndarray, remainder: Remainder
     ) -> tuple[dict[object, np.ndarray], float]:
         """Products of each voyage, and log|I + D^½ M D^½| of all."""
-        deviation = self._deviation(remainder)
         each = self.of_parts(point, noise, weight, remainder)
-        parts, volumes = zip(*(reduced(gram, deviation) for gram in each), strict=True)
-        apart = self._campaign.apart * deviation
-        voyages, more = campaign_prior.of_voyages(parts, self._voyage, apart)
-        return dict(zip(np.unique(self._voyage), voyages, strict=True)), sum(volumes) + sum(more)
+        grams, volumes = campaign_prior.voyages_of(
+            each, self._voyage, self._deviation(remainder), self._campaign.apart
+        )
+        return dict(zip(np.unique(self._voyage), grams, strict=True)), sum(volumes)
 
     def _deviation(self, remainder: Remainder) -> np.ndarray:
         """[C] of a part's own numbers; of the families that no campaign shows there are none."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
-from shiplog.diagnosis.campaign_prior import INFORMATION_SHARES, learn, prior
+from shiplog.diagnosis.campaign_prior import INFORMATION_SHARES, learn, prior, voyages_of
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 
 EACH = np.arange(12)  # parts that are voyages of their own
@@ -94,3 +95,20 @@ def test_how_far_campaigns_are_apart_is_what_the_voyages_say():
     assert np.mean([apart for apart, _ in far]) > 0.67
     # what voyages differ in is no reason to count less
     assert sum(share == 1.0 for _, share in (*near, *far)) >= 6
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.6])
+def test_products_of_voyages_are_those_of_a_dense_covariance(apart):
+    """e = J d + ε, ε ~ N(0, I + J (D + a² D) Jᵀ) within a part and J a² D Jᵀ between the parts of
+    a voyage; one of three voyages has two parts."""
+    rng = np.random.default_rng(1)
+    voyages, deviation = np.array([0, 1, 1, 2]), np.array([0.5, 0.0, 2.0])
+    drawn = [rng.standard_normal((12, 4)) for _ in voyages]
+    found, volumes = voyages_of([both.T @ both for both in drawn], voyages, deviation, apart)
+    for name, gram, volume in zip((0, 1, 2), found, volumes, strict=True):
+        own = [both for both, of in zip(drawn, voyages, strict=True) if of == name]
+        both, j = np.concatenate(own), block_diag(*(one[:, 1:] * deviation for one in own))
+        shared = np.concatenate([one[:, 1:] for one in own]) * apart * deviation
+        covariance = np.eye(len(both)) + np.asarray(j @ j.T) + shared @ shared.T
+        assert gram == pytest.approx(both.T @ np.linalg.solve(covariance, both))
+        assert volume == pytest.approx(np.linalg.slogdet(covariance)[1])
