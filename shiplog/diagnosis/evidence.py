@@ -56,7 +56,8 @@ def level(
     volume = trial.products.volume(trial.first, noise, trial.weight, remainder)
     found = solve(trial, total, volume, noise, point, included, remainder)
     value = found.value + noise_prior(noise, trial.nominal_spread, remainder)
-    return replace(found, value=value + _within(trial, found, point, included))
+    share = _within(trial, found, point, included)
+    return replace(found, value=value + share, share=share)
 
 
 def solve(
@@ -157,7 +158,16 @@ def fit(
 
 def _found(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> Found:
     numbers, covariance = numbers_of(trial, one, point, included)
-    return Found("nothing", one.value, one.noise_factor, numbers, covariance)
+    density = one.value - one.share - _gained(trial, one, included)
+    return Found("nothing", one.value, one.noise_factor, numbers, covariance, density=density)
+
+
+def _gained(trial: Trial, one: Level, included: Sequence[str]) -> float:
+    """Log evidence less the log density of the numbers that the point was linearised at."""
+    columns, first = trial.reference.columns, len(trial.reference.pull)
+    own = slice(first, first + sum(len(columns.of[n]) for n in included))
+    step, spread = one.solution[own], one.inverse[own, own]
+    return 0.5 * float(step @ np.linalg.solve(spread, step) + np.linalg.slogdet(spread)[1])
 
 
 def _with(trial: Trial, one: Level, label: str) -> Found:

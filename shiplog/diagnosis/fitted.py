@@ -20,6 +20,8 @@ class Found:
                    structure its log Bayes factor over the base hypothesis
     noise_factor   λ, the most probable factor of the process noise
     numbers        of each cause, as a change from nominal, with their covariance
+    density        of a base hypothesis the log density of the data and of the numbers where it was
+                   linearised
     expected       of a candidate: the log Bayes factor to expect of it, by its size
     """
 
@@ -29,6 +31,7 @@ class Found:
     numbers: Mapping[str, np.ndarray] = field(default_factory=dict)
     covariance: np.ndarray | None = None
     expected: ExpectedEvidence | None = None
+    density: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -89,3 +92,4 @@ class Level:
     inverse: np.ndarray  # of information and data together, base's own numbers last
     solution: np.ndarray
     value: float  # log evidence of the base
+    share: float = 0.0  # of it, what the bounds of numbers add

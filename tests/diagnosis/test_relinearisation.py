@@ -1,0 +1,73 @@
+"""Gauss-Newton on functions whose steps are known in closed form."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shiplog.diagnosis import evidence, relinearisation
+from shiplog.diagnosis.fitted import Found
+from shiplog.diagnosis.relinearisation import RELINEARISATIONS, converge
+
+NOISE = 0.1
+
+
+def fits(monkeypatch, function, slope):
+    """A trial that sees function(x) with NOISE where it is 0; the points x that were asked for."""
+    asked = []
+
+    def at(numbers, *_):
+        asked.append(float(numbers["x"][0]))
+        linear = SimpleNamespace(e=np.zeros(1))
+        return SimpleNamespace(numbers=numbers, path=None, linear=linear)
+
+    def fit(_trial, point, *_):
+        (x,) = point.numbers["x"]
+        off, by = -function(x) / NOISE, slope(x) / NOISE
+        step = off / by
+        density = -0.5 * off**2
+        value = density + 0.5 * (step * by) ** 2 - np.log(by)
+        return Found("", value, 1.0, {"x": np.array([x + step])}, np.eye(1) / by**2,
+                     density=density)  # fmt: skip
+
+    monkeypatch.setattr(evidence, "fit", fit)
+    monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    return SimpleNamespace(at=at, converged={}, first=None), asked
+
+
+def test_what_is_linear_takes_one_step(monkeypatch):
+    trial, asked = fits(monkeypatch, lambda x: 2.0 * (x - 3.0), lambda x: 2.0)
+    _, found = converge(trial, ("x",), {"x": np.zeros(1)}, None)
+    assert found.numbers["x"] == pytest.approx([3.0])
+    assert found.evidence == pytest.approx(-np.log(2.0 / NOISE))
+    assert asked == pytest.approx([0.0, 3.0])
+
+
+@pytest.mark.parametrize("begin", [1.0, 2.0, 5.0])
+def test_a_step_too_far_is_halved(monkeypatch, begin):
+    """Newton's steps on arctan run away from 0 where they begin beyond 1.39."""
+    trial, asked = fits(monkeypatch, np.arctan, lambda x: 1.0 / (1.0 + x**2))
+    _, found = converge(trial, ("x",), {"x": np.array([begin])}, None)
+    assert found.numbers["x"] == pytest.approx([0.0], abs=0.2 * NOISE)
+    assert found.evidence == pytest.approx(-np.log(1.0 / NOISE), abs=0.1)
+    assert len(asked) <= RELINEARISATIONS
+
+
+def test_a_fit_without_end_has_the_evidence_of_the_best_numbers_that_it_met(monkeypatch):
+    """Newton's steps on a cube root go to -2x for ever: each is a step too far."""
+    trial, asked = fits(monkeypatch, np.cbrt, lambda x: np.abs(x) ** (-2.0 / 3.0) / 3.0)
+    point, found = converge(trial, ("x",), {"x": np.array([1.0])}, None)
+    best = min(np.abs(asked))
+    assert abs(point.numbers["x"][0]) == best and found.numbers == point.numbers
+    by = best ** (-2.0 / 3.0) / 3.0 / NOISE
+    assert found.evidence == pytest.approx(-0.5 * best ** (2.0 / 3.0) / NOISE**2 - np.log(by))
+
+
+def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
+    """A slope that is a half too steep leaves a third of the way at each step: 30, 10, 3.3 ..."""
+    trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.5)
+    _, found = converge(trial, ("x",), {"x": np.array([3.0])}, None)
+    assert abs(found.numbers["x"][0]) < relinearisation.LEFT * NOISE
+    assert asked[:3] == pytest.approx([3.0, 1.0, 1.0 / 3.0])
