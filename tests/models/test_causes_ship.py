@@ -71,6 +71,12 @@ def test_fouling_and_cross_flow_are_what_the_hull_feels_straight_ahead_and_abeam
     still = (np.zeros((1, 4)), CALM, off)
     x = forces("fouling", [0.6], ahead, *still)[0, 0]
     assert x == pytest.approx(1.6 * q * of["hull.x_0f"] * 0.49, rel=1e-3)
+    # of a ship whose resistance is in part proportional to its speed, too
+    hull = {"hull.x_0f": -0.02, "hull.x_0a": -0.03, "hull.x_u": -0.01, "hull.c_d": 0.5}
+    fouled = BY["fouling"].coefficients(hull, [0.6], None, None, {})
+    assert fouled == pytest.approx(
+        {"hull.x_0f": -0.032, "hull.x_0a": -0.048, "hull.x_u": -0.016, "hull.c_d": 0.5}
+    )
     abeam = np.array([[0.0, 0.0, 0.0, -0.3, 0.2, 0.0]])
     y = forces("cross_flow_drag", [0.35], abeam, *still)[0, 1]
     assert y == pytest.approx(1.35 * q * of["hull.c_d"] * 0.09, rel=1e-9)

@@ -67,8 +67,8 @@ class Fouling(_Factor):
 
     name = "fouling"
     story = "The hull resistance has changed by fouling."
-    equation = "X'₀·{factor:.2f}"
-    scaled = ("hull.x_0f", "hull.x_0a")
+    equation = "X'₀, X'_u·{factor:.2f}"
+    scaled = ("hull.x_0f", "hull.x_0a", "hull.x_u")
     parameters = (Parameter("factor", "1", 0.45, 0.06, low=-1.0),)
     separated_by = {
         "thrust_loss": "bollard pull (high revolutions at rest) against coasting (propeller "
