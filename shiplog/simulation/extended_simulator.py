@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
@@ -22,6 +23,7 @@ from shiplog.voyages.windows import Windows
 
 NUMBER_DRAWS = 12  # of the causes' numbers, for the spread of the states
 SEED = 0
+LATER_DEVIATION = 1e-6  # SI, of numbers that a cause did not have yet when a run was extended by it
 
 Shares = Mapping[str, tuple[float, float]]  # voyage → share of the campaign at its start and end
 
@@ -183,10 +185,14 @@ class Extension:
             made = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["made"].items()}
             cause = replace(kind, **made)
             causes.append(cause)
-            numbers[cause.label] = np.array(entry["numbers"])
-            part = slice(at, at + cause.count)
-            covariance[cause.label] = np.atleast_2d(arrays["covariance"])[part, part]
-            at += cause.count
+            values = np.array(entry["numbers"])
+            part = slice(at, at + len(values))
+            spread = np.atleast_2d(arrays["covariance"])[part, part]
+            # numbers that a cause did not have yet stay where they change nothing
+            later = cause.count - len(values)
+            numbers[cause.label] = np.append(values, np.zeros(later))
+            covariance[cause.label] = block_diag(spread, LATER_DEVIATION**2 * np.eye(later))
+            at += len(values)
         constants = {
             k.removeprefix("constant."): v for k, v in arrays.items() if k.startswith("constant.")
         }

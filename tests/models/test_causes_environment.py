@@ -194,14 +194,15 @@ def test_shallow_water_acts_where_it_is_shallow():
     """One bump of the map: the hull's drag grows there by 1.2 of it, and far away not at all."""
     off = ("propeller", "rudder", "wind")
     still = (np.zeros((1, 4)), CALM, off)
-    strength = np.zeros(12)
+    nothing = np.zeros(BY["shallow_water"].count)
+    strength = nothing.copy()
     strength[4] = 0.5
 
     def drag(at):
         abeam = np.array([[at[0], 0.0, at[1], 0.3, 0.0, 0.0]])
         model, values = extended([BY["shallow_water"]], without=off)
         found = acceleration(model, values, strength, abeam, *still[:2])[0]
-        plain = acceleration(model, values, np.zeros(12), abeam, *still[:2])[0]
+        plain = acceleration(model, values, nothing, abeam, *still[:2])[0]
         return found[1] / plain[1]
 
     near, away = drag(PLACES[4]), drag(PLACES[4] + 200.0)
@@ -214,6 +215,21 @@ def test_shallow_water_acts_where_it_is_shallow():
     assert near == pytest.approx(1.6 / heavier, rel=0.02)
 
 
+@pytest.mark.parametrize(("place", "name", "grows"), [
+    (12, "hull.x_0f", 0.3), (13, "hull.y_v", 0.8), (14, "body.m_y", 0.7), (15, "body.i_j", 0.2),
+])  # fmt: skip
+def test_each_force_grows_with_depth_by_a_factor_of_its_own(place, name, grows):
+    """Next to that of the cross-flow drag, which is the map's measure."""
+    p = np.zeros(16)
+    p[4], p[place] = 0.5, np.log(2.0)
+    state = np.array([PLACES[4][0], 0.0, PLACES[4][1], 0.0, 0.0, 0.0])
+    at = {"shallow.places": PLACES, "shallow.spacing": 0.1}  # no bump but the one
+    plain = {"hull.c_d": 1.0, name: 3.0}
+    found = BY["shallow_water"].coefficients(plain, list(p), jnp.asarray(state), 0.0, at)
+    assert found["hull.c_d"] == pytest.approx(1.6)
+    assert found[name] == pytest.approx(3.0 * (1.0 + 2.0 * grows * 0.5))
+
+
 def test_no_water_is_deeper_than_deep():
     """A map may be less than none where bumps overlap: the forces there are deep water's, and
     what a first look asks of a flat map is the slope that a shoal has."""
@@ -222,12 +238,12 @@ def test_no_water_is_deeper_than_deep():
     still = (np.zeros((1, 4)), CALM)
 
     def at(strength):
-        return acceleration(model, values, np.eye(12)[4] * strength, abeam, *still)
+        return acceleration(model, values, np.eye(16)[4] * strength, abeam, *still)
 
     assert at(-0.3) == pytest.approx(at(0.0), abs=1e-12)
     slope = jax.jacfwd(
         lambda s: model.acceleration(
-            jnp.concatenate((jnp.asarray(values), jnp.eye(12)[4] * s)),
+            jnp.concatenate((jnp.asarray(values), jnp.eye(16)[4] * s)),
             abeam, *still,
         )
     )(0.0)  # fmt: skip

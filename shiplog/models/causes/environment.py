@@ -118,10 +118,24 @@ class WindForce(Cause):
         )
 
 
+# What grows in shallow water, by how much per unit of the map: of a full ship's derivatives, by the
+# formulas of Kijima et al. 1990
+GROWS = (
+    (("hull.c_d",), 1.2),
+    (("hull.x_0f", "hull.x_0a"), 0.3),
+    (("hull.y_v", "hull.n_r"), 0.8),
+    (("body.m_y",), 0.7),
+    (("body.i_j",), 0.2),
+)
+GROWS_TIMES = 0.5  # standard deviation of the logarithm of each growth: a factor of 1.6
+
+
 @dataclass(frozen=True)
 class ShallowWater(Cause):
     """Hull forces and added masses grow where the water is shallow; a map of how much, since no
-    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990.
+    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990. That differs
+    from hull to hull and from formula to formula, and is known to a factor only (`GROWS_TIMES`):
+    after the map come logarithms of such factors, of all growths but the cross-flow drag's.
 
     Size: theirs has a full ship's sway damping a quarter larger at a depth of twice the draught,
     which is 0.3 here; PIANC 2014 begins to count shallow water at 3 draughts, and ends at 1.1."""
@@ -137,7 +151,7 @@ class ShallowWater(Cause):
 
     @property
     def count(self) -> int:
-        return self.places
+        return self.places + len(GROWS) - 1
 
     def missing(self, setting: Setting) -> str | None:
         return None if len(setting.places) == self.places else "the ship stayed in one place"
@@ -146,23 +160,26 @@ class ShallowWater(Cause):
         return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.full(self.places, 0.3)
+        return self._each(0.3, GROWS_TIMES)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        return np.full(self.places, -0.5), np.full(self.places, 5.0)
+        return self._each(-0.5, -4.0 * GROWS_TIMES), self._each(5.0, 4.0 * GROWS_TIMES)
+
+    def _each(self, of_map: float, of_form: float) -> np.ndarray:
+        return np.repeat([of_map, of_form], [self.places, self.count - self.places])
 
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         near = _bumps(state, at["shallow.places"], at["shallow.spacing"])
-        depth = (near * jnp.stack(p)).sum(-1)
+        depth = (near * jnp.stack(p[: self.places])).sum(-1)
         depth = jnp.where(depth >= 0.0, depth, 0.0)  # no water is deeper than deep
-        grow = {
-            "hull.x_0f": 0.3, "hull.x_0a": 0.3, "hull.y_v": 0.8, "hull.n_r": 0.8,
-            "hull.c_d": 1.2, "body.m_y": 0.7, "body.i_j": 0.2,
-        }  # fmt: skip
-        return c | {k: c[k] * (1.0 + share * depth) for k, share in grow.items()}
+        grown = {}
+        for (names, grows), form in zip(GROWS, (0.0, *p[self.places :]), strict=True):
+            factor = 1.0 + grows * jnp.exp(form) * depth
+            grown |= {name: c[name] * factor for name in names if name in c}
+        return c | grown
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
-        return {"strength": (p.max(-1), "1")}
+        return {"strength": (p[..., : self.places].max(-1), "1")}
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         return (
@@ -171,7 +188,7 @@ class ShallowWater(Cause):
         )
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p.max(-1) > 0.05)
+        return np.asarray(p[..., : self.places].max(-1) > 0.05)
 
 
 def _bumps(state: Any, places: Any, spacing: Any) -> Any:
