@@ -99,12 +99,13 @@ def _named(
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
         form = thresholds.FORM_ERROR * numbers  # its equations are no better than that
+        unit = by[label].unit_error * numbers  # nor is what they are measured in, one with another
         given.append(
             Named(
                 by[label], table.alone.get(label, float("nan")),
                 found.names.get(name_of(label), 0.0), numbers,
-                best.found.covariance[part, part] + np.diag(form**2), tuple(others), others,
-                table.trial.reference.freedom,
+                best.found.covariance[part, part] + np.diag(form**2) + np.outer(unit, unit),
+                tuple(others), others, table.trial.reference.freedom,
             )
         )  # fmt: skip
     return tuple(given)

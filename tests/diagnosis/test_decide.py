@@ -54,6 +54,12 @@ def test_two_names_each_with_its_own_part_of_the_covariance(trial, monkeypatch):
     drag, two = decide(made)[0].named
     assert drag.covariance.tolist() == [[4.0]]
     assert two.covariance.tolist() == whole[1:, 1:].tolist()
+    # both numbers of one cause are measured in one unit
+    monkeypatch.setattr(type(two.cause), "unit_error", 0.1)
+    _, two = decide(made)[0].named
+    assert two.covariance == pytest.approx(
+        whole[1:, 1:] + 0.01 * np.outer(two.numbers, two.numbers)
+    )
 
 
 def test_neither_of_two_is_named(trial):

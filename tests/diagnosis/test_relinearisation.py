@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from shiplog.diagnosis.relinearisation import RELINEARISATIONS, converge
 NOISE = 0.1
 
 
-def fits(monkeypatch, function, slope):
+def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
     """A trial that sees function(x) with NOISE where it is 0; the points x that were asked for."""
-    asked = []
+    asked: list[float] = []
 
     def at(numbers, *_):
         asked.append(float(numbers["x"][0]))

@@ -128,6 +128,7 @@ class Cause:
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
+    unit_error: ClassVar[float] = 0.0  # share by which what its numbers are measured in may be off
 
     @property
     def label(self) -> str:

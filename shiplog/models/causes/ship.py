@@ -203,12 +203,14 @@ class Payload(Cause):
 
     Size: deadweight is half of a cargo ship's displacement and more (Schneekluth & Bertram 1998);
     of that, as much as leaves the draught about what it was, a quarter of the length off midship.
+    Motion tells it as a share of the inertia with added masses, which formulas know to a tenth.
     """
 
     name = "payload"
     kind = "ship"
     story = "The ship carries a load."
     equation = "m + {mass:.1f} kg at {position:+.2f} m"
+    unit_error = 0.1
     parameters = (
         Parameter("mass", "kg", 0.2, 0.015, of="mass", low=-0.5),
         Parameter("moment", "kg m", 0.05, 0.004, of="moment"),
