@@ -150,9 +150,9 @@ def test_a_bank_draws_in_and_turns_the_bow_out():
     off = ("propeller", "rudder", "wind")
     still = (np.zeros((1, 4)), CALM, off)
 
-    def pull(heading, u, y0):
+    def pull(heading, u, y0, *form):
         state = np.array([[0.0, u, y0, 0.0, heading, 0.0]])
-        one, none = (forces("bank", [p], state, *still) for p in (1.0, 0.0))
+        one, none = (forces("bank", [p, *(form or (0.0, 0.0))], state, *still) for p in (1.0, 0.0))
         return (one - none)[0]
 
     north, south = pull(0.0, 0.6, 38.0), pull(math.pi, 0.6, 38.0)
@@ -164,6 +164,10 @@ def test_a_bank_draws_in_and_turns_the_bow_out():
     gap = (2.0 - 0.5 * 0.489) / 9.0
     q = 0.5 * 1000.0 * 3.0 * 0.201
     assert north[1] == pytest.approx(0.15 * q * 0.36 / (1.0 + gap**3), rel=1e-4)
+    # one that reaches half as far, and one that turns the ship twice as much
+    short, bent = pull(0.0, 0.6, 38.0, np.log(0.5), 0.0), pull(0.0, 0.6, 38.0, 0.0, np.log(2.0))
+    assert short == pytest.approx(north * (1.0 + gap**3) / (1.0 + (2.0 * gap) ** 3), rel=1e-3)
+    assert bent == pytest.approx(north * [1, 1, 2], rel=1e-6, abs=1e-9)
 
 
 def test_a_wall_attracts_as_much_however_many_points_its_line_has():
@@ -182,7 +186,7 @@ def test_a_wall_attracts_as_much_however_many_points_its_line_has():
         profile = here.profile.model_copy(update={"site": site})
         at = Bank().constants(replace(here, profile=profile))
         state = np.array([[0.1, 0.6, 38.0, 0.0, 0.0, 0.0]])
-        return np.asarray(Bank().force(np.ones(1), state, at))[0]
+        return np.asarray(Bank().force(np.array([1.0, 0.0, 0.0]), state, at))[0]
 
     whole = pull(2)
     assert whole[0] == pytest.approx(0.0, abs=1e-9)

@@ -127,14 +127,15 @@ GROWS = (
     (("body.m_y",), 0.7),
     (("body.i_j",), 0.2),
 )
-GROWS_TIMES = 0.5  # standard deviation of the logarithm of each growth: a factor of 1.6
+# Standard deviation of the logarithm of what of a form is known to a factor only: 1.6
+FORM_TIMES = 0.5
 
 
 @dataclass(frozen=True)
 class ShallowWater(Cause):
     """Hull forces and added masses grow where the water is shallow; a map of how much, since no
     chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990. That differs
-    from hull to hull and from formula to formula, and is known to a factor only (`GROWS_TIMES`):
+    from hull to hull and from formula to formula, and is known to a factor only (`FORM_TIMES`):
     after the map come logarithms of such factors, of all growths but the cross-flow drag's.
 
     Size: theirs has a full ship's sway damping a quarter larger at a depth of twice the draught,
@@ -160,10 +161,10 @@ class ShallowWater(Cause):
         return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return self._each(0.3, GROWS_TIMES)
+        return self._each(0.3, FORM_TIMES)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        return self._each(-0.5, -4.0 * GROWS_TIMES), self._each(5.0, 4.0 * GROWS_TIMES)
+        return self._each(-0.5, -4.0 * FORM_TIMES), self._each(5.0, 4.0 * FORM_TIMES)
 
     def _each(self, of_map: float, of_form: float) -> np.ndarray:
         return np.repeat([of_map, of_form], [self.places, self.count - self.places])
@@ -200,7 +201,9 @@ def _bumps(state: Any, places: Any, spacing: Any) -> Any:
 
 @dataclass(frozen=True)
 class Bank(Cause):
-    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974).
+    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974). How far it
+    reaches and how much it turns the ship are known to a factor only (`FORM_TIMES`): after the
+    strength come logarithms of both.
 
     Size: all of it. The profile shows the bank and the model has none; published formulas differ
     from each other by about a factor of two (Vantorre, Delefortrie et al. 2003)."""
@@ -209,9 +212,24 @@ class Bank(Cause):
     kind = "environment"
     needs = ("bank",)
     story = "A bank attracts the ship."
-    equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/L/3)³), N bow out"
+    equation = "Y = {strength:.2f} · 0.15 · ½ρLd u² / (1 + (gap/reach)³), N bow out"
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
     separated_by = {"shallow_water": "the same run farther from the bank"}
+
+    @property
+    def count(self) -> int:
+        return 3
+
+    def sizes(self, setting: Setting) -> np.ndarray:
+        return np.append(super().sizes(setting), np.full(2, FORM_TIMES))
+
+    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        low, high = super().bounds(setting)
+        limit = np.full(2, 4.0 * FORM_TIMES)
+        return np.append(low, -limit), np.append(high, limit)
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return super().practical(p[..., :1], setting)
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         banks = setting.profile.site.banks
@@ -237,14 +255,15 @@ class Bank(Cause):
         distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
         gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
         one = jnp.ones((len(lines), len(lines)))  # as a run has it that was extended before
-        near = _nearest(distance, at.get("bank.same", one)) / (1.0 + (gap / (3.0 * length)) ** 3)
+        reach, turning = 3.0 * length * jnp.exp(p[1]), -0.25 * length * jnp.exp(p[2])
+        near = _nearest(distance, at.get("bank.same", one)) / (1.0 + (gap / reach) ** 3)
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
         ahead = (c * to[..., 0] + s * to[..., 1]) / distance
         starboard = (c * to[..., 1] - s * to[..., 0]) / distance
         u = state[..., 1, None]
         pull = 0.15 * 0.5 * density * length * draught * (u * starboard) ** 2 * near * p[0]
         lead = u / jnp.sqrt(u * u + 1e-4)
-        turn = -0.25 * length * pull * starboard * lead
+        turn = turning * pull * starboard * lead
         return jnp.stack(((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1)
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
