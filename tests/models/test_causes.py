@@ -154,7 +154,7 @@ def test_words_speak_degrees_and_factors():
     ("label", "number"),
     [("current", [0.0, 0.02]), ("heading_offset", [-0.006]), ("rudder_lag", [0.15]),
      ("rudder_offset", [0.0, -0.01]), ("payload", [5.0, 0.0]), ("antenna_offset", [0.05, 0.0]),
-     ("shallow_water", [0.1] + [0.0] * 15)],
+     ("shallow_water", [0.1] + [0.0] * 17)],
 )  # fmt: skip
 def test_small_is_no_matter(label, number):
     cause = BY[label].on(setting())

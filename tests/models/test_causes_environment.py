@@ -220,11 +220,12 @@ def test_shallow_water_acts_where_it_is_shallow():
 
 
 @pytest.mark.parametrize(("place", "name", "grows"), [
-    (12, "hull.x_0f", 0.3), (13, "hull.y_v", 0.8), (14, "body.m_y", 0.7), (15, "body.i_j", 0.2),
+    (12, "hull.x_0f", 0.3), (13, "hull.y_v", 0.8), (14, "hull.n_v", 1.4), (15, "hull.n_r", 0.5),
+    (16, "body.m_y", 0.7), (17, "body.i_j", 0.2),
 ])  # fmt: skip
 def test_each_force_grows_with_depth_by_a_factor_of_its_own(place, name, grows):
     """Next to that of the cross-flow drag, which is the map's measure."""
-    p = np.zeros(16)
+    p = np.zeros(18)
     p[4], p[place] = 0.5, np.log(2.0)
     state = np.array([PLACES[4][0], 0.0, PLACES[4][1], 0.0, 0.0, 0.0])
     at = {"shallow.places": PLACES, "shallow.spacing": 0.1}  # no bump but the one
@@ -242,12 +243,12 @@ def test_no_water_is_deeper_than_deep():
     still = (np.zeros((1, 4)), CALM)
 
     def at(strength):
-        return acceleration(model, values, np.eye(16)[4] * strength, abeam, *still)
+        return acceleration(model, values, np.eye(18)[4] * strength, abeam, *still)
 
     assert at(-0.3) == pytest.approx(at(0.0), abs=1e-12)
     slope = jax.jacfwd(
         lambda s: model.acceleration(
-            jnp.concatenate((jnp.asarray(values), jnp.eye(16)[4] * s)),
+            jnp.concatenate((jnp.asarray(values), jnp.eye(18)[4] * s)),
             abeam, *still,
         )
     )(0.0)  # fmt: skip

@@ -123,7 +123,9 @@ class WindForce(Cause):
 GROWS = (
     (("hull.c_d",), 1.2),
     (("hull.x_0f", "hull.x_0a"), 0.3),
-    (("hull.y_v", "hull.n_r"), 0.8),
+    (("hull.y_v",), 0.8),
+    (("hull.n_v",), 1.4),
+    (("hull.n_r",), 0.5),
     (("body.m_y",), 0.7),
     (("body.i_j",), 0.2),
 )
@@ -146,7 +148,7 @@ class ShallowWater(Cause):
     name = "shallow_water"
     kind = "environment"
     story = "The water is shallow in places."
-    equation = "X₀, Y_v, N_r, C_D, m_y and J grow with a map of depth; at most {strength:.2f}"
+    equation = "X₀, Y_v, N_v, N_r, C_D, m_y, J grow with a map of depth; at most {strength:.2f}"
     parameters = ()
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
 
