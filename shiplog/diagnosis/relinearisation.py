@@ -117,11 +117,21 @@ def converge(
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
             trial.converged[key] = (base.numbers, point.path, base.noise_factor)
             return point, replace(base, name="+".join(included))
+    return _without_end(trial, included, remainder, best, numbers)
+
+
+def _without_end(
+    trial: Trial, included: Sequence[str], remainder: Remainder, best: _Stand | None,
+    numbers: Mapping[str, np.ndarray],
+) -> tuple[Point, Found]:  # fmt: skip
+    """Of a fit that did not converge: the best that it met, or no evidence."""
+    name = "+".join(included)
     if best is None:
         assert trial.first is not None
-        return trial.first, Found("+".join(included), -np.inf, noise_factor, numbers)
-    trial.converged[key] = (best.point.numbers, best.point.path, best.base.noise_factor)
-    return best.point, replace(best.as_it_stands(), name="+".join(included))
+        return trial.first, Found(name, -np.inf, 1.0, numbers)
+    found = (best.point.numbers, best.point.path, best.base.noise_factor)
+    trial.converged[tuple(included), remainder] = found
+    return best.point, replace(best.as_it_stands(), name=name)
 
 
 def _length(point: Point, base: Found, included: Sequence[str]) -> float:
