@@ -36,44 +36,30 @@ def prior(
     return information, information @ mean
 
 
-def voyages_of(
-    each: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray, apart: float
-) -> tuple[list[np.ndarray], list[float]]:
-    """Products [1 + C, 1 + C] of each voyage, its own numbers and those of its parts integrated
-    out, and log|I + D^½ M D^½| of both together.
-
-    each        products of each part; `voyages` of each
-    deviation   [C] of a part's own numbers; `apart` of a voyage's, in units of those
-    """
-    found, volumes = [], []
-    for name in np.unique(voyages):
-        own = [gram for gram, of in zip(each, voyages, strict=True) if of == name]
-        spread, volume = apart * deviation, 0.0
-        if len(own) == 1:  # both are of one part: their sum is a Gaussian, too
-            spread = np.hypot(deviation, spread)
-        else:
-            parts = [reduced(gram, deviation) for gram in own]
-            own, volume = [gram for gram, _ in parts], sum(of for _, of in parts)
-        gram, more = reduced(sum(own[1:], own[0]), spread)
-        found.append(gram)
-        volumes.append(volume + more)
-    return found, volumes
-
-
 def of_voyages(
-    parts: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray
-) -> tuple[list[np.ndarray], list[float]]:
+    parts: Sequence[np.ndarray], voyages: np.ndarray, deviation: np.ndarray,
+    within: np.ndarray | None = None,
+) -> tuple[list[np.ndarray], list[float]]:  # fmt: skip
     """Products [1 + C, 1 + C] of each voyage, numbers of its own with that `deviation` [C]
     integrated out, and log|I + D^½ M D^½| of each.
 
-    parts     products of each part, its own numbers integrated out; `voyages` of each
+    parts     products of each part; `voyages` of each
+    within    [C] deviation of a part's own numbers, where they are not integrated out yet; their
+              volume is then in the voyage's
     """
+    within = np.zeros_like(deviation) if within is None else within
     found, volumes = [], []
     for name in np.unique(voyages):
         own = [gram for gram, of in zip(parts, voyages, strict=True) if of == name]
-        gram, volume = reduced(sum(own[1:], own[0]), deviation)
+        spread, volume = deviation, 0.0
+        if len(own) == 1:  # both are of one part: their sum is a Gaussian, too
+            spread = np.hypot(deviation, within)
+        else:
+            each = [reduced(gram, within) for gram in own]
+            own, volume = [gram for gram, _ in each], sum(of for _, of in each)
+        gram, more = reduced(sum(own[1:], own[0]), spread)
         found.append(gram)
-        volumes.append(volume)
+        volumes.append(volume + more)
     return found, volumes
 
 

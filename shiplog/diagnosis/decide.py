@@ -99,7 +99,7 @@ def _named(
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
         form = thresholds.FORM_ERROR * numbers  # its equations are no better than that
-        unit = by[label].unit_error * numbers  # nor is what they are measured in, one with another
+        unit = by[label].unit_error * numbers  # one error of all numbers of the cause
         given.append(
             Named(
                 by[label], table.alone.get(label, float("nan")),

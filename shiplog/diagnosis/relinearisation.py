@@ -1,10 +1,9 @@
 """The named causes, linearised again at their estimates, with a path of their own, until they
 converge.
 
-Gauss-Newton: where a linearisation has its most probable numbers, the next one is made. A step is
-measured in standard deviations of the numbers, since neither their evidence nor their intervals
-change by less. A step after which the numbers are far less probable, and the next step is longer,
-went too far, and is halved.
+Gauss-Newton with step halving. The length of a step is measured in standard deviations of the
+numbers (Mahalanobis distance). A step is rejected, and halved, if the numbers are then far less
+probable and the next step is longer.
 """
 
 from __future__ import annotations
@@ -23,39 +22,39 @@ from shiplog.diagnosis.trial import Trial
 
 RELINEARISATIONS = 10  # of linearising again, at most
 AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
-LOST_NATS = 10.0  # of the numbers' log density: a step that loses more, and leads to a longer one
-MOST_HALVINGS = 3  # times in turn that a step is halved where it went too far
-LEFT = 0.2  # standard deviations that a fit may still be off where it ends
-LITTLE_NATS = 1.0  # that no step gains any more: not what decides between hypotheses
-FALL = 0.1  # by which a step is expected to be shorter than the one before, until that is known
+LOST_NATS = 10.0  # of the numbers' log density: a step that loses more may be rejected
+MOST_HALVINGS = 3  # of one step, at most
+LEFT = 0.2  # standard deviations: expected distance from the optimum, at which a fit has converged
+LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
+RATE = 0.1  # of convergence, until two steps give it: length of a step over that of the last one
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 
 
 @dataclass(frozen=True)
-class _Stand:
-    """A fit, the point that it was made at, and the length [sd] of the step from that point."""
+class _Iterate:
+    """A point, the fit made there, and the length of the step to its numbers [sd]."""
 
     point: Point
     base: Found
     step: float
 
-    def fails(self, before: _Stand) -> bool:
-        """Whether the step from there went too far."""
+    def rejected(self, before: _Iterate) -> bool:
+        """Whether the step from the iterate before went too far."""
         lost = before.base.density - self.base.density
         return self.step > before.step and lost > LOST_NATS
 
-    def rests(self, before: _Stand | None, share: float) -> bool:
-        """Whether a further step would change neither the numbers nor the evidence: steps get
-        shorter by the factor by which the last one did, of which a `share` was taken."""
-        fall, gained = FALL, math.inf
-        if before is not None and before.step > 0.0 and share == 1.0:
-            fall = min(self.step / before.step, 0.99)
+    def converged(self, before: _Iterate | None, damping: float) -> bool:
+        """Whether further steps would change neither the numbers nor the evidence. Convergence is
+        taken for linear; after a damped step its rate is not known."""
+        rate, gained = RATE, math.inf
+        if before is not None and before.step > 0.0 and damping == 1.0:
+            rate = min(self.step / before.step, 0.99)
             gained = self.base.density - before.base.density
         little = max(gained, 0.5 * self.step**2) < LITTLE_NATS
-        return little or self.step * fall / (1.0 - fall) < LEFT
+        return little or self.step * rate / (1.0 - rate) < LEFT
 
-    def as_it_stands(self) -> Found:
-        """With the point's own numbers: what the step would gain was not seen."""
+    def at_point(self) -> Found:
+        """The fit with the point's own numbers, without the gain that the step promises."""
         return replace(self.base, numbers=self.point.numbers,
                        evidence=self.base.evidence - 0.5 * self.step**2)  # fmt: skip
 
@@ -70,9 +69,9 @@ def converge(
 ) -> tuple[Point, Found]:
     """These causes together, linearised again until their numbers converge.
 
-    They start from where an earlier fit of them converged, if there was one. A first step has gone
-    too far if the evidence is then below the `lowest` that is possible. A fit that does not
-    converge has the evidence of the most probable numbers that it met.
+    They start from where an earlier fit of them converged, if there was one. A step is rejected,
+    too, if the evidence is then below the `lowest` that is possible. A fit that does not converge
+    has the evidence of the most probable numbers that it met.
     """
     # where each channel has a factor of its own the common one stays near 1; an intermittent force
     # is estimated together with the nominal process noise, which is then kept
@@ -83,45 +82,45 @@ def converge(
     if key in trial.converged:
         numbers, near, noise_factor = trial.converged[key]
         lately = noise_factor
-    stood: _Stand | None = None  # where the fit last held
-    best: _Stand | None = None
-    shorter, share = 0, 1.0  # of each step, that is taken: a fit that went too far is still there
+    last: _Iterate | None = None  # that was accepted
+    best: _Iterate | None = None
+    halvings, damping = 0, 1.0  # of a step; it grows back once steps are accepted
     steady = held  # whether the process noise has converged: a round then keeps it
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, noise_factor, remainder)
             base = _fitted(trial, point, included, remainder, lately, steady, lowest)
-            here = _Stand(point, base, _length(point, base, included))
-            if stood is not None and here.fails(stood):
+            here = _Iterate(point, base, _length(point, base, included))
+            if last is not None and here.rejected(last):
                 raise np.linalg.LinAlgError("a step too far")
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
-            if shorter == MOST_HALVINGS or not included:
+            if halvings == MOST_HALVINGS or not included:
                 break
-            shorter, share = shorter + 1, 0.5 * share
-            numbers = _half_way(numbers, stood.point.numbers if stood else None, included[-1])
+            halvings, damping = halvings + 1, 0.5 * damping
+            numbers = _half_way(numbers, last.point.numbers if last else None, included[-1])
             continue
-        rests = here.rests(stood, share)
+        converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
         kept, steady = steady, held or settled
-        stood, share = here, share if shorter else min(2.0 * share, 1.0)
-        shorter = 0
+        last, damping = here, damping if halvings else min(2.0 * damping, 1.0)
+        halvings = 0
         if best is None or base.density >= best.base.density:
             best = here
         near, noise_factor = point, base.noise_factor
-        numbers = _towards(base.numbers, point.numbers, share)
+        numbers = _towards(base.numbers, point.numbers, damping)
         lately = noise_factor
         if not all(np.isfinite(values).all() for values in numbers.values()):
             return point, replace(base, name="+".join(included), evidence=-np.inf)
-        if rests:
+        if converged:
             if kept and not held:
                 base, _ = evidence.scan(trial, point, (), included, lately, remainder)
             trial.converged[key] = (base.numbers, point.path, base.noise_factor)
             return point, replace(base, name="+".join(included))
-    return _without_end(trial, included, remainder, best, numbers)
+    return _not_converged(trial, included, remainder, best, numbers)
 
 
-def _without_end(
-    trial: Trial, included: Sequence[str], remainder: Remainder, best: _Stand | None,
+def _not_converged(
+    trial: Trial, included: Sequence[str], remainder: Remainder, best: _Iterate | None,
     numbers: Mapping[str, np.ndarray],
 ) -> tuple[Point, Found]:  # fmt: skip
     """Of a fit that did not converge: the best that it met, or no evidence."""
@@ -131,7 +130,7 @@ def _without_end(
         return trial.first, Found(name, -np.inf, 1.0, numbers)
     found = (best.point.numbers, best.point.path, best.base.noise_factor)
     trial.converged[tuple(included), remainder] = found
-    return best.point, replace(best.as_it_stands(), name=name)
+    return best.point, replace(best.at_point(), name=name)
 
 
 def _length(point: Point, base: Found, included: Sequence[str]) -> float:
@@ -160,18 +159,18 @@ def _fitted(
 
 
 def _half_way(
-    numbers: Mapping[str, np.ndarray], stood: Mapping[str, np.ndarray] | None, last: str
+    numbers: Mapping[str, np.ndarray], accepted: Mapping[str, np.ndarray] | None, newest: str
 ) -> Mapping[str, np.ndarray]:
-    """Half a step: back towards where the fit held; before it ever did, half of the last cause."""
-    if stood is None:
-        return {**numbers, last: 0.5 * numbers[last]}
-    return _towards(numbers, stood, 0.5)
+    """Half a step from the accepted numbers; where there are none, half of the newest cause."""
+    if accepted is None:
+        return {**numbers, newest: 0.5 * numbers[newest]}
+    return _towards(numbers, accepted, 0.5)
 
 
 def _towards(
-    numbers: Mapping[str, np.ndarray], stood: Mapping[str, np.ndarray], share: float
+    numbers: Mapping[str, np.ndarray], begin: Mapping[str, np.ndarray], share: float
 ) -> Mapping[str, np.ndarray]:
-    """A share of the step from where the fit stood."""
+    """A share of the step from `begin` to these numbers."""
     if share == 1.0:
         return numbers
-    return {n: share * values + (1.0 - share) * stood[n] for n, values in numbers.items()}
+    return {n: share * values + (1.0 - share) * begin[n] for n, values in numbers.items()}

@@ -120,8 +120,9 @@ class Products:
     ) -> tuple[dict[object, np.ndarray], float]:
         """Products of each voyage, and log|I + D^½ M D^½| of all."""
         each = self.of_parts(point, noise, weight, remainder)
-        grams, volumes = campaign_prior.voyages_of(
-            each, self._voyage, self._deviation(remainder), self._campaign.apart
+        within = self._deviation(remainder)
+        grams, volumes = campaign_prior.of_voyages(
+            each, self._voyage, self._campaign.apart * within, within
         )
         return dict(zip(np.unique(self._voyage), grams, strict=True)), sum(volumes)
 

@@ -88,7 +88,7 @@ def _limits(verdict: Verdict) -> list[str]:
 
 
 def _change(value: float, unit: str) -> str:
-    """Of a factor or a share in per cent."""
+    """A size in its unit; in per cent where it has none."""
     return f"{100 * value:.2g}%" if unit == "1" else f"{value:.2g} {unit}"
 
 

@@ -124,7 +124,7 @@ def _hire() -> _Worker:
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    with _one_thread(), _undisturbed():
+    with _one_thread(), _signals_deferred():
         process.start()
     theirs.close()  # so that a worker's death is the end of the pipe
     return _Worker(process, ours)
@@ -191,11 +191,11 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Signals that end this process wait until a child has been told what it is.
+def _signals_deferred() -> Iterator[None]:
+    """Signals that end this process are handled after a child process has received its arguments.
 
-    A child that is left without it ends in a traceback. Ctrl-C, which a terminal sends to
-    children too, never reaches this one: it begins with that signal blocked.
+    A child process that does not receive them ends in a traceback. A terminal sends Ctrl-C to child
+    processes, too: this one starts with that signal blocked.
     """
     if threading.current_thread() is not threading.main_thread():
         yield  # no signal is handled here

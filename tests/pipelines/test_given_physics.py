@@ -95,7 +95,7 @@ def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_pa
 
 
 def test_an_extension_was_fitted_to_its_own_voyages_and_shows_no_forces(published, tmp_path):
-    """They test neither it nor a run beside it; the current is no force of the equations."""
+    """They test neither it nor a run evaluated with it; a current is no force of the equations."""
     run = load_model.load(published[0])
     (current,) = [c for c in CATALOGUE if c.label == "current"]
     after = run.extended(0).with_causes(

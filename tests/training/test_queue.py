@@ -90,7 +90,7 @@ list(work([Task("a", cores, ())], 1))
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_while_a_process_begins_leaves_no_trace(name):
-    """It comes when the child is there and has not been told its work."""
+    """It comes when the process has started and has not received its arguments."""
     script = INTERRUPTED.replace("SIGNAL", name)
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert ended.returncode == 128 + getattr(signal, name)

@@ -18,6 +18,11 @@ from shiplog.channels import DEGREE
 from shiplog.profile import Profile
 from shiplog.voyages.recording import Record
 
+# Standard deviation of the logarithm of an uncertain factor in a cause's equations: a factor of
+# 1.6. Published formulas for one force differ by as much.
+FORM_SPREAD = 0.5
+FORM_BOUND = 4.0 * FORM_SPREAD  # of that logarithm: four standard deviations
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -128,7 +133,8 @@ class Cause:
     separated_by: ClassVar[Mapping[str, str]] = {}  # other cause → manoeuvre that tells them apart
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
-    unit_error: ClassVar[float] = 0.0  # share by which what its numbers are measured in may be off
+    unit_error: ClassVar[float] = 0.0  # share by which the unit of its numbers may be wrong
+    forms: ClassVar[int] = 0  # of its equations, factors that are uncertain: `FORM_SPREAD`
 
     @property
     def label(self) -> str:
@@ -137,7 +143,8 @@ class Cause:
 
     @property
     def count(self) -> int:
-        return len(self.parameters)
+        """Of its numbers: the parameters, then the logarithms of the uncertain factors."""
+        return len(self.parameters) + self.forms
 
     @property
     def absorbed(self) -> bool:
@@ -183,10 +190,11 @@ class Cause:
 
     def sizes(self, setting: Setting) -> np.ndarray:
         """[count] realistic size of each number."""
-        return np.array([setting.prior(p) for p in self.parameters])
+        return np.array([setting.prior(p) for p in self.parameters] + [FORM_SPREAD] * self.forms)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         both = [setting.bounds(p) for p in self.parameters]
+        both += [(-FORM_BOUND, FORM_BOUND)] * self.forms
         return np.array([b[0] for b in both]), np.array([b[1] for b in both])
 
     # --- hooks ---
@@ -249,7 +257,7 @@ class Cause:
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
         """Whether any of its numbers [..., Q] is large enough to matter: [...] bool."""
         least = np.array([setting.least(q) for q in self.parameters])
-        return np.asarray((np.abs(p) >= least).any(-1))
+        return np.asarray((np.abs(p[..., : len(least)]) >= least).any(-1))
 
 
 def deviations(covariance: np.ndarray, freedom: float, draws: int) -> np.ndarray:

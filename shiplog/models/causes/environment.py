@@ -118,8 +118,8 @@ class WindForce(Cause):
         )
 
 
-# What grows in shallow water, by how much per unit of the map: of a full ship's derivatives, by the
-# formulas of Kijima et al. 1990
+# What grows in shallow water, by how much per unit of the map. Y_v, N_v and N_r are of a full ship
+# by the formulas of Kijima et al. 1990, the others are estimates.
 GROWS = (
     (("hull.c_d",), 1.2),
     (("hull.x_0f", "hull.x_0a"), 0.3),
@@ -129,16 +129,14 @@ GROWS = (
     (("body.m_y",), 0.7),
     (("body.i_j",), 0.2),
 )
-# Standard deviation of the logarithm of what of a form is known to a factor only: 1.6
-FORM_TIMES = 0.5
 
 
 @dataclass(frozen=True)
 class ShallowWater(Cause):
     """Hull forces and added masses grow where the water is shallow; a map of how much, since no
-    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990. That differs
-    from hull to hull and from formula to formula, and is known to a factor only (`FORM_TIMES`):
-    after the map come logarithms of such factors, of all growths but the cross-flow drag's.
+    chart says. Which force grows how fast: Kijima, Katsuno, Nakiri & Furukawa 1990. Growths differ
+    from hull to hull. All but that of the cross-flow drag, in which the map is measured, have an
+    uncertain factor.
 
     Size: theirs has a full ship's sway damping a quarter larger at a depth of twice the draught,
     which is 0.3 here; PIANC 2014 begins to count shallow water at 3 draughts, and ends at 1.1."""
@@ -152,9 +150,11 @@ class ShallowWater(Cause):
     parameters = ()
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
 
+    forms = len(GROWS) - 1
+
     @property
     def count(self) -> int:
-        return self.places + len(GROWS) - 1
+        return self.places + super().count
 
     def missing(self, setting: Setting) -> str | None:
         return None if len(setting.places) == self.places else "the ship stayed in one place"
@@ -163,13 +163,12 @@ class ShallowWater(Cause):
         return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return self._each(0.3, FORM_TIMES)
+        return np.append(np.full(self.places, 0.3), super().sizes(setting))
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        return self._each(-0.5, -4.0 * FORM_TIMES), self._each(5.0, 4.0 * FORM_TIMES)
-
-    def _each(self, of_map: float, of_form: float) -> np.ndarray:
-        return np.repeat([of_map, of_form], [self.places, self.count - self.places])
+        low, high = super().bounds(setting)
+        of_map = np.ones(self.places)
+        return np.append(-0.5 * of_map, low), np.append(5.0 * of_map, high)
 
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         near = _bumps(state, at["shallow.places"], at["shallow.spacing"])
@@ -203,9 +202,8 @@ def _bumps(state: Any, places: Any, spacing: Any) -> Any:
 
 @dataclass(frozen=True)
 class Bank(Cause):
-    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974). How far it
-    reaches and how much it turns the ship are known to a factor only (`FORM_TIMES`): after the
-    strength come logarithms of both.
+    """Suction towards a wall and the moment that turns the bow from it (Norrbin 1974). Its reach
+    and the lever of its moment have uncertain factors.
 
     Size: all of it. The profile shows the bank and the model has none; published formulas differ
     from each other by about a factor of two (Vantorre, Delefortrie et al. 2003)."""
@@ -218,20 +216,7 @@ class Bank(Cause):
     parameters = (Parameter("strength", "1", 1.0, 0.08),)
     separated_by = {"shallow_water": "the same run farther from the bank"}
 
-    @property
-    def count(self) -> int:
-        return 3
-
-    def sizes(self, setting: Setting) -> np.ndarray:
-        return np.append(super().sizes(setting), np.full(2, FORM_TIMES))
-
-    def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
-        low, high = super().bounds(setting)
-        limit = np.full(2, 4.0 * FORM_TIMES)
-        return np.append(low, -limit), np.append(high, limit)
-
-    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return super().practical(p[..., :1], setting)
+    forms = 2
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         banks = setting.profile.site.banks
@@ -257,7 +242,7 @@ class Bank(Cause):
         distance = jnp.sqrt((to**2).sum(-1) + 1e-6)
         gap = jnp.maximum(distance - 0.5 * breadth, 0.0)
         one = jnp.ones((len(lines), len(lines)))  # as a run has it that was extended before
-        reach, turning = 3.0 * length * jnp.exp(p[1]), -0.25 * length * jnp.exp(p[2])
+        reach, lever = 3.0 * length * jnp.exp(p[1]), 0.25 * length * jnp.exp(p[2])
         near = _nearest(distance, at.get("bank.same", one)) / (1.0 + (gap / reach) ** 3)
         c, s = jnp.cos(state[..., 4])[..., None], jnp.sin(state[..., 4])[..., None]
         ahead = (c * to[..., 0] + s * to[..., 1]) / distance
@@ -265,7 +250,7 @@ class Bank(Cause):
         u = state[..., 1, None]
         pull = 0.15 * 0.5 * density * length * draught * (u * starboard) ** 2 * near * p[0]
         lead = u / jnp.sqrt(u * u + 1e-4)
-        turn = turning * pull * starboard * lead
+        turn = -lever * pull * starboard * lead
         return jnp.stack(((pull * ahead).sum(-1), (pull * starboard).sum(-1), turn.sum(-1)), -1)
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
