@@ -24,11 +24,13 @@ from shiplog import frames
 from shiplog.diagnosis import segment_nodes
 from shiplog.diagnosis.segment_nodes import Knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid
-from shiplog.profile import Profile
+from shiplog.models.mmg import geometry
+from shiplog.profile import Actuator, Profile
 
 SEEN = ("motion", "controls", "wind")  # by a model of forces
 UNSEEN = ("position", "heading", "time")
 EVEN = {"position": 3, "heading": 1, "time": 2}  # features of an even force, the first ones
+HARD_OVER = np.deg2rad(35.0)  # of most rudders (SOLAS II-1/29)
 WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, "time": 5}
 
 
@@ -197,7 +199,8 @@ def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
 
 def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
     """Of every unit that drives its thrust n|n| and n u, of every blade sin δ in the stream of
-    the ship and of the first screw; of what turns all the way round the thrust's parts."""
+    the ship and of the first screw; of what turns all the way round the thrust's parts. A rudder's
+    force need not go on with its angle (stall, play, a stop): sin(πδ/δ_max) in the same streams."""
     u = knots.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []
@@ -212,7 +215,16 @@ def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
         for j in driven_by(profile, i, driving):
             thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
+            if actuator.kind == "rudder":
+                found.append(thrust * np.sin(np.pi * angle / hard_over(actuator)))
+        if actuator.kind == "rudder":
+            found.append(np.sin(np.pi * angle / hard_over(actuator)) * u * np.abs(u))
     return found
+
+
+def hard_over(rudder: Actuator) -> float:
+    """The largest angle of a rudder, rad, by its limits if the profile gives them."""
+    return geometry.reach(rudder) or HARD_OVER
 
 
 def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:

@@ -48,9 +48,10 @@ unit = "deg"
     )
 
 
-def actuator(name: str, kind: str, place=None) -> str:
+def actuator(name: str, kind: str, place=None, limits=None) -> str:
     unit = "deg" if kind in ("rudder", "azimuth") else "rpm"
     at = "" if place is None else f"position_m = [{place[0]}, {place[1]}]\n"
+    at += "" if limits is None else f"limits = {limits}\n"
     return (
         f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\ntopic = "/{name}"\n'
         f'field = "x"\nunit = "{unit}"\n{at}'
@@ -103,12 +104,40 @@ def test_a_screw_and_a_rudder_at_another_place_by_hand():
     state[..., 1] = -0.5
     angle, n = 0.3, -4.0
     at = knots(state, np.array([[[angle, n]]]))
+    bent = math.sin(math.pi * angle / math.radians(35.0))
     wanted = [
         -16.0, 4.0 * -0.5,
         math.sin(angle) * -0.25, 1.0 - math.cos(angle),
         -16.0 * math.sin(angle), -16.0 * (1.0 - math.cos(angle)),
+        -16.0 * bent, bent * -0.25,
     ]  # fmt: skip
     assert products("controls", of, at)[0, 0] == pytest.approx(wanted)
+
+
+def test_a_rudder_is_hard_over_at_the_larger_of_its_limits():
+    of = profile(
+        actuator("one", "rudder", limits=[-45.0, 40.0]) + actuator("other", "rudder")
+        + actuator("screw", "propeller")
+    )  # fmt: skip
+    assert discrepancy.hard_over(of.actuators[0]) == pytest.approx(math.radians(45.0))
+    assert discrepancy.hard_over(of.actuators[1]) == pytest.approx(math.radians(35.0))
+
+
+def test_a_rudder_that_stops_short_is_a_function_of_its_angle():
+    """Of a rudder that moves from hard over to hard over but acts up to 13 degrees only, what is
+    left of its force lies in the family's columns; sin δ alone leaves a tenth of it."""
+    of = profile(actuator("rudder", "rudder") + actuator("screw", "propeller"))
+    angle = np.linspace(-1.0, 1.0, 41) * math.radians(35.0)
+    at = knots(np.ones((1, 41, 6)), np.stack((angle, np.full(41, 5.0)), -1)[None])
+    acts = np.sin(np.clip(angle, *np.radians([-13.0, 13.0])))
+
+    def left(columns: np.ndarray) -> float:
+        rest = acts - columns @ np.linalg.lstsq(columns, acts)[0]
+        return float(rest @ rest / (acts @ acts))
+
+    known = products("controls", of, at)[0]
+    assert left(known) < 0.02
+    assert left(np.sin(angle)[:, None]) > 0.08
 
 
 def test_an_azimuth_turns_the_thruster_at_its_own_place():

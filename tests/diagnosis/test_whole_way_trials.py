@@ -66,7 +66,8 @@ def test_turning_the_pond_leaves_the_compass(sea, compass):
     assert labels(decision) == ["heading_offset"]
     (after,), (before,) = decision.named, plain.named
     sure = np.sqrt(before.covariance[0, 0])
-    assert after.numbers == pytest.approx(before.numbers, abs=0.5 * sure)
+    # each fit ends within 0.2 standard deviations of its optimum, and the wind does not turn along
+    assert after.numbers == pytest.approx(before.numbers, abs=0.6 * sure)
 
 
 def test_taken_out_of_the_data_it_is_gone(sea, compass):

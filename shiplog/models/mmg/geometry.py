@@ -168,7 +168,7 @@ def _units(
     rudders = tuple(
         Rudder(
             column[a.name], a.name, *a.position_m, area, span,
-            _reach(a) > WIDE_ANGLE, _slipstream(a, propellers),
+            reach(a) > WIDE_ANGLE, _slipstream(a, propellers),
         )
         for a, (area, span, _) in zip(blades, sizes, strict=True)
     )  # fmt: skip
@@ -210,7 +210,7 @@ def _slipstream(rudder: Actuator, propellers: tuple[Propeller, ...]) -> int | No
     return min(near)[2] if near else None
 
 
-def _reach(actuator: Actuator) -> float:
+def reach(actuator: Actuator) -> float:
     """The larger of its limits from zero, in SI; 0 where the profile gives none."""
     offset, factor = actuator.scale()[0]
     return max((abs((limit - offset) * factor) for limit in actuator.limits or ()), default=0.0)
@@ -221,14 +221,14 @@ def _full(thruster: Actuator) -> float:
 
     Raises ProfileError for revolutions without limits: full thrust is then not known.
     """
-    reach = _reach(thruster)
-    if not reach and thruster.si_unit != "1":
+    most = reach(thruster)
+    if not most and thruster.si_unit != "1":
         raise ProfileError(
             f"The profile gives no limits for the thruster {thruster.name!r}, and its command is "
             f"in {thruster.unit}: the full thrust is not known.",
             hint="add limits to that actuator, or leave the force out with --without thruster.",
         )
-    return reach or 1.0
+    return most or 1.0
 
 
 def _turning(thruster: Actuator, profile: Profile) -> int | None:
