@@ -173,6 +173,26 @@ def test_every_force_changes_the_path_and_no_instrument_does(name):
     assert apart == 0.0 if name in observed else apart > 0.002 * ship.length
 
 
+def test_no_unit_that_turns_as_a_whole_has_a_side_force():
+    """It would be one whose angle is off, which is in the catalogue: the paths are the same but
+    for what flows into the unit."""
+    ship = ship_of("azimuth_ferry")
+    assert "propeller_side_force" not in effects.offered(ship)
+    assert "propeller_side_force" in effects.offered(ship_of("abkowitz"))
+    order = ship.mixer(0.7, 0.6, 0.3)
+    off = math.atan(0.08)
+    plain, aside, turned = (
+        sail(ship, 5.0 * ship.time_unit, seed=1, wind=CALM, quiet=True, effects=e,
+             helm=lambda *_: order)
+        for e in (Effects(), Effects(aside=0.08), Effects(rudder_offset=(off, off)))
+    )  # fmt: skip
+
+    def apart(a, b) -> float:
+        return float(np.hypot(a.x0 - b.x0, a.y0 - b.y0).max())
+
+    assert apart(aside, turned) < 0.15 * apart(aside, plain)
+
+
 # --- what must not be shared ----------------------------------------------------------------------
 
 

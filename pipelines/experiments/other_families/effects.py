@@ -357,13 +357,15 @@ OUTSIDE: dict[str, tuple[str, Draw]] = {  # no cause has these names; the family
 def offered(ship: Ship) -> tuple[str, ...]:
     """What can be hidden in this ship: it has the actuator, the sensor, or the force."""
     public = ship.own_motion is not None  # a package whose equations are not ours to change
+    # a unit that turns as a whole, and pushes aside as well, is one whose angle is off: a cause
+    turned = bool(ship.steering) and not ship.rudders
     has = {
         "wind_force": ship.winds, "wind_direction_offset": ship.winds,
         "wind_speed_scale": ship.winds, "shallow_water": not public, "bank": not public,
         "cross_flow_drag": ship.cross_flow and not public,
         "thrust_loss:unit": len(ship.drives) > 1, "rudder_force": bool(ship.rudders),
         "rudder_offset": bool(ship.steering), "rudder_lag": bool(ship.steering),
-        "rudder_delay": bool(ship.steering), "propeller_side_force": not public,
+        "rudder_delay": bool(ship.steering), "propeller_side_force": not public and not turned,
         "rudder_limit": bool(ship.rudders), "cross_coupling": len(ship.drives) > 1,
     }  # fmt: skip
     return tuple(name for name in (*CATALOGUE, *OUTSIDE) if has.get(name, True))
