@@ -14,7 +14,7 @@ from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.intermittent import force_at_nodes
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, Remainder
 from shiplog.diagnosis.result import Decision, Named, Structure
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
@@ -74,13 +74,21 @@ def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> dict[str, st
     shares: dict[str, float] = {}
     for label in fit.included:
         if label not in table.trial.fixed and name_of(label) in names:
-            share = fits.imitated(table.trial, fit, label)
+            size = _size_without(table, fit.remainder, name_of(label))
+            share = fits.imitated(table.trial, fit, label, size)
             shares[name_of(label)] = max(share, shares.get(name_of(label), 0.0))
     return {
         name: f"what remains unknown could do {share:.0%} of it as well"
         for name, share in shares.items()
         if share > thresholds.MOST
     }
+
+
+def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
+    """How large a remainder of this kind would be if it had to do the work of a cause: in the most
+    probable hypothesis without it. With the cause, it is only what the cause leaves."""
+    others = (h.remainder.size for h in table.ranked((name,)) if h.kind == remainder.kind)
+    return max(remainder.size, next(others, 0.0))
 
 
 def _named(

@@ -111,9 +111,12 @@ def changed(trial: Trial, point: Point, level: Level, included: tuple[str, ...],
     return max(found)
 
 
-def imitated(trial: Trial, one: Fit, label: str) -> float:
+def imitated(trial: Trial, one: Fit, label: str, size: float) -> float:
     """Share, 0 to 1, of what a cause does to the observations that a change of the weights of the
-    remainder's family does as well, the campaign's own numbers free."""
+    remainder's family does as well, the campaign's own numbers free.
+
+    size   of that change, as it is expected without the cause
+    """
     family = trial.families.get(one.remainder.kind)
     if family is None:
         return 0.0
@@ -129,7 +132,7 @@ def imitated(trial: Trial, one: Fit, label: str) -> float:
     does = one.found.numbers[label] / columns.unit[of]
     own = does @ left[: len(of), : len(of)] @ does
     across = left[len(of) :, : len(of)] @ does
-    free = left[len(of) :, len(of) :] + one.remainder.size**-2.0 * np.eye(len(family))
+    free = left[len(of) :, len(of) :] + size**-2.0 * np.eye(len(family))
     return float(across @ np.linalg.solve(free, across) / own) if own > 0.0 else 1.0
 
 

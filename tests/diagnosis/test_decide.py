@@ -1,5 +1,7 @@
 """Verdicts of posteriors that are made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import weighed
@@ -131,7 +133,7 @@ def test_a_cause_that_the_remainder_imitates_is_not_named_with_it(trial, monkeyp
     reported."""
     asked = []
 
-    def imitated(of, fit, label):
+    def imitated(of, fit, label, size):
         asked.append((label, fit.remainder.kind))
         return share
 
@@ -152,13 +154,27 @@ def test_a_cause_that_the_remainder_imitates_puts_no_other_in_doubt(
     """The other is named where it explains most by itself, without the one in doubt."""
     both = ("drag", "load")
     shares = {"drag": 0.1, "load": 0.8}
-    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label: shares[label])
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: shares[label])
     sure = {(both, "time"): 0.96, (DRAG, NOMINAL): 0.02, (both, NOMINAL): 0.02}
     evidence = {(both, "time"): 80.0, (both, NOMINAL): 70.0, (DRAG, NOMINAL): alone}
     found = verdict(trial, sure, evidence=evidence)
     assert (found.verdict, named(found)) == (word, names)
     assert "could do 80% of it" in found.rejected["load"]
     assert "drag" not in found.rejected or word == "unknown"
+
+
+def test_the_remainder_is_as_large_as_it_would_be_without_the_cause(trial, monkeypatch):
+    """Next to the cause it is only what the cause leaves of an unknown force."""
+    asked = []
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: asked.append(size) or 0.0)
+    sure = {(DRAG, "time"): 0.97, (DRAG, NOMINAL): 0.02, ((), "time"): 0.01}
+    made = weighed.search(trial, sure, evidence={(DRAG, "time"): 80.0, (DRAG, NOMINAL): 70.0})
+    found = made.table.found
+    alone = found[(), "time"]
+    for size, wanted in ((9.0, 9.0), (0.5, found[DRAG, "time"].remainder.size)):
+        found[(), "time"] = replace(alone, remainder=replace(alone.remainder, size=size))
+        decide(made)
+        assert asked[-1] == wanted
 
 
 def test_a_name_of_two_kinds_is_reported_in_the_likelier(trial):

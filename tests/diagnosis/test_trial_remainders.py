@@ -93,9 +93,10 @@ def test_what_a_family_does_as_well_is_the_share_that_lies_in_its_columns(made, 
     point = trial.at({})
     base, _ = evidence.scan(trial, point, (), ("drag",), 1.0)
     base.numbers["drag"] = np.ones(1)
-    share = fits.imitated(trial, Fit(point, base, Remainder("time", 1e4)), "drag")
+    share = fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e4)
     assert low <= share <= high
-    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag") == 0.0
+    assert fits.imitated(trial, Fit(point, base, Remainder("time")), "drag", 1e-4) < 0.01
+    assert fits.imitated(trial, Fit(point, base, Remainder(RAISED)), "drag", 1e4) == 0.0
 
 
 # --- levels of process noise
