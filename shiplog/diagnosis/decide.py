@@ -36,9 +36,7 @@ def decide(
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
     device = is_device(table, best, fit)  # then what remains has a name, too
-    in_doubt: dict[str, str] = {}
-    if not posteriors.slight(table, best):
-        in_doubt = _imitated(table, fit, names)
+    in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
     mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
@@ -67,16 +65,21 @@ def decide(
     ), found  # fmt: skip
 
 
-def _imitated(table: Hypotheses, fit: Fit, names: Sequence[str]) -> dict[str, str]:
+def _imitated(
+    table: Hypotheses, best: Hypothesis, fit: Fit, names: Sequence[str]
+) -> dict[str, str]:
     """Names → why each is in doubt: the remainder could do most of what the cause does. An offset
     of the rudder, for instance, may be a part of an unknown force of the controls. That puts no
-    other cause in doubt."""
+    other cause in doubt, nor does a remainder that is slight next to what the cause explains."""
     shares: dict[str, float] = {}
     for label in fit.included:
-        if label not in table.trial.fixed and name_of(label) in names:
-            size = _size_without(table, fit.remainder, name_of(label))
+        name = name_of(label)
+        if label in table.trial.fixed or name not in names:
+            continue
+        if not posteriors.slight(table, best, name):
+            size = _size_without(table, fit.remainder, name)
             share = fits.imitated(table.trial, fit, label, size)
-            shares[name_of(label)] = max(share, shares.get(name_of(label), 0.0))
+            shares[name] = max(share, shares.get(name, 0.0))
     return {
         name: f"what remains unknown could do {share:.0%} of it as well"
         for name, share in shares.items()

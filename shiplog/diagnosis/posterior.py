@@ -153,11 +153,14 @@ def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -
     return max(shares, default=1.0)
 
 
-def slight(table: Hypotheses, one: Hypothesis) -> bool:
+def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
     """Whether the remainder of a hypothesis adds so little to its causes with nominal process noise
-    that it can be an error of their equations."""
+    that it can be an error of their equations: little of what they explain, or, where that is
+    named, of what one of its causes explains next to the others."""
     plain = table.found.get((one.causes, NOMINAL))
-    whole = one.evidence - table.nothing.evidence
+    rest = tuple(n for n in one.causes if cause and name_of(n) != cause)
+    less = table.found.get((rest, NOMINAL), table.nothing)
+    whole = one.evidence - less.evidence
     if plain is None or whole <= 0.0:
         return False
     return one.evidence - plain.evidence <= thresholds.SLIGHT * whole

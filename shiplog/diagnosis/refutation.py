@@ -4,13 +4,15 @@ The numbers of a hypothesis are fitted without each fold in turn. A cause is ref
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it.
 
-With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
-are then named only if the whole interval is a gain. A remainder so slight that it can be an error
-of the causes' own equations puts none in doubt.
+With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Nor is
+it one of a cause that takes the place of a more probable one, which is refuted. Causes are then
+named only if the whole interval is a gain. A remainder so slight that it can be an error of the
+causes' own equations puts none in doubt.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Protocol
 
@@ -37,15 +39,27 @@ class Judge(Protocol):
         ...
 
 
-def _in_doubt(search: Search, found: Posterior, decision: Decision) -> bool:
-    """Whether it is stated that there is a remainder, of whatever kind, that is more than an error
-    of the causes' equations, and is no device, which has a name and is in the noise of the
-    likelihood."""
+def _why_in_doubt(
+    search: Search, found: Posterior, decision: Decision, first: Collection[str]
+) -> str:
+    """Why the likelihood alone is no proof of what is named; empty where it is.
+
+    first   names before any was refuted
+
+    Some remainder is stated, of whatever kind, that is more than an error of the causes'
+    equations, and is no device, which has a name and is in the noise of the likelihood; or a name
+    takes the place of a refuted one.
+    """
+    names = [one.cause.name for one in decision.named]
+    if not set(names) <= set(first):
+        return "held-out voyages refute what is more probable"
     if decision.side_force is not None:
-        return False
-    best = posteriors.best_with(found, [one.cause.name for one in decision.named])
+        return ""
+    best = posteriors.best_with(found, names)
     remains = 1.0 - found.kinds.get(NOMINAL, 0.0)
-    return remains >= thresholds.STATED and not posteriors.slight(search.table, best)
+    if remains >= thresholds.STATED and not posteriors.slight(search.table, best):
+        return "the catalogue does not explain all of the trial"
+    return ""
 
 
 def judged(
@@ -57,8 +71,10 @@ def judged(
     Of several causes the one that takes most off the held-out error comes first.
     """
     refuted: dict[str, str] = {}
+    first: set[str] = set()  # names before any is refuted
     while True:
         decision, found = decide(search, refuted)
+        first = first if refuted else {one.cause.name for one in decision.named}
         if held is None or not decision.named:
             return decision, found, None, refuted
         gain = held.gain(decision)
@@ -70,10 +86,11 @@ def judged(
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
         worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
-        if not worse and not gain.real and _in_doubt(search, found, decision):
-            why = (
-                "the catalogue does not explain all of the trial, so a cause is named only if it "
-                f"surely reduces the held-out error: here by {gain.low:.1%} to {gain.high:.1%}"
+        why = _why_in_doubt(search, found, decision, first)
+        if not worse and not gain.real and why:
+            why += (
+                ", so a cause is named only if it surely reduces the held-out error: "
+                f"here by {gain.low:.1%} to {gain.high:.1%}"
             )
             doubted = {one.cause.name: why for one in decision.named}
             return *decide(search, refuted, doubted), None, refuted

@@ -163,6 +163,18 @@ def test_a_cause_that_the_remainder_imitates_puts_no_other_in_doubt(
     assert "drag" not in found.rejected or word == "unknown"
 
 
+@pytest.mark.parametrize(("alone", "names"), [(8.0, ["drag", "load"]), (97.0, ["drag"])])
+def test_a_slight_remainder_may_do_the_work_of_a_slight_cause(trial, monkeypatch, alone, names):
+    """It adds 1.5 nats to 100, of which the load alone explains 92, or 3. Both could be a part of
+    it, by their form."""
+    both = ("drag", "load")
+    shares = {"drag": 0.9, "load": 0.9}
+    monkeypatch.setattr(fits, "imitated", lambda trial, fit, label, size: shares[label])
+    sure = {(both, "time"): 0.96, (both, NOMINAL): 0.03, (DRAG, NOMINAL): 0.01}
+    evidence = {(both, "time"): 101.5, (both, NOMINAL): 100.0, (DRAG, NOMINAL): alone}
+    assert named(verdict(trial, sure, evidence=evidence)) == names
+
+
 def test_the_remainder_is_as_large_as_it_would_be_without_the_cause(trial, monkeypatch):
     """Next to the cause it is only what the cause leaves of an unknown force."""
     asked = []

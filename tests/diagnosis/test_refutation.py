@@ -112,15 +112,34 @@ def test_what_is_surely_worse_is_dropped_and_the_next_is_judged(trial):
     made = weighed.search(
         trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
     )
-    held = HeldOut({DRAG: WORSE, LOAD: UNSURE})
+    held = HeldOut({DRAG: WORSE, LOAD: BETTER})
     decision, found, gained, refuted = judged(made, held)
     assert held.asked == [DRAG, LOAD]
     assert [one.cause.label for one in decision.named] == ["load"]
     assert found.names == pytest.approx({"load": 0.039 / 0.0391})
-    assert gained.high == UNSURE[1]
+    assert gained.high == BETTER[1]
     assert list(refuted) == ["drag"]
     assert "2.0% to 40.0% greater" in refuted["drag"]
     assert decision.rejected["drag"] == refuted["drag"]
+
+
+def test_what_takes_the_place_of_a_refuted_name_must_prove_itself(trial):
+    """The likelihood was no proof of the first, and is none of the second."""
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
+    )
+    decision, _, gained, refuted = judged(made, HeldOut({DRAG: WORSE, LOAD: UNSURE}))
+    assert (decision.verdict, decision.named, gained) == ("undecided", (), None)
+    assert list(refuted) == ["drag"]
+    assert decision.rejected["load"].startswith("held-out voyages refute what is more probable")
+
+
+def test_what_was_named_beside_a_refuted_name_need_not(trial):
+    made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
+    held = HeldOut({("drag", "load"): BETTER, LOAD: UNSURE}, {"drag": (-0.5, -0.2), "load": UNSURE})
+    decision, _, _, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == ["load"]
+    assert list(refuted) == ["drag"]
 
 
 def test_after_a_refutation_the_rest_may_be_undecided(trial):
