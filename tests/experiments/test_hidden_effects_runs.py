@@ -5,15 +5,17 @@ import hashlib
 import json
 import subprocess
 import sys
+import tarfile
 import xml.etree.ElementTree as ElementTree
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from pipelines.experiments.hidden_effects import (
+    archive,
     methods,
     plan,
     program,
@@ -267,6 +269,42 @@ def test_the_page_is_written_with_its_picture_or_refused(tmp_path, stubs, capsys
     steps.write_text(json.dumps(content))
     assert main(["scores", str(out)]) == 2
     assert "several programs" in capsys.readouterr().err
+
+
+def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path, stubs, capsys):
+    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
+    planned = plan.save(out, suites.plan("nightly", 5, 2))
+    run.run(out, replace(planned, cases=planned.cases[:1]), stubs())
+    assert main(["pack", str(out), "--into", str(packed)]) == 0
+    before = packed.read_bytes()
+    with tarfile.open(packed) as content:
+        assert not [name for name in content.getnames() if "store" in name or "logs" in name]
+        content.extractall(tmp_path / "elsewhere", filter="data")
+    archive.pack([out], packed)
+    assert packed.read_bytes() == before
+    pages = []
+    for given in (out, packed):
+        capsys.readouterr()
+        assert main(["scores", str(given)]) == 0
+        pages.append(capsys.readouterr().out)
+    assert pages[0] == pages[1] and "1 of 2 cases; 1 not run" in pages[0]
+    run.run(tmp_path / "elsewhere" / "out", planned, stubs())
+    answers = score.read(tmp_path / "elsewhere" / "out").answers
+    assert [one.planned.label for one in answers] == ["5", "6"]
+    assert (out / "cases" / "5" / "verdict.json").read_bytes() == (
+        tmp_path / "elsewhere" / "out" / "cases" / "5" / "verdict.json"
+    ).read_bytes()
+
+
+def test_what_cannot_be_packed_or_unpacked_is_said(tmp_path, capsys):
+    (tmp_path / "a").mkdir()
+    assert main(["pack", str(tmp_path / "a"), "--into", str(tmp_path / "b")]) == 1
+    assert "holds no test" in capsys.readouterr().err and not (tmp_path / "b").exists()
+    assert main(["pack", *[str(tmp_path / "a")] * 2, "--into", str(tmp_path / "b")]) == 1
+    assert "Two of the folders" in capsys.readouterr().err
+    (tmp_path / "b").write_text("words")
+    assert main(["scores", str(tmp_path / "b")]) == 1
+    assert "no archive of tests" in capsys.readouterr().err
 
 
 # --- the commit

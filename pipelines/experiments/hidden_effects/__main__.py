@@ -21,6 +21,9 @@ python -m pipelines.experiments.hidden_effects score DIR
     the tables again, of what is there by now
 python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown docs/validation.md]
     the validation page: misses first, then the scores of all methods, home and abroad apart
+python -m pipelines.experiments.hidden_effects pack DIR [DIR ...] --into FILE.tar.xz
+    their answers and keys in one file, which `scores` takes as well as folders; unpacked with
+    `tar -xf`, a test goes on where it was
 
 Interrupted, give the same command again and it goes on; with a larger --count it grows. Exit
 code 2: verdicts of several programs, which no table holds; 3: a case has no verdict; 4: less than
@@ -37,6 +40,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipelines.experiments.hidden_effects import (
+    archive,
     plan,
     replay,
     run,
@@ -57,6 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given.what == "scores":
             return _scores(given)
+        if given.what == "pack":
+            print(archive.pack(given.out, given.into))
+            return 0
         if given.what != "score":
             _run(given)
         found = score.read(given.out)
@@ -85,7 +92,8 @@ def _short_of(found: Score, least: int) -> int:
 
 
 def _scores(given: argparse.Namespace) -> int:
-    page = validation.page([score.read(out) for out in given.out], given.markdown)
+    with archive.opened(given.out) as folders:
+        page = validation.page([score.read(folder) for folder in folders], given.markdown)
     if given.markdown is None:
         print(page.text)
     else:
@@ -135,11 +143,14 @@ def _parser() -> argparse.ArgumentParser:
     scored = commands.add_parser("score", help="the tables of what is there by now")
     scored.add_argument("out", type=Path)
     page = commands.add_parser("scores", help="the validation page of all cases found")
-    page.add_argument("out", type=Path, nargs="+", metavar="DIR")
+    page.add_argument("out", type=Path, nargs="+", metavar="DIR", help="or a packed file")
     page.add_argument(
         "--markdown", type=Path, metavar="PATH", help="write it there, with its picture"
     )
-    for one in (one for name, one in commands.choices.items() if name != "scores"):
+    packed = commands.add_parser("pack", help="answers and keys in one file")
+    packed.add_argument("out", type=Path, nargs="+", metavar="DIR")
+    packed.add_argument("--into", type=Path, required=True, metavar="FILE.tar.xz")
+    for one in (one for n, one in commands.choices.items() if n not in ("scores", "pack")):
         one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "
                          "are right and none is misnamed")  # fmt: skip
     return parser

@@ -1,0 +1,76 @@
+"""Answers and keys of tests in one file, small enough to lie beside the page that is made of them.
+
+A test may be unpacked from it, on any machine, and goes on where it was.
+"""
+
+from __future__ import annotations
+
+import tarfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from shiplog import files
+from shiplog.exceptions import ShiplogError
+
+KEPT = ("verdict.json", "verdict.sha256", "rivals.json", "rivals.sha256", "oracle.json",
+        "steps.json")  # fmt: skip
+
+
+def pack(tests: Sequence[Path], path: Path) -> Path:
+    """The sealed answers of these tests' folders, and their keys; the same bytes each time.
+
+    Raises ShiplogError where a folder holds no test, or two have one name.
+    """
+    if twice := {test.name for test in tests if sum(t.name == test.name for t in tests) > 1}:
+        raise ShiplogError(
+            f"Two of the folders are called {twice.pop()}.", hint="rename one of them."
+        )
+    with files.whole(path) as partial, tarfile.open(partial, "w:xz", preset=9) as packed:
+        for test in tests:
+            if not (test / "keys" / "plan.json").exists():
+                raise ShiplogError(
+                    f"{test} holds no test of hidden effects.", hint="give the --out of a suite."
+                )
+            for file in _contents(test):
+                about = tarfile.TarInfo(f"{test.name}/{file.relative_to(test).as_posix()}")
+                about.size = file.stat().st_size
+                with file.open("rb") as content:
+                    packed.addfile(about, content)
+    return path
+
+
+def _contents(test: Path) -> list[Path]:
+    """The plan, and of each sealed case its key and answers."""
+    sealed = sorted(seal.parent for seal in (test / "cases").glob("*/verdict.sha256"))
+    keys = [test / "keys" / f"{case.name}.json" for case in sealed]
+    return [
+        test / "keys" / "plan.json", *keys,
+        *(case / name for case in sealed for name in KEPT if (case / name).exists()),
+    ]  # fmt: skip
+
+
+@contextmanager
+def opened(given: Sequence[Path]) -> Iterator[list[Path]]:
+    """The folders of tests; of a file that was packed those in it, for as long as this lasts.
+
+    Raises ShiplogError where a file is no such archive.
+    """
+    with TemporaryDirectory() as temporary:
+        folders: list[Path] = []
+        for number, path in enumerate(given):
+            if not path.is_file():
+                folders.append(path)
+                continue
+            into = Path(temporary) / str(number)
+            try:
+                with tarfile.open(path) as packed:
+                    packed.extractall(into, filter="data")
+            except tarfile.TarError as error:
+                raise ShiplogError(
+                    f"{path} is no archive of tests ({error}).",
+                    hint="give a file that `pack` wrote, or the --out of a suite.",
+                ) from error
+            folders += sorted(into.iterdir())
+        yield folders
