@@ -66,7 +66,7 @@ def judged(
     search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
     """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.
-    Causes in doubt are not named: the decision is that of their remainder.
+    Causes in doubt are not named: the decision is that of their remainder, or undecided.
 
     Of several causes the one that takes most off the held-out error comes first.
     """
@@ -93,6 +93,9 @@ def judged(
                 f"here by {gain.low:.1%} to {gain.high:.1%}"
             )
             doubted = {one.cause.name: why for one in decision.named}
+            if not {*doubted} <= first:  # held-out voyages confirm no answer: all are listed
+                search.banned.clear()
+                doubted, refuted = refuted | doubted, {}
             return *decide(search, refuted, doubted), None, refuted
         if not worse:
             order = sorted(asked, key=lambda pair: -pair[1].reduction)

@@ -130,8 +130,11 @@ def test_what_takes_the_place_of_a_refuted_name_must_prove_itself(trial):
     )
     decision, _, gained, refuted = judged(made, HeldOut({DRAG: WORSE, LOAD: UNSURE}))
     assert (decision.verdict, decision.named, gained) == ("undecided", (), None)
-    assert list(refuted) == ["drag"]
+    assert decision.rejected["drag"].startswith("held-out voyages refute it")
     assert decision.rejected["load"].startswith("held-out voyages refute what is more probable")
+    # neither is confirmed, so each keeps its probability
+    assert refuted == {} and decision.ranking["drag"] == pytest.approx(0.96, abs=0.01)
+    assert decision.ranking["load"] == pytest.approx(0.039, abs=0.001)
 
 
 def test_what_was_named_beside_a_refuted_name_need_not(trial):

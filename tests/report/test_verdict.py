@@ -51,3 +51,16 @@ def test_the_gain_of_another_fit_alone_is_in_the_sentence():
 def test_noise_of_rougher_weather_is_mentioned_where_nothing_changed():
     assert "noise" not in sentence("none", [], None, None, 1.1)
     assert "Process noise is 1.3 times its nominal" in sentence("none", [], None, None, 1.3)
+
+
+def test_an_undecided_verdict_does_not_contradict_its_ranking():
+    """Either nothing is probable enough, or held-out voyages do not confirm what is."""
+    likely = [{"name": "fouling", "probability": 0.6}, {"name": "none", "probability": 0.3}]
+    assert sentence("undecided", [], None, None, 1.0, ranking=likely) == (
+        "Undecided: fouling (60%) or no change (30%). No answer has a probability of 90%."
+    )
+    sure = [{"name": "rudder_delay", "probability": 0.99}, {"name": "none", "probability": 0.01}]
+    assert sentence("undecided", [], None, None, 1.0, ranking=sure) == (
+        "Undecided: the log Bayes factor favours rudder delay (99%), which held-out voyages do not "
+        "confirm."
+    )
