@@ -21,18 +21,25 @@ from shiplog.models.causes import Cause
 
 NOISES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0)  # times the nominal
 FINE_STEP = 1.08  # step about the best of them
+LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
+MOST_PATHS = 8  # of the model as it stands, one closer to the measurement than the other, at most
 NO_CHANGE_OF_NOISE = Remainder()
 
 
 def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
     """The trial with weights of its segments, and the model as it stands, its path held as firmly
-    as the process noise then found allows. Segments on which the model diverges carry no
+    as the process noise then found allows, and linearised again until the evidence stays: causes
+    must not gain by a path that converges with them. Segments on which the model diverges carry no
     information."""
     first = trial.at(numbers)
     trial = replace(trial.leaving_out(first.linear.lost), first=first)
     trial = replace(trial, weight=robust(trial, first))
-    base, _ = scan(trial, first, (), trial.fixed)
-    point = trial.at(numbers, first, base.noise_factor)
+    point, last = first, -np.inf
+    for _ in range(MOST_PATHS):
+        base, _ = scan(trial, point, (), trial.fixed)
+        if abs(base.evidence - last) < LITTLE_NATS:
+            break
+        point, last = trial.at(numbers, point, base.noise_factor), base.evidence
     return replace(trial.leaving_out(point.linear.lost), begun=True), point
 
 

@@ -31,6 +31,10 @@ SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
 RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
+MOST_PULLS = 20  # of a path onto what was measured
+PULLED_NATS = (
+    0.5  # that a further pull would gain in any segment: fewer, and the path has converged
+)
 
 
 class Smooth(Physical, Protocol):
@@ -160,17 +164,20 @@ def pulled(
     g: SegmentGrid,
     wide: Wide,
     path: Path | None = None,
-    rounds: int = 2,
+    rounds: int = MOST_PULLS,
     about: np.ndarray | None = None,
 ) -> Path:
-    """Each segment's path onto what was measured: Gauss-Newton in start and knots.
+    """Each segment's path onto what was measured: Gauss-Newton in start and knots, until it
+    converges or for so many rounds.
 
     about   [S, 3J] acceleration at the knots that is expected of it; none unless given
     """
     path = path or first_path(model, theta, segments, g)
     for _ in range(rounds):
         y, z = simulated(model, theta, segments, path, g)
-        path = _closer(path, segments.y - y, z, segments.used, wide, about)
+        path, gained = _closer(path, segments.y - y, z, segments.used, wide, about)
+        if gained < PULLED_NATS:
+            break
     return path
 
 
@@ -179,15 +186,16 @@ def ahead(linear: Linear, d: np.ndarray, wide: Wide, about: np.ndarray | None = 
     Gauss-Newton: nothing is simulated, and what is not linear shows when it is linearised there.
     `about` as in `pulled`."""
     gap = linear.e - linear.j @ d - np.einsum("sbcz,sz->sbc", linear.z, linear.path.known)
-    return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)
+    return _closer(linear.path, gap, linear.z, linear.cut.used, wide, about)[0]
 
 
 def _closer(
     path: Path, gap: np.ndarray, z: np.ndarray, used: np.ndarray, wide: Wide,
     about: np.ndarray | None,
-) -> Path:  # fmt: skip
-    """One step of Gauss-Newton: gap [S, B, 6] is what was measured less what was simulated. A path
-    that diverged stays where it was."""
+) -> tuple[Path, float]:  # fmt: skip
+    """One step of Gauss-Newton, and the most nats that it is expected to gain in a segment: gap
+    [S, B, 6] is what was measured less what was simulated. A path that diverged stays where it
+    was."""
     count, _, _, size = z.shape
     away = np.logical_not(np.isfinite(gap).all((1, 2)) & np.isfinite(z).all((1, 2, 3)))
     if away.any():
@@ -205,9 +213,10 @@ def _closer(
     pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - known * prior**-2.0
     step = np.linalg.solve(normal, pull[..., None])[..., 0]
     step[away] = 0.0
-    return Path(
+    closer = Path(
         path.start + step[:, :6], path.acceleration + step[:, 6:].reshape(path.acceleration.shape)
     )
+    return closer, 0.5 * float((step * pull).sum(1).max(initial=0.0))
 
 
 def linear(

@@ -25,7 +25,6 @@ AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 LOST_NATS = 10.0  # of the numbers' log density: a step that loses more may be rejected
 MOST_HALVINGS = 3  # of one step, at most
 LEFT = 0.2  # standard deviations: expected distance from the optimum, at which a fit has converged
-LITTLE_NATS = 1.0  # gain of a step, too small to decide between hypotheses
 RATE = 0.1  # of convergence, until two steps give it: length of a step over that of the last one
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 
@@ -50,7 +49,7 @@ class _Iterate:
         if before is not None and before.step > 0.0 and damping == 1.0:
             rate = min(self.step / before.step, 0.99)
             gained = self.base.density - before.base.density
-        little = max(gained, 0.5 * self.step**2) < LITTLE_NATS
+        little = max(gained, 0.5 * self.step**2) < evidence.LITTLE_NATS
         return little or self.step * rate / (1.0 - rate) < LEFT
 
     def at_point(self) -> Found:

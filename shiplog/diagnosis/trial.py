@@ -177,9 +177,8 @@ class Trial:
             stood = np.concatenate((ref.theta, ref.columns.numbers(dict(near.numbers))))
             path = linearisation.ahead(near.linear, whole - stood, wide, about)
         else:
-            path = linearisation.pulled(
-                ref.model, whole, cut, self.grid, wide, near, 1 if near else 2, about
-            )
+            rounds = 1 if near else linearisation.MOST_PULLS
+            path = linearisation.pulled(ref.model, whole, cut, self.grid, wide, near, rounds, about)
         linear = linearisation.linear(
             ref.model, whole, cut, self.grid, path, moved, observed, ref.wide
         )

@@ -68,6 +68,22 @@ def test_a_path_is_pulled_onto_a_known_acceleration():
     assert found.acceleration[..., 1:-1] == pytest.approx(true.acceleration[..., 1:-1], abs=2e-3)
 
 
+def test_a_path_is_pulled_until_it_converges():
+    """From a start that is far off, two rounds leave it far from where it ends."""
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    start = true.start + np.array([30.0, 0.0, -30.0, 0.0, 2.0, 0.05])
+    free = replace(WIDE, start=1e3 * WIDE.start)
+    off = {}
+    for rounds in (2, linearisation.MOST_PULLS):
+        found = linearisation.pulled(
+            Toy(), THETA, cut, GRID, free, replace(true, start=start), rounds
+        )
+        y, _ = linearisation.simulated(Toy(), THETA, cut, found, GRID)
+        off[rounds] = np.abs(y - cut.y).max()
+    assert off[linearisation.MOST_PULLS] < 1e-3 < 0.1 < off[2]
+
+
 def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     """Held to what is expected, it is the true path at once; held to none, it has no acceleration
     and is off. The same where a linearisation says where it will be."""

@@ -189,6 +189,24 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     assert trial.weight[5] > 0.0
 
 
+def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
+    """Else a cause gains by a path that converges with it. Each path is ten times as close."""
+    nominal, record, given = made
+    asked: list[float] = []
+
+    class Closing(straight.Straight):
+        def at(self, *more):
+            asked.append(3.0 * 0.1 ** len(asked))
+            off = given.e + asked[-1] * np.sin(np.arange(given.e.size)).reshape(given.e.shape)
+            return straight.Straight.at(replace(self, given=replace(given, e=off)), *more)
+
+    trial, point = evidence.begin(Closing.of(nominal, record, given=given), {})
+    at_end, _ = evidence.scan(trial, point, (), ())
+    closest, _ = evidence.scan(trial, straight.Straight.at(trial, {}), (), ())
+    assert 3 < len(asked) < evidence.MOST_PATHS
+    assert at_end.evidence == pytest.approx(closest.evidence, abs=evidence.LITTLE_NATS)
+
+
 def test_what_is_left_out_is_left_out_of_a_trial_of_its_own(trial):
     out = np.arange(8) == 3
     less = trial.leaving_out(out)
