@@ -13,8 +13,9 @@ JUDGEMENTS: dict[str, str] = {
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
         "position and velocity. The random tests alone say, too, that the wind force athwart is "
-        "half of that published. The antenna's offset of a tenth of a metre is unconfirmed, and "
-        "half of the error is unexplained."
+        "half of that published, as it is with a wind that is measured 1.47 times too strong. That "
+        "it is the anemometer and not the force, and the wind's clock, are unconfirmed, and half "
+        "of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "
