@@ -212,18 +212,19 @@ def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
             continue
         angle = knots.driven[..., [i]]
         found += [np.sin(angle) * u * np.abs(u), 1.0 - np.cos(angle)]
+        bent = []
+        if actuator.kind == "rudder":
+            bent = [np.sin(np.pi * angle / hard_over(actuator))]
         for j in driven_by(profile, i, driving):
             thrust = knots.driven[..., [j]] * np.abs(knots.driven[..., [j]])
             found += [thrust * np.sin(angle), thrust * (1.0 - np.cos(angle))]
-            if actuator.kind == "rudder":
-                found.append(thrust * np.sin(np.pi * angle / hard_over(actuator)))
-        if actuator.kind == "rudder":
-            found.append(np.sin(np.pi * angle / hard_over(actuator)) * u * np.abs(u))
+            found += [thrust * shape for shape in bent]
+        found += [shape * u * np.abs(u) for shape in bent]
     return found
 
 
 def hard_over(rudder: Actuator) -> float:
-    """The largest angle of a rudder, rad, by its limits if the profile gives them."""
+    """The largest angle of a rudder, rad: of its limits, or 35 degrees without any."""
     return geometry.reach(rudder) or HARD_OVER
 
 

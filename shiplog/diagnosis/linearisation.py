@@ -31,10 +31,8 @@ SEGMENTS_AT_A_TIME = 64
 STILLEST = 1e-3  # m, m/s, rad or rad/s: no ship is measured as still as that
 KIND = np.array(((0, 2), (1, 3), (0, 2), (1, 3), (4, 4), (5, 5)))  # channels of one width
 RUN_AWAY = 10.0  # expected distances from its measurement, beyond which a path has diverged
-MOST_PULLS = 20  # of a path onto what was measured
-PULLED_NATS = (
-    0.5  # that a further pull would gain in any segment: fewer, and the path has converged
-)
+MOST_PULLS = 20  # steps of a path towards its measurement, at most
+PULLED_NATS = 0.5  # gain of a step in any segment: with less, the path has converged
 
 
 class Smooth(Physical, Protocol):

@@ -158,7 +158,7 @@ def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
     that it can be an error of their equations: little of what they explain, or, where that is
     named, of what one of its causes explains next to the others."""
     plain = table.found.get((one.causes, NOMINAL))
-    rest = tuple(n for n in one.causes if cause and name_of(n) != cause)
+    rest = tuple(n for n in one.causes if name_of(n) != cause) if cause else ()
     less = table.found.get((rest, NOMINAL), table.nothing)
     whole = one.evidence - less.evidence
     if plain is None or whole <= 0.0:

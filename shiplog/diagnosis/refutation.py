@@ -66,7 +66,9 @@ def judged(
     search: Search, held: Judge | None
 ) -> tuple[Decision, Posterior, Gain | None, dict[str, str]]:
     """The decision that held-out voyages leave, its posterior and gain, and name → why refuted.
-    Causes in doubt are not named: the decision is that of their remainder, or undecided.
+    Causes in doubt are not named: the decision is that of their remainder, or undecided. If
+    held-out voyages confirm no answer, refuted causes keep their probabilities, too, with the
+    reasons in the decision.
 
     Of several causes the one that takes most off the held-out error comes first.
     """
@@ -94,7 +96,7 @@ def judged(
             )
             doubted = {one.cause.name: why for one in decision.named}
             if not {*doubted} <= first:  # held-out voyages confirm no answer: all are listed
-                search.banned.clear()
+                search.banned.difference_update(refuted)
                 doubted, refuted = refuted | doubted, {}
             return *decide(search, refuted, doubted), None, refuted
         if not worse:

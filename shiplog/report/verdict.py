@@ -233,15 +233,15 @@ def sentence(
     if verdict == "named":
         return _named(causes, gain, alone, wrong)
     if verdict == "undecided":
-        listed = [one for one in ranking if one["probability"] >= thresholds.STATED] or ranking[:3]
-        text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in listed]
-        if listed and listed[0]["probability"] >= thresholds.STATED:
+        sure = [one for one in ranking if one["probability"] >= thresholds.STATED]
+        text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in sure or ranking[:3]]
+        if sure:
             return (
                 f"Undecided: the log Bayes factor favours {' and '.join(text)}, which held-out "
                 "voyages do not confirm."
             )
-        sure = f"{thresholds.STATED:.0%}"
-        return f"Undecided: {' or '.join(text)}. No answer has a probability of {sure}."
+        stated = f"{thresholds.STATED:.0%}"
+        return f"Undecided: {' or '.join(text)}. No answer has a probability of {stated}."
     if verdict == "unknown":
         assert structure is not None
         return _unknown(structure, noise_factor)

@@ -137,7 +137,7 @@ def test_what_takes_the_place_of_a_refuted_name_must_prove_itself(trial):
     assert decision.ranking["load"] == pytest.approx(0.039, abs=0.001)
 
 
-def test_what_was_named_beside_a_refuted_name_need_not(trial):
+def test_what_was_named_together_with_a_refuted_name_need_not(trial):
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
     held = HeldOut({("drag", "load"): BETTER, LOAD: UNSURE}, {"drag": (-0.5, -0.2), "load": UNSURE})
     decision, _, _, refuted = judged(made, held)

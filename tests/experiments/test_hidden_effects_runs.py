@@ -296,7 +296,7 @@ def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path
     ).read_bytes()
 
 
-def test_what_cannot_be_packed_or_unpacked_is_said(tmp_path, capsys):
+def test_what_cannot_be_packed_or_unpacked_is_reported(tmp_path, capsys):
     (tmp_path / "a").mkdir()
     assert main(["pack", str(tmp_path / "a"), "--into", str(tmp_path / "b")]) == 1
     assert "holds no test" in capsys.readouterr().err and not (tmp_path / "b").exists()

@@ -1,4 +1,4 @@
-"""Answers and keys of tests in one file, small enough to lie beside the page that is made of them.
+"""Answers and keys of tests in one file, small enough for the repository.
 
 A test may be unpacked from it, on any machine, and goes on where it was.
 """
