@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import gc
 import os
+import select
 import signal
 import sys
 import threading
@@ -90,10 +91,25 @@ class _Child:
     def wait(self) -> tuple[int, bytes]:
         """Its exit code, or minus the signal that ended it; and the file that it was reading."""
         passed_on = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {number: signal.signal(number, self._pass_on) for number in passed_on}
+        before = {number: signal.signal(number, lambda *_: None) for number in passed_on}
+        # Their numbers come through a pipe, too: one that arrives just before a read is not late
+        # until something can be read (the self-pipe trick of D. J. Bernstein).
+        woken, waking = os.pipe()
+        os.set_blocking(waking, False)
+        others = signal.set_wakeup_fd(waking)
         begun = b""  # names of the files that were begun, each with a zero behind it
-        while some := os.read(self.pipe, 1 << 16):
-            begun = (begun + some)[-(1 << 16) :]
+        while True:
+            ready = select.select([self.pipe, woken], [], [])[0]
+            if woken in ready:
+                for number in os.read(woken, 1 << 16):
+                    self._pass_on(number)
+            if self.pipe in ready:
+                if not (some := os.read(self.pipe, 1 << 16)):
+                    break
+                begun = (begun + some)[-(1 << 16) :]
+        signal.set_wakeup_fd(others)
+        os.close(woken)
+        os.close(waking)
         os.close(self.pipe)
         _, status = os.waitpid(self.pid, 0)
         for number, handler in before.items():
@@ -101,6 +117,6 @@ class _Child:
         names = begun.split(b"\0")
         return os.waitstatus_to_exitcode(status), names[-2] if len(names) > 1 else b""
 
-    def _pass_on(self, number: int, _frame: object) -> None:
+    def _pass_on(self, number: int) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, number)
