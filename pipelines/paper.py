@@ -9,6 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
+from pipelines import gpu as on_gpu
 from pipelines import train_networks
 from pipelines.evaluate import evaluate_runs
 from shiplog import files
@@ -20,7 +21,7 @@ from shiplog.report import viewer
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
 from shiplog.report.text_table import inert
-from shiplog.training import run_folder
+from shiplog.training import gpu, run_folder
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
@@ -71,9 +72,11 @@ def paper_command(
     epochs: int | None,
     jobs: int | None,
     ray: str | None,
+    device: str,
 ) -> Answer:
     """`shiplog paper`: every set, every seed, then tables and figures. Interrupted, the same
     command goes on. Raises ShiplogError."""
+    there = None if device == gpu.CPU else gpu.find()
     store = Store(store_path)
     chosen = choose_voyages(store, voyages, validation, window)
     say(chosen.of("d-ref"))
@@ -84,7 +87,7 @@ def paper_command(
         name: Config.model_validate({**settings, "data": name, "split": chosen.of(name)})
         for name in data
     }
-    finished, failures = train_sets(configs, store, out / "runs", jobs, ray)
+    finished, failures = train_sets(configs, store, out / "runs", jobs, ray, there)
     refuse_none_trained(finished, failures)
     results = collect(finished, failures, store)
     text = write(results, chosen, store, out)
@@ -154,9 +157,15 @@ def _halved(name: str, length: int) -> str:
 
 
 def train_sets(
-    configs: Mapping[str, Config], store: Store, out: Path, jobs: int | None, ray: str | None
+    configs: Mapping[str, Config],
+    store: Store,
+    out: Path,
+    jobs: int | None,
+    ray: str | None,
+    there: gpu.Device | None = None,
 ) -> tuple[dict[str, RunFolder], dict[str, str]]:
-    """Every training of every set in one queue. Finished sets, and trainings that failed."""
+    """Every training of every set in one queue, or on the GPU `there`. Finished sets, and
+    trainings that failed."""
     finished: dict[str, RunFolder] = {}
     begun: dict[str, train_networks.Begun] = {}
     failures: dict[str, str] = {}
@@ -178,11 +187,14 @@ def train_sets(
         from pipelines import cluster
 
         failures |= cluster.do(tasks, ray)
+    elif tasks and there is not None:
+        failures |= on_gpu.do(tasks, there)
     elif tasks:
         failures |= train_networks.do(tasks, jobs)
+    device = gpu.CPU if there is None else gpu.name(there)
     for name, one in begun.items():
         if all(one.run.finished(seed) for seed in one.run.config.seeds):
-            finished[name] = train_networks.finish(one)
+            finished[name] = train_networks.finish(one, device)
     return {name: finished[name] for name in configs if name in finished}, failures
 
 

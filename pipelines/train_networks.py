@@ -19,7 +19,14 @@ from shiplog.logs.health_report import CONTRACT
 from shiplog.models.feedforward import scaling
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.rollout import simulate
-from shiplog.training import load_model, network_files, network_gradient, random_streams, run_folder
+from shiplog.training import (
+    gpu,
+    load_model,
+    network_files,
+    network_gradient,
+    random_streams,
+    run_folder,
+)
 from shiplog.training.jittering import jittered
 from shiplog.training.job import Training
 from shiplog.training.load_model import NetworkRun, Run
@@ -39,9 +46,17 @@ from shiplog.voyages.windows import Windows
 log = logging.getLogger(__name__)
 
 
-def train_run(config: Config, store: Store, out: Path) -> Run:
+def train_run(config: Config, store: Store, out: Path, device: str = "cpu") -> Run:
     """Train every seed of a run; goes on where an interrupted one stopped. Raises ShiplogError."""
-    return _trained(begin(config, store, out))
+    if device == gpu.CPU:
+        return _trained(begin(config, store, out))
+    from pipelines.gpu import do as do_there  # which imports this module
+
+    there = gpu.find()
+    begun = begin(config, store, out)
+    tasks = tasks_of(begun.run)
+    refuse_unended(do_there(tasks, there), len(tasks))
+    return finish(begun, gpu.name(there))
 
 
 def train_network_again(old: RunFolder, out: Path) -> Run:
@@ -100,11 +115,11 @@ def begin(config: Config, store: Store, out: Path) -> Begun:
     return Begun(run, held, hashes, time.time())
 
 
-def finish(begun: Begun) -> Run:
-    """The run with its name, all seeds being trained."""
+def finish(begun: Begun, device: str = "cpu") -> Run:
+    """The run with its name, all seeds being trained; the last of them on `device`."""
     run = load_model.network(begun.run)
     run.save_band(_band(run, begun.held))
-    done = run.finish(provenance(begun.logs_sha256, begun.began))
+    done = run.finish(provenance(begun.logs_sha256, begun.began, device))
     return load_model.of_folder(done)
 
 
@@ -185,7 +200,7 @@ def _cut(run: RunFolder, rows: pl.DataFrame, planned: pl.DataFrame) -> Windows:
 
 def network_command(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:
     """`shiplog train` of a network: every seed trained."""
-    return answer(train_run(options.config(split), store, out), store.path)
+    return answer(train_run(options.config(split), store, out, options.device), store.path)
 
 
 def answer(run: Run, store_path: Path) -> Answer:

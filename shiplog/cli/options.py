@@ -41,6 +41,9 @@ Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
 Epochs = Annotated[
     int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")
 ]
+Device = Annotated[
+    str, typer.Option(help="cpu, or cuda: the paper's recipe on an NVIDIA GPU, all seeds at once.")
+]
 Validation = Annotated[
     list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
 ]

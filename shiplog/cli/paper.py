@@ -10,6 +10,7 @@ import typer
 from shiplog.cli.inputs import check_voyages
 from shiplog.cli.options import (
     STORE,
+    Device,
     Epochs,
     JsonOption,
     StoreOption,
@@ -19,6 +20,7 @@ from shiplog.cli.options import (
     Window,
 )
 from shiplog.cli.output import LOST, answer
+from shiplog.exceptions import UsageError
 
 
 def paper(
@@ -34,6 +36,7 @@ def paper(
     window: Window = 100,
     width: Width = 256,
     epochs: Epochs = None,
+    device: Device = "cpu",
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Trainings at a time; one a core unless given.")
     ] = None,
@@ -53,7 +56,8 @@ def paper(
 
     chosen = list(dict.fromkeys(data or AUGMENTATIONS))
     for name in chosen:
-        TrainOptions(data=name, recipe=recipe).check()
+        TrainOptions(data=name, recipe=recipe, device=device).check()
+    _refuse_together(device, jobs, ray)
     check_writable(out, "--out")
     check_voyages(store, voyages, validation)
     from pipelines.bars import loading
@@ -74,7 +78,18 @@ def paper(
         epochs=epochs,
         jobs=jobs,
         ray=ray,
+        device=device,
     )
     answer(found.text, found.content, json_to)
     if found.content["failures"]:
         raise typer.Exit(LOST)
+
+
+def _refuse_together(device: str, jobs: int | None, ray: str | None) -> None:
+    """Raises UsageError for a GPU and, at once, processes or a cluster."""
+    for value, flag in ((jobs, "--jobs"), (ray, "--ray")):
+        if device == "cuda" and value is not None:
+            raise UsageError(
+                f"{flag} says nothing to --device cuda: one process trains all seeds on the GPU.",
+                hint=f"leave {flag} or --device out.",
+            )

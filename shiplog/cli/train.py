@@ -10,6 +10,7 @@ import typer
 from shiplog.cli.inputs import check_voyages
 from shiplog.cli.options import (
     STORE,
+    Device,
     Epochs,
     JsonOption,
     StoreOption,
@@ -77,6 +78,7 @@ def train(
     width: Width = 256,
     wind_input: WindInput = None,
     epochs: Epochs = None,
+    device: Device = "cpu",
     fit: Fit = True,
     parameters: Parameters = None,
     without: Without = None,
@@ -100,7 +102,7 @@ def train(
     options = TrainOptions(
         model=model, data=data, voyages=tuple(voyages or ()), validation=tuple(validation or ()),
         seeds=seeds, window=window, recipe=recipe, width=width, wind_input=wind_input,
-        epochs=epochs, fit=fit, parameters=parameters, without=tuple(without or ()),
+        epochs=epochs, device=device, fit=fit, parameters=parameters, without=tuple(without or ()),
         free=tuple(free or ()), folds=folds,
     )  # fmt: skip
     options.check()

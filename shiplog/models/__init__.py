@@ -31,7 +31,7 @@ class ModelFamily:
 NETWORK = ModelFamily(
     "network",
     "a network",
-    options=("recipe", "width", "wind_input", "epochs", "copies"),
+    options=("recipe", "width", "wind_input", "epochs", "device", "copies"),
     sections=("network", "paper", "fast"),
 )
 PHYSICS = ModelFamily(

@@ -52,13 +52,8 @@ class Training:
 
         Raises RunError where windows hold what is not a number, or no weights have a finite loss.
         """
+        self.refuse_not_finite()
         batches = (self.training, self.validation)
-        for name, batch in zip(("training", "validation"), batches, strict=True):
-            if not all(bool(t.isfinite().all()) for t in (batch.velocity, batch.driven, batch.dt)):
-                raise RunError(
-                    f"The {name} windows hold values that are not finite.",
-                    hint="ingest the voyages again and see `shiplog check` for what is wrong.",
-                )
         if self.config.recipe == "paper":
             progress = network_training.paper(
                 self.model, *batches, self.config.paper, self.seed, checkpoint=checkpoint,
@@ -68,12 +63,26 @@ class Training:
             progress = network_training.fast(
                 self.model, *batches, self.config.fast, self.seed, report=report
             )
+        self.refuse_diverged(progress)
+        return progress
+
+    def refuse_diverged(self, progress: Progress) -> None:
+        """Raises RunError where no weights of a training have a finite loss."""
         if not math.isfinite(progress.best):
             raise RunError(
                 f"Every rollout of seed {self.seed} diverged: no weights have a finite loss.",
                 hint="look at the voyages' velocities and actuators with `shiplog voyages`.",
             )
-        return progress
+
+    def refuse_not_finite(self) -> None:
+        """Raises RunError where windows hold what is not a number."""
+        batches = (self.training, self.validation)
+        for name, batch in zip(("training", "validation"), batches, strict=True):
+            if not all(bool(t.isfinite().all()) for t in (batch.velocity, batch.driven, batch.dt)):
+                raise RunError(
+                    f"The {name} windows hold values that are not finite.",
+                    hint="ingest the voyages again and see `shiplog check` for what is wrong.",
+                )
 
     def finished(self, progress: Progress) -> bool:
         """Whether its recipe is at an end there."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from torch import Tensor
@@ -234,7 +235,12 @@ def _rows(values: Tensor) -> Tensor:
 
 
 def _error_weights(like: Tensor) -> Tensor:
-    return torch.tensor(channels.VELOCITY_WEIGHTS, dtype=like.dtype, device=like.device) ** 2
+    return _weights_of(like.dtype, like.device)
+
+
+@cache  # a CUDA graph must not copy from the processor's memory while it is captured
+def _weights_of(dtype: torch.dtype, device: torch.device) -> Tensor:
+    return torch.tensor(channels.VELOCITY_WEIGHTS, dtype=dtype, device=device) ** 2
 
 
 def adam(

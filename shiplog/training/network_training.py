@@ -147,12 +147,18 @@ def paper_done(progress: Progress, settings: Paper) -> bool:
 def _note(
     progress: Progress, values: list[Tensor], training: float, loss: float, alpha: float
 ) -> None:
-    """One more epoch in the history; the best weights so far (smoothing as in Eq. 23)."""
+    """One more epoch in the history; the best weights so far."""
+    if loss < progress.best:
+        progress.best_weights = [v.clone() for v in values]
+    note_losses(progress, training, loss, alpha)
+
+
+def note_losses(progress: Progress, training: float, loss: float, alpha: float) -> None:
+    """One more epoch in the history (smoothing as in Eq. 23), without its weights."""
     progress.smoothed = alpha * loss + (1.0 - alpha) * progress.smoothed
     progress.history.append((progress.epoch, training, loss, progress.smoothed))
     if loss < progress.best:
         progress.best = loss
-        progress.best_weights = [v.clone() for v in values]
 
 
 def fast(

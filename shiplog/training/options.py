@@ -10,7 +10,7 @@ from typing import Any
 from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import UsageError, listed, nearest
 from shiplog.models import MODELS, PHYSICS, taking
-from shiplog.training.run_config import RECIPES, WIND_INPUTS, Config
+from shiplog.training.run_config import DEVICES, RECIPES, WIND_INPUTS, Config
 from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.split_settings import Split
 
@@ -33,6 +33,7 @@ class TrainOptions:
     width        units of each hidden layer
     wind_input   angle (default of the paper's recipe) or components (of the fast one)
     epochs       cap on the epochs (paper) or iterations (fast)
+    device       cpu, or cuda: the paper's recipe on an NVIDIA GPU, all seeds at once
 
     Of physical models:
     fit          identify; else the coefficients as they are published or estimated
@@ -52,6 +53,7 @@ class TrainOptions:
     width: int = 256
     wind_input: str | None = None
     epochs: int | None = None
+    device: str = "cpu"
     fit: bool = True
     parameters: Path | None = None
     without: tuple[str, ...] = ()
@@ -65,6 +67,7 @@ class TrainOptions:
             (self.model, MODELS, "--model"),
             (self.data, AUGMENTATIONS, "--data"),
             (self.recipe, RECIPES, "--recipe"),
+            (self.device, DEVICES, "--device"),
             (self.wind_input or WIND_INPUTS[0], WIND_INPUTS, "--wind-input"),
         ):
             if value not in allowed:
@@ -72,6 +75,12 @@ class TrainOptions:
                     f"{option} {value!r} does not exist{nearest(value, allowed)}.",
                     hint=f"{option} can be {listed(allowed)}.",
                 )
+        if self.device == "cuda" and self.recipe != "paper":
+            raise UsageError(
+                f"--device cuda does not go with the {self.recipe} recipe, which takes seconds on "
+                "a core.",
+                hint="add --recipe paper, or leave --device out.",
+            )
         if self.window < LEAST_WINDOW:
             raise UsageError(
                 f"A window of {self.window} s is too short to compare velocities in.",

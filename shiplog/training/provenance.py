@@ -23,10 +23,11 @@ class Answer:
     content: dict
 
 
-def provenance(logs_sha256: Mapping[str, str | None], began: float) -> dict:
+def provenance(logs_sha256: Mapping[str, str | None], began: float, device: str = "cpu") -> dict:
     """Versions, commit, log hashes, device and times; no path of this machine.
 
     logs_sha256   voyage → hash of its log
+    device        which finished the run
     """
     return {
         "shiplog": version("shiplog"),
@@ -35,7 +36,7 @@ def provenance(logs_sha256: Mapping[str, str | None], began: float) -> dict:
         "torch": version("torch"),
         "polars": pl.__version__,
         "machine": platform.machine(),
-        "device": "cpu",
+        "device": device,
         "logs_sha256": dict(logs_sha256),
         "began": _utc(began),
         "ended": _utc(time.time()),

@@ -17,6 +17,7 @@ from shiplog.voyages.split_settings import Split
 
 RECIPES = ("fast", "paper")
 WIND_INPUTS = ("angle", "components")
+DEVICES = ("cpu", "cuda")
 
 
 class Paper(Section):

@@ -218,6 +218,15 @@ OPTIONS = {
     "--data": (2, ["did you mean 'sli"], lambda d: d.train("--data", "sli99")),
     "--recipe": (2, ["--recipe can be fast, paper"], lambda d: d.train("--recipe", "quick")),
     "--wind-input": (2, ["--wind-input can be"], lambda d: d.train("--wind-input", "sails")),
+    "--device": (2, ["--device can be cpu, cuda"], lambda d: d.train("--device", "tpu")),
+    "--device for the fast recipe": (2, ["add --recipe paper"],
+                                     lambda d: d.train("--device", "cuda")),
+    "--device of a physical model": (2, ["says nothing to a physical model"], lambda d: d.train(
+        "--model", "mmg", "--device", "cuda", "--recipe", "paper")),
+    "a GPU and processes": (2, ["--jobs says nothing to --device cuda"], lambda d: [
+        "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--jobs", "2"]),
+    "a GPU and a cluster": (2, ["--ray says nothing to --device cuda"], lambda d: [
+        "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--ray", "a:1"]),
     "--no-fit of a network": (2, ["says nothing to a network"], lambda d: d.train("--no-fit")),
     "--parameters of a network": (2, ["says nothing"], lambda d: d.train("--parameters", "x.toml")),
     "--without of a network": (2, ["says nothing"], lambda d: d.train("--without", "wind")),

@@ -5,11 +5,14 @@ import json
 import polars as pl
 import pytest
 import sailing
+import torch
 from commands import call
 
+from pipelines import gpu as on_gpu
 from pipelines.paper import choose_voyages
 from shiplog.exceptions import StoreError
 from shiplog.report.paper import figures, sets
+from shiplog.training import gpu, network_files
 
 FEW = ("--window", 20, "--width", 8, "--seeds", 2, "--epochs", 2)
 DATA = ("ref", "sli2", "jit2", "d-ref")
@@ -78,6 +81,75 @@ def test_given_again_it_trains_nothing_and_says_the_same(experiment, store, monk
     code, again, _ = call("paper", "--store", store.path, "--out", out, *FEW, *options)
     assert (code, again) == (0, text)
     assert weights.stat().st_mtime_ns == before
+
+
+def by_paper(store, out, *options):
+    return call("paper", "--store", store.path, "--out", out, "--recipe", "paper", *FEW,
+                "--data", "ref", "--data", "jit2", *options)  # fmt: skip
+
+
+def test_a_gpu_trains_the_same_networks(store, tmp_path, monkeypatch):
+    """The processor in its place: all but the CUDA graph, which has a test where there is a GPU.
+    In 32 bits Adam's first steps, which are as long for any slope, differ by rounding."""
+    monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
+    monkeypatch.setattr(on_gpu, "CHECKPOINT_EPOCHS", 1)
+    assert by_paper(store, tmp_path / "there", "--device", "cuda")[0] == 0
+    assert by_paper(store, tmp_path / "here")[0] == 0
+    there, here = (
+        pl.read_parquet(tmp_path / out / "tables" / "test_losses.parquet")
+        for out in ("there", "here")
+    )
+    assert there.drop("loss").equals(here.drop("loss"))
+    assert there["loss"].to_list() == pytest.approx(here["loss"].to_list(), rel=5e-3)
+    assert not list((tmp_path / "there").rglob("checkpoint*"))
+
+
+def test_a_gpu_goes_on_from_checkpoints(store, tmp_path, monkeypatch):
+    monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
+    monkeypatch.setattr(on_gpu, "CHECKPOINT_EPOCHS", 1)
+    save, after = network_files.save_checkpoint, []
+
+    def interrupt(folder, progress):
+        save(folder, progress)
+        after.append(progress.epoch)
+        if len(after) == 3:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(network_files, "save_checkpoint", interrupt)
+        by_paper(store, tmp_path, "--device", "cuda", "--epochs", 5)
+    code, _, _ = by_paper(store, tmp_path, "--device", "cuda", "--epochs", 5)
+    assert code == 0
+    losses = pl.read_parquet(tmp_path / "tables" / "validation_losses.parquet")
+    counts = losses.group_by("set", "seed").len()["len"].to_list()
+    assert counts == [6] * 4  # the initial weights and five epochs, none twice
+
+
+def test_a_seed_that_diverges_on_a_gpu_is_reported_and_costs_no_other(store, tmp_path, monkeypatch):
+    monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
+    begin = on_gpu.training_of
+
+    def broken(run, seed):
+        training = begin(run, seed)
+        if seed == 1:
+            with torch.no_grad():
+                training.model.weights[-1].fill_(float("inf"))
+        return training
+
+    monkeypatch.setattr(on_gpu, "training_of", broken)
+    code, _, text = by_paper(store, tmp_path, "--device", "cuda")
+    assert code == 1 and "Every rollout of seed 1 diverged" in text
+    assert (tmp_path / "runs" / "ref.partial" / "seed0" / "model.safetensors").exists()
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_gpu_that_is_absent_is_reported_before_the_work(store, tmp_path):
+    code, _, text = by_paper(store, tmp_path / "out", "--device", "cuda")
+    assert code == 1 and "needs an NVIDIA GPU" in text and "leave --device out" in text
+    code, _, text = call("train", "--store", store.path, "--out", tmp_path / "run", "--recipe",
+                         "paper", "--device", "cuda", "--window", 20)  # fmt: skip
+    assert code == 1 and "needs an NVIDIA GPU" in text
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_of_other_settings_is_reported_and_not_touched(experiment, store):
