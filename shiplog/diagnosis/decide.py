@@ -62,6 +62,7 @@ def decide(
         verdict, named, structure, side_force, traces,
         _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
         found.ranking(), reported, nothing, search.expected,
+        _in_addition(table, found, best, named),
     ), found  # fmt: skip
 
 
@@ -120,6 +121,15 @@ def _named(
             )
         )  # fmt: skip
     return tuple(given)
+
+
+def _in_addition(
+    table: Hypotheses, found: Posterior, best: Hypothesis, named: Sequence[Named]
+) -> tuple[str, ...]:
+    """Names of which one acts in addition to those that are named. A remainder that is not slight
+    could do their work, too."""
+    clear = best.kind == NOMINAL or posteriors.slight(table, best)
+    return found.one_of if named and clear else ()
 
 
 def _instead(found: Posterior, best: Hypothesis, label: str) -> dict[str, float]:

@@ -34,6 +34,8 @@ class Posterior:
     labels       the same of each of its kinds, such as each clock
     kinds        kind of remainder → probability; noise raised by little counts as nominal
     none         probability that nothing of practical size changed
+    one_of       names, each too improbable to be stated, one of which at least acts: that is
+                 probable enough
     hidden       name → weight, relative to all these hypotheses, of causes that were only scanned
     """
 
@@ -44,6 +46,7 @@ class Posterior:
     kinds: Mapping[str, float]
     none: float
     hidden: Mapping[str, float]
+    one_of: tuple[str, ...] = ()
 
     @property
     def stated(self) -> tuple[str, ...]:
@@ -84,12 +87,14 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     labels: dict[str, float] = {}
     kinds: dict[str, float] = {}
     none = 0.0
+    large_in: list[dict[str, float]] = []
     for one, p in zip(kept, share, strict=True):
         real = practical(search.table, one)
         by_name: dict[str, float] = {}
         for label, large in real.items():
             labels[label] = labels.get(label, 0.0) + float(p) * large
             by_name[name_of(label)] = max(by_name.get(name_of(label), 0.0), large)
+        large_in.append(by_name)
         for name, large in by_name.items():
             names[name] = names.get(name, 0.0) + float(p) * large
         kind = practical_kind(one)
@@ -105,7 +110,22 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
             name = name_of(label)
             hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
     order = sorted(names, key=lambda name: -names[name])
-    return Posterior(tuple(kept), share, {n: names[n] for n in order}, labels, kinds, none, hidden)
+    names = {n: names[n] for n in order}
+    one_of = _one_of(names, large_in, share)
+    return Posterior(tuple(kept), share, names, labels, kinds, none, hidden, one_of)
+
+
+def _one_of(
+    names: Mapping[str, float], large_in: Sequence[Mapping[str, float]], share: np.ndarray
+) -> tuple[str, ...]:
+    """The fewest of the likeliest unstated names of which one acts with the stated probability."""
+    group: list[str] = []
+    for name in (n for n, p in names.items() if p < thresholds.STATED):
+        group.append(name)
+        without = [math.prod(1.0 - large.get(n, 0.0) for n in group) for large in large_in]
+        if 1.0 - float(share @ np.array(without)) >= thresholds.STATED:
+            return tuple(group)
+    return ()
 
 
 def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:

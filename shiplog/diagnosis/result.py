@@ -62,6 +62,7 @@ class Decision:
     fit        the hypothesis of the verdict: what is named, or nothing, with its remainder
     nothing    no cause, with the same remainder
     expected   label → expected log Bayes factor of each cause, by its size
+    one_of     names of which one acts in addition, which of them these data cannot tell
     adapted    whether the model's coefficients are fitted again together with the named causes
     """
 
@@ -75,6 +76,7 @@ class Decision:
     fit: Fit
     nothing: Fit
     expected: Mapping[str, ExpectedEvidence] = field(default_factory=dict)
+    one_of: tuple[str, ...] = ()
     adapted: bool = False
 
     @property
@@ -82,7 +84,7 @@ class Decision:
         """The same with nothing named, and the process noise as it is reported."""
         noise_factor = self.fit.found.noise_factor
         nothing = replace(self.nothing.found, noise_factor=noise_factor)
-        return replace(self, named=(), fit=replace(self.nothing, found=nothing))
+        return replace(self, named=(), one_of=(), fit=replace(self.nothing, found=nothing))
 
 
 def without(trial: Trial, decision: Decision, one: Named) -> Decision:

@@ -112,7 +112,7 @@ def verdict(
     if not context.lost:
         sentence = verdicts.sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
-            ranking, context.wrong,
+            ranking, context.wrong, decision.one_of,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(

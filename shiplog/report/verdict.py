@@ -223,15 +223,18 @@ def sentence(
     alone: float | None = None,
     ranking: Sequence[dict] = (),
     wrong: Sequence[dict] = (),
+    one_of: Sequence[str] = (),
 ) -> str:
     """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
     noise_factor  factor of the process noise on its nominal standard deviation
     alone   share of the error that a second fit without any cause removes; None without that fit
     wrong   share of the error in each channel, before any cause is included
+    one_of  names of which one acts in addition
     """
     if verdict == "named":
-        return _named(causes, gain, alone, wrong)
+        named = _named(causes, gain, alone, wrong)
+        return f"{named} {_in_addition(one_of, ranking)}".strip()
     if verdict == "undecided":
         sure = [one for one in ranking if one["probability"] >= thresholds.STATED]
         text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in sure or ranking[:3]]
@@ -280,6 +283,15 @@ def _named(
     if alone is None:
         return text
     return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
+
+
+def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:
+    """One cause more, of which only these are left."""
+    if not one_of:
+        return ""
+    likely = {one["name"]: one["probability"] for one in ranking}
+    text = " or ".join(f"{_answer(name)} ({likely[name]:.0%})" for name in one_of)
+    return f"By the log Bayes factor, {text} acts as well: these data cannot tell which."
 
 
 def _unknown(structure: dict, noise_factor: float) -> str:

@@ -41,6 +41,29 @@ def test_one_name(trial):
     assert found.fit.included == ("drag",)
 
 
+def test_of_two_causes_that_cannot_be_told_apart_one_acts_in_addition(trial):
+    """Neither has 0.9, but one or the other is in hypotheses of 0.97."""
+    either = {(("drag", "load"), NOMINAL): 0.7, (("drag", "two"), NOMINAL): 0.2,
+              (("drag", "load", "two"), NOMINAL): 0.07, (DRAG, NOMINAL): 0.03}  # fmt: skip
+    found = verdict(trial, either)
+    assert named(found) == ["drag"] and found.one_of == ("load", "two")
+    # 0.87 is too little, and nothing is stated in addition to a verdict without a name
+    less = {**either, (DRAG, NOMINAL): 0.145}
+    assert verdict(trial, less).one_of == ()
+    alone = {(LOAD, NOMINAL): 0.7, (TWO, NOMINAL): 0.3}
+    assert (verdict(trial, alone).verdict, verdict(trial, alone).one_of) == ("undecided", ())
+
+
+def test_what_a_remainder_could_do_is_not_stated_in_addition(trial):
+    """It explains 50 of 400 nats, which is not slight; 2 are."""
+    kinds = {(("drag", "load"), "position"): 0.7, (("drag", "two"), "position"): 0.3}
+    plain = {(("drag", "load"), NOMINAL): 1e-9, (("drag", "two"), NOMINAL): 1e-9}
+    for explained, expected in ((50.0, ()), (2.0, ("load", "two"))):
+        evidence = dict.fromkeys(kinds, 400.0) | dict.fromkeys(plain, 400.0 - explained)
+        found = verdict(trial, {**kinds, **plain}, evidence=evidence)
+        assert (named(found), found.one_of) == (["drag"], expected)
+
+
 def test_two_names_each_with_its_own_part_of_the_covariance(trial, monkeypatch):
     """And with the form error of its own numbers, 2 % of them unless it is said to be none."""
     made = weighed.search(trial, {(("drag", "two"), NOMINAL): 1.0})

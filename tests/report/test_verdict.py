@@ -25,6 +25,22 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
+def test_one_of_several_causes_that_acts_in_addition_is_in_the_sentence():
+    sure = {
+        "sentence": "The clock is late.", "name": "clock_offset", "probability": 1.0,
+        "indistinguishable_from": [],
+    }  # fmt: skip
+    ranking = [sure, {"name": "wind_force", "probability": 0.8},
+               {"name": "wind_speed_scale", "probability": 0.17}]  # fmt: skip
+    gained = Gain(500.0, 300.0, 0.3, 0.5, 18, {})
+    one_of = ("wind_force", "wind_speed_scale")
+    assert sentence("named", [sure], None, gained, 1.0, ranking=ranking, one_of=one_of).endswith(
+        "is late. By the log Bayes factor, wind force (80%) or wind speed scale (17%) acts as "
+        "well: these data cannot tell which."
+    )
+    assert sentence("named", [sure], None, gained, 1.0, ranking=ranking).endswith("is late.")
+
+
 def test_the_largest_part_that_is_not_explained_is_in_the_sentence():
     """Of shares 0.6 and 0.3 before: nine tenths of the first are taken off, a third of the second,
     so that 0.06 and 0.2 are left."""
