@@ -41,10 +41,16 @@ def decide(
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
     mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
     verdict, structure, named, side_force = "undecided", None, (), None
+    either: tuple[str, ...] = ()
     if sure and mostly:
         verdict, named = "named", _named(table, found, best, sure)
     elif best.kind != NOMINAL and (kind is not None or names):
-        verdict, structure = "unknown", _structure(table, best, fit)
+        structure = _structure(table, best, fit)
+        probable = tuple(n for n in best.causes if name_of(n) in found.stated)
+        if not device and posteriors.explain_more(table, best, probable):
+            either = tuple(dict.fromkeys(map(name_of, probable)))
+        else:
+            verdict = "unknown"
     elif found.none >= thresholds.STATED:
         verdict = "none"
     if verdict in ("named", "unknown") and device:
@@ -61,8 +67,8 @@ def decide(
     return Decision(
         verdict, named, structure, side_force, traces,
         _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
-        found.ranking(), reported, nothing, search.expected,
-        _in_addition(table, found, best, named),
+        found.ranking(either), reported, nothing, search.expected,
+        _in_addition(table, found, best, named), either,
     ), found  # fmt: skip
 
 

@@ -8,7 +8,7 @@ kind of remainder is, or nothing, or the verdict is undecided.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,11 +66,18 @@ class Posterior:
         found = [k for k, p in self.kinds.items() if k != NOMINAL and p >= thresholds.STATED]
         return found[0] if found else None
 
-    def ranking(self) -> dict[str, float]:
+    def ranking(self, either: Collection[str] = ()) -> dict[str, float]:
         """Every answer with its probability, likeliest first. Causes that these data would hardly
-        show were not weighed one by one: of "none" they keep what they had before any data."""
-        of = {**self.names, "none": self.none}
-        of |= {f"unknown:{FAMILY.get(k, k)}": p for k, p in self.kinds.items() if k != NOMINAL}
+        show were not weighed one by one: of "none" they keep what they had before any data.
+
+        either   names of causes that act, or else the remainder does: each has half
+        """
+        share = 0.5 if either else 1.0
+        of = {n: share * p if n in either else p for n, p in self.names.items()}
+        of["none"] = self.none
+        of |= {
+            f"unknown:{FAMILY.get(k, k)}": share * p for k, p in self.kinds.items() if k != NOMINAL
+        }
         whole = 1.0 + sum(self.hidden.values())
         for name, p in self.hidden.items():
             of[name] = of.get(name, 0.0) + p
@@ -184,6 +191,17 @@ def slight(table: Hypotheses, one: Hypothesis, cause: str = "") -> bool:
     if plain is None or whole <= 0.0:
         return False
     return one.evidence - plain.evidence <= thresholds.SLIGHT * whole
+
+
+def explain_more(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> bool:
+    """Whether these causes by themselves explain more than the remainder of a hypothesis does by
+    itself. What is left next to them may then be an error of their equations. Not where one of
+    both was never weighed."""
+    alone = table.found.get((tuple(causes), NOMINAL))
+    remainder = table.found.get(((), one.kind))
+    if not causes or alone is None or remainder is None:
+        return False
+    return alone.evidence > remainder.evidence
 
 
 def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -> Hypothesis:

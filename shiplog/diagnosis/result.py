@@ -53,8 +53,9 @@ class Structure:
 class Decision:
     """The decision from the posterior, before the held-out test.
 
-    verdict    named, none or unknown
+    verdict    named, none, unknown or undecided
     named      in the order they were found
+    structure  of what is unknown, or may be
     side_force  the unrecorded thruster, where it is one of the causes
     traces     causes below their practical size
     rejected   label → why not
@@ -63,6 +64,8 @@ class Decision:
     nothing    no cause, with the same remainder
     expected   label → expected log Bayes factor of each cause, by its size
     one_of     names of which one acts in addition, which of them these data cannot tell
+    either     names of causes that act, or else something outside the catalogue does: these data
+               cannot tell which
     adapted    whether the model's coefficients are fitted again together with the named causes
     """
 
@@ -77,6 +80,7 @@ class Decision:
     nothing: Fit
     expected: Mapping[str, ExpectedEvidence] = field(default_factory=dict)
     one_of: tuple[str, ...] = ()
+    either: tuple[str, ...] = ()
     adapted: bool = False
 
     @property
@@ -125,5 +129,5 @@ def untold(decision: Decision) -> Decision:
     """Of a model that simulates nothing: its error goes with the motion, and has no name."""
     return replace(
         decision, verdict="unknown", named=(), side_force=None, traces=(),
-        structure=Structure("motion", 0.0, ()),
+        structure=Structure("motion", 0.0, ()), either=(),
     )  # fmt: skip

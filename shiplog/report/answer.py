@@ -24,6 +24,7 @@ from shiplog.voyages.recording import Record
 RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
+OPEN = ("unknown", "undecided")  # what may be such an error
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def verdict(
     if not context.lost:
         sentence = verdicts.sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
-            ranking, context.wrong, decision.one_of,
+            ranking, context.wrong, decision.one_of, decision.either,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
@@ -186,7 +187,7 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
     family = decision.structure.family if decision.structure else ""
     most = thresholds.UNCOVERED_WINDOWS
     unseen = held is not None and len(context.uncovered) > most * len(held.cut)
-    if decision.verdict == "unknown" and not context.lost and family in INPUTS and unseen:
+    if decision.verdict in OPEN and not context.lost and family in INPUTS and unseen:
         return "coverage"
     # less than a segment in all is listed, but is no answer for the trial
     external_s = sum(one.end_s - one.start_s for one in context.external)

@@ -224,6 +224,7 @@ def sentence(
     ranking: Sequence[dict] = (),
     wrong: Sequence[dict] = (),
     one_of: Sequence[str] = (),
+    either: Sequence[str] = (),
 ) -> str:
     """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
@@ -231,10 +232,14 @@ def sentence(
     alone   share of the error that a second fit without any cause removes; None without that fit
     wrong   share of the error in each channel, before any cause is included
     one_of  names of which one acts in addition
+    either  names that act, or else the structure does
     """
     if verdict == "named":
         named = _named(causes, gain, alone, wrong)
         return f"{named} {_in_addition(one_of, ranking)}".strip()
+    if verdict == "undecided" and either:
+        assert structure is not None
+        return _either(either, structure, ranking)
     if verdict == "undecided":
         sure = [one for one in ranking if one["probability"] >= thresholds.STATED]
         text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in sure or ranking[:3]]
@@ -283,6 +288,19 @@ def _named(
     if alone is None:
         return text
     return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
+
+
+def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict]) -> str:
+    """Causes, or something that is not in the catalogue and does much of the same."""
+    likely = {one["name"]: one["probability"] for one in ranking}
+    outside = f"unknown:{structure['family']}"
+    causes = listed(map(_answer, names))
+    return (
+        f"Undecided: {causes} ({likely.get(names[0], 0.0):.0%}), or {_answer(outside)} "
+        f"({likely.get(outside, 0.0):.0%}). Both together explain most, and alone {causes} more. "
+        "Either the equations of the catalogue are not those of this ship, or something unknown "
+        "acts."
+    )
 
 
 def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:

@@ -150,6 +150,25 @@ def test_a_name_has_to_explain_more_than_the_remainder_with_it(trial):
     assert (much.verdict, named(much)) == ("named", ["drag"])
 
 
+@pytest.mark.parametrize(
+    ("alone", "word", "share"), [(25.0, "undecided", 0.5), (15.0, "unknown", 1.0)]
+)
+def test_a_cause_that_alone_explains_more_than_the_remainder_alone_may_be_it(
+    trial, alone, word, share
+):
+    """Of 80 nats together the drag has too few to be named. The remainder alone has 20: where the
+    drag alone has more, the rest may be an error of its equations."""
+    sure = {(DRAG, "time"): 0.94, (DRAG, NOMINAL): 0.02, ((), "time"): 0.02, ((), NOMINAL): 0.02}
+    evidence = {(DRAG, "time"): 80.0, (DRAG, NOMINAL): alone, ((), "time"): 20.0}
+    found = verdict(trial, sure, evidence=evidence)
+    assert (found.verdict, named(found)) == (word, [])
+    assert found.either == (("drag",) if word == "undecided" else ())
+    assert found.structure.family == "time"
+    assert found.ranking["unknown:time"] == pytest.approx(share * 0.96)
+    assert found.ranking["drag"] == pytest.approx(share * 0.96)
+    assert found.ranking["none"] == pytest.approx(0.02)
+
+
 @pytest.mark.parametrize(("share", "word"), [(0.3, "named"), (0.7, "unknown")])
 def test_a_cause_that_the_remainder_imitates_is_not_named_with_it(trial, monkeypatch, share, word):
     """What acts through the same inputs may be a part of the unknown force: then that is

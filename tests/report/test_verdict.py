@@ -80,3 +80,15 @@ def test_an_undecided_verdict_does_not_contradict_its_ranking():
         "Undecided: the log Bayes factor favours rudder delay (99%), which held-out voyages do not "
         "confirm."
     )
+
+
+def test_a_cause_or_something_outside_the_catalogue_is_undecided():
+    ranking = [{"name": n, "probability": 0.5} for n in ("unknown:motion", "fouling")]
+    structure = {"family": "motion", "acts_on": ["surge"], "depends_on": []}
+    assert sentence(
+        "undecided", [], structure, None, 1.0, ranking=ranking, either=("fouling",)
+    ) == (
+        "Undecided: fouling (50%), or something outside the catalogue (motion) (50%). Both "
+        "together explain most, and alone fouling more. Either the equations of the catalogue are "
+        "not those of this ship, or something unknown acts."
+    )

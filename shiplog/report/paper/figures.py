@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLUMNS = 3  # of histograms side by side
+SETS = 4  # side by side
 LEAST_ERROR = 0.1  # of d, where its axis begins: a window begins with none
 LABELS = {c.name: c.label for c in channels.VELOCITY} | {"d": "error d"}
 
@@ -81,9 +82,10 @@ def validation(histories: pl.DataFrame, path: Path) -> None:
     histories   set, seed, epoch, smoothed
     """
     sets = histories["set"].unique(maintain_order=True).to_list()
-    rows = math.ceil(len(sets) / 4)
+    columns = min(SETS, len(sets))
+    rows = math.ceil(len(sets) / columns)
     with figure(0.5 + 1.6 * rows, path) as drawn:
-        axes = drawn.subplots(rows, 4, sharex=True, sharey=True, squeeze=False).ravel()
+        axes = drawn.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axis, name in zip(axes, sets, strict=False):
             own = histories.filter(pl.col("set") == name)
             for _, one in own.group_by("seed", maintain_order=True):
