@@ -70,6 +70,7 @@ def test_more_measured_data_beats_every_augmentation_or_it_is_not_shown():
     row = found(losses(d_ref=d_ref, **noisy), "d-ref")
     assert row["right"] == "sli2" and row["high"] < 1.0
     assert row["finding"] == statements.UNCLEAR
+    assert statements.sentence(row).endswith("of sli2: not shown of every augmented set.")
     worse = better | {"jit2": [0.25 * x for x in five[:-1]] + [26.0]}
     assert found(losses(d_ref=d_ref, **worse), "d-ref")["finding"] == statements.FAILS
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 3  # of histograms side by side
 SETS = 4  # side by side
+EPOCH_TICKS = 4  # at most, so that those of one set do not run into the next
 LEAST_ERROR = 0.1  # of d, where its axis begins: a window begins with none
 LABELS = {c.name: c.label for c in channels.VELOCITY} | {"d": "error d"}
 
@@ -81,6 +82,8 @@ def validation(histories: pl.DataFrame, path: Path) -> None:
 
     histories   set, seed, epoch, smoothed
     """
+    from matplotlib.ticker import EngFormatter, MaxNLocator
+
     sets = histories["set"].unique(maintain_order=True).to_list()
     columns = min(SETS, len(sets))
     rows = math.ceil(len(sets) / columns)
@@ -92,6 +95,8 @@ def validation(histories: pl.DataFrame, path: Path) -> None:
                 axis.plot(one["epoch"], one["smoothed"], color=COLOURS[name], linewidth=0.6)
             axis.set_yscale("log")
             axis.set_title(named(name), color=COLOURS[name])
+        axes[0].xaxis.set_major_locator(MaxNLocator(EPOCH_TICKS))
+        axes[0].xaxis.set_major_formatter(EngFormatter(sep=""))
         for axis in axes[len(sets) :]:
             axis.set_axis_off()
         drawn.supxlabel("epoch", fontsize=8)

@@ -138,4 +138,7 @@ def sentence(row: Mapping[str, Any]) -> str:
     if row["low"] is None:
         return f"L of {left} is {ratio:.2f} times that of {right}: one seed, so no interval."
     between = f"{row['low']:.2f} to {row['high']:.2f}"
-    return f"L of {left} is {ratio:.2f} ({between}) times that of {right}: {row['finding']}."
+    finding = row["finding"]
+    if finding == UNCLEAR and row["high"] < 1.0:  # of one set; the statement is about every set
+        finding = f"{UNCLEAR} of every augmented set"
+    return f"L of {left} is {ratio:.2f} ({between}) times that of {right}: {finding}."
