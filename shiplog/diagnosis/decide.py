@@ -15,7 +15,14 @@ from shiplog.diagnosis.hypothesis import Hypothesis, name_of
 from shiplog.diagnosis.intermittent import force_at_nodes
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, Remainder
-from shiplog.diagnosis.result import Decision, Named, Structure
+from shiplog.diagnosis.result import (
+    EXPLAIN_MORE,
+    PATTERN,
+    REFUTED,
+    Decision,
+    Named,
+    Structure,
+)
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -35,20 +42,26 @@ def decide(
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
-    device = is_device(table, best, fit)  # then what remains has a name, too
+    one_device = of_one_device(table, best, fit)
+    device = one_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
     kept = [n for n in best.causes if name_of(n) not in in_doubt]
     mostly = device or posteriors.share_of_causes(table, best, kept) >= thresholds.MOST
     verdict, structure, named, side_force = "undecided", None, (), None
     either: tuple[str, ...] = ()
+    why = ""
     if sure and mostly:
         verdict, named = "named", _named(table, found, best, sure)
     elif best.kind != NOMINAL and (kind is not None or names):
         structure = _structure(table, best, fit)
         probable = tuple(n for n in best.causes if name_of(n) in found.stated)
-        if not device and posteriors.explain_more(table, best, probable):
-            either = tuple(dict.fromkeys(map(name_of, probable)))
+        if one_device == 0.0 and posteriors.explain_more(table, best, probable):
+            either, why = tuple(dict.fromkeys(map(name_of, probable))), EXPLAIN_MORE
+        elif 0.0 < one_device < thresholds.STATED:
+            why = PATTERN
+        elif refuted and not device:
+            either, why = tuple(refuted), REFUTED
         else:
             verdict = "unknown"
     elif found.none >= thresholds.STATED:
@@ -67,8 +80,8 @@ def decide(
     return Decision(
         verdict, named, structure, side_force, traces,
         _reasons(search, found, refuted | dict(doubted or {}) | in_doubt, named),
-        found.ranking(either), reported, nothing, search.expected,
-        _in_addition(table, found, best, named), either,
+        found.ranking(either, why, one_device), reported, nothing, search.expected,
+        _in_addition(table, found, best, named), either, why,
     ), found  # fmt: skip
 
 
@@ -161,10 +174,10 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
     return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
 
 
-def is_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> bool:
-    """Whether an intermittent force is what remains, and is that of one device."""
+def of_one_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> float:
+    """Probability that what remains is an intermittent force, and that of one device."""
     if best.kind != INTERMITTENT or best.side_force is None:
-        return False
+        return 0.0
     with_it = _with_side_force(fit, best.side_force)
     force, deviation = force_at_nodes(table.trial, with_it, best.side_force)
     return posteriors.of_one_device(force, deviation)

@@ -16,7 +16,8 @@ import numpy as np
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.remainder import NOMINAL, RAISED
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.result import REFUTED, SIDE_THRUST
 from shiplog.diagnosis.search import Search
 from shiplog.models.causes.base import deviations
 
@@ -66,18 +67,27 @@ class Posterior:
         found = [k for k, p in self.kinds.items() if k != NOMINAL and p >= thresholds.STATED]
         return found[0] if found else None
 
-    def ranking(self, either: Collection[str] = ()) -> dict[str, float]:
+    def ranking(
+        self, either: Collection[str] = (), why: str = "", device: float = 0.0
+    ) -> dict[str, float]:
         """Every answer with its probability, likeliest first. Causes that these data would hardly
         show were not weighed one by one: of "none" they keep what they had before any data.
 
         either   names of causes that act, or else the remainder does: each has half
+        why      REFUTED: held-out voyages refute `either`; all that is left without has half
+        device   probability that an intermittent force is that of one device
         """
-        share = 0.5 if either else 1.0
-        of = {n: share * p if n in either else p for n, p in self.names.items()}
-        of["none"] = self.none
-        of |= {
-            f"unknown:{FAMILY.get(k, k)}": share * p for k, p in self.kinds.items() if k != NOMINAL
+        half, rest = (0.5 if either else 1.0), (0.5 if why == REFUTED else 1.0)
+        of = {
+            f"unknown:{FAMILY.get(k, k)}": half * p for k, p in self.kinds.items() if k != NOMINAL
         }
+        if device and INTERMITTENT in self.kinds:
+            force = of.pop(f"unknown:{INTERMITTENT}")
+            of[SIDE_THRUST] = device * force
+            of |= {f"unknown:{INTERMITTENT}": (1.0 - device) * force} if device < 1.0 else {}
+        of |= dict.fromkeys(either if why == REFUTED else (), half)
+        of |= {n: half * p if n in either else rest * p for n, p in self.names.items()}
+        of["none"] = rest * self.none
         whole = 1.0 + sum(self.hidden.values())
         for name, p in self.hidden.items():
             of[name] = of.get(name, 0.0) + p
@@ -214,18 +224,24 @@ def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -
     return (likeliest or holding or found.hypotheses)[0]
 
 
-def of_one_device(force: np.ndarray, deviation: np.ndarray) -> bool:
-    """Whether a side force [S, J], N, is that of one device, which is on or off.
+def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
+    """Probability that a side force [S, J], N, is that of one device, which is on or off: one,
+    zero, or a half where its pattern is between both.
 
-    A force that merely varies is between its extremes for much of the time: a Gaussian one as
-    often between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever between.
+    A force that merely varies is between its extremes for much of the time: a Gaussian one is 1.13
+    times as long between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever
+    between.
     `deviation` [S, J] is the standard deviation of the estimate.
     """
     size = np.abs(force)
     strongest = float(np.quantile(size, 0.95))
     if strongest < 2.0 * float(np.median(deviation)):
-        return False
+        return 0.0
     on = size > 0.5 * strongest
     between = (size > 0.2 * strongest) & ~on
-    often = on.mean() > 0.5  # what is on for most of the time is no device that comes and goes
-    return bool(not often and between.sum() < thresholds.BETWEEN * on.sum())
+    share = between.sum() / on.sum()
+    if on.mean() > 0.5:  # what is on for most of the time is no device that comes and goes
+        return 0.0
+    if share < thresholds.BETWEEN:
+        return 1.0
+    return 0.5 if share < 1.0 else 0.0

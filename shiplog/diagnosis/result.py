@@ -14,6 +14,10 @@ from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.models.causes import Cause, ParameterEstimate
 
+EXPLAIN_MORE = "explain more"  # why a verdict is undecided: the causes by themselves do
+REFUTED = "refuted"  # the same: held-out voyages refute the most probable causes
+PATTERN = "pattern"  # the same: a force is on and off less clearly than a device, and clearer than
+# one that varies
 SIDE_THRUST = "side_thrust"
 
 
@@ -66,6 +70,7 @@ class Decision:
     one_of     names of which one acts in addition, which of them these data cannot tell
     either     names of causes that act, or else something outside the catalogue does: these data
                cannot tell which
+    why        an undecided verdict is: EXPLAIN_MORE, REFUTED, PATTERN, or else nothing is probable
     adapted    whether the model's coefficients are fitted again together with the named causes
     """
 
@@ -81,6 +86,7 @@ class Decision:
     expected: Mapping[str, ExpectedEvidence] = field(default_factory=dict)
     one_of: tuple[str, ...] = ()
     either: tuple[str, ...] = ()
+    why: str = ""
     adapted: bool = False
 
     @property
@@ -129,5 +135,5 @@ def untold(decision: Decision) -> Decision:
     """Of a model that simulates nothing: its error goes with the motion, and has no name."""
     return replace(
         decision, verdict="unknown", named=(), side_force=None, traces=(),
-        structure=Structure("motion", 0.0, ()), either=(),
+        structure=Structure("motion", 0.0, ()), either=(), why="",
     )  # fmt: skip

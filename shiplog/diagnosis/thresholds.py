@@ -47,7 +47,8 @@ BASELINE = 0.5
 ORDINARY_NOISE = 1.5
 
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
-# time that it is on, while a force that merely varies is between as often as above.
+# time that it is on. A force that merely varies is between as long as above; where a force is less
+# than that, both are as probable.
 BETWEEN = 0.5
 
 # --- whether there is a verdict, and what is listed with it

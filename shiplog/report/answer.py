@@ -15,6 +15,7 @@ from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
+from shiplog.report.verdict_sentence import less, sentence
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.load_model import Run
@@ -109,16 +110,16 @@ def verdict(
     word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
-    sentence = f"{none_named(context.lost)}."
+    text = f"{none_named(context.lost)}."
     if not context.lost:
-        sentence = verdicts.sentence(
+        text = sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
-            ranking, context.wrong, decision.one_of, decision.either,
+            ranking, context.wrong, decision.one_of, decision.either, decision.why,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
     return Verdict(
         verdict=word,
-        sentence=sentence,
+        sentence=text,
         run=context.run.name,
         before_effect=context.before_effect,
         made=_made(context.run, context.before_effect),
@@ -174,8 +175,8 @@ def of_physics(run: Run, trial: Trial, found: Gain | None) -> list[str]:
     if found is not None:
         notes.append(
             f"On the same windows that MMG has an error "
-            f"{verdicts.less(found.reduction)} with them ({verdicts.less(found.low)} to "
-            f"{verdicts.less(found.high)})."
+            f"{less(found.reduction)} with them ({less(found.low)} to "
+            f"{less(found.high)})."
         )
     return notes
 

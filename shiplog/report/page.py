@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
-from shiplog.report.verdict import HOPELESS, Verdict, less
+from shiplog.report.verdict import HOPELESS, Verdict
+from shiplog.report.verdict_sentence import less
 
 
 def markdown(verdict: Verdict) -> str:

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis, in the contract's words, with its sentences."""
+"""The answer of a diagnosis, in the contract's words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from shiplog.simulation.error_reduction import Gain
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
 HOPELESS = 30.0  # realistic sizes, beyond which a cause counts as undetectable
 NINETY_SPREADS = 1.645  # standard deviations to either end of a 90 % interval
-NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
 
 
 @dataclass(frozen=True)
@@ -214,144 +213,6 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     return tuple(sorted(found, key=lambda one: one["share"]))
 
 
-def sentence(
-    verdict: str,
-    causes: Sequence[dict],
-    structure: dict | None,
-    gain: Gain | None,
-    noise_factor: float,
-    alone: float | None = None,
-    ranking: Sequence[dict] = (),
-    wrong: Sequence[dict] = (),
-    one_of: Sequence[str] = (),
-    either: Sequence[str] = (),
-) -> str:
-    """The verdict in a few sentences: the share of the error that is explained, then the causes.
-
-    noise_factor  factor of the process noise on its nominal standard deviation
-    alone   share of the error that a second fit without any cause removes; None without that fit
-    wrong   share of the error in each channel, before any cause is included
-    one_of  names of which one acts in addition
-    either  names that act, or else the structure does
-    """
-    if verdict == "named":
-        named = _named(causes, gain, alone, wrong)
-        return f"{named} {_in_addition(one_of, ranking)}".strip()
-    if verdict == "undecided" and either:
-        assert structure is not None
-        return _either(either, structure, ranking)
-    if verdict == "undecided":
-        sure = [one for one in ranking if one["probability"] >= thresholds.STATED]
-        text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in sure or ranking[:3]]
-        if sure:
-            return (
-                f"Undecided: the log Bayes factor favours {' and '.join(text)}, which held-out "
-                "voyages do not confirm."
-            )
-        stated = f"{thresholds.STATED:.0%}"
-        return f"Undecided: {' or '.join(text)}. No answer has a probability of {stated}."
-    if verdict == "unknown":
-        assert structure is not None
-        return _unknown(structure, noise_factor)
-    if verdict == "coverage":
-        return "Not trained in these conditions: record data there first, then diagnose again."
-    if verdict == "external":
-        return "The ship was pushed, held or towed: no force of its own explains these stretches."
-    text = (
-        "No change found: the errors are those that the model already has on its nominal voyages."
-    )
-    if noise_factor < NOTED_NOISE:
-        return text
-    return (
-        f"{text} Process noise is {noise_factor:.1f} times its nominal standard deviation: no more "
-        "than it varies."
-    )
-
-
-def _named(
-    causes: Sequence[dict], gain: Gain | None, alone: float | None, wrong: Sequence[dict]
-) -> str:
-    text = " ".join(_likely(cause) for cause in causes)
-    if gain is None:
-        return text
-    if gain.real:
-        share = (
-            f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
-            f"explained ({gain.low:.0%} to {gain.high:.0%})."
-        )
-    else:
-        share = (
-            f"No part of the error on {gain.windows} held-out windows is surely explained: it "
-            f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
-        )
-    text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
-    if alone is None:
-        return text
-    return f"{text} Fitted again with nothing named, the model has an error {less(alone)}."
-
-
-def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict]) -> str:
-    """Causes, or something that is not in the catalogue and does much of the same."""
-    likely = {one["name"]: one["probability"] for one in ranking}
-    outside = f"unknown:{structure['family']}"
-    causes = listed(map(_answer, names))
-    return (
-        f"Undecided: {causes} ({likely.get(names[0], 0.0):.0%}), or {_answer(outside)} "
-        f"({likely.get(outside, 0.0):.0%}). Both together explain most, and alone {causes} more. "
-        "Either the equations of the catalogue are not those of this ship, or something unknown "
-        "acts."
-    )
-
-
-def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:
-    """One cause more, of which only these are left."""
-    if not one_of:
-        return ""
-    likely = {one["name"]: one["probability"] for one in ranking}
-    text = " or ".join(f"{_answer(name)} ({likely[name]:.0%})" for name in one_of)
-    return f"By the log Bayes factor, {text} acts as well: these data cannot tell which."
-
-
-def _unknown(structure: dict, noise_factor: float) -> str:
-    if structure["family"] == "intermittent":
-        return (
-            "Outside the catalogue: an intermittent side force acts on the ship, and no device "
-            "of known place and pattern explains it."
-        )
-    if structure["family"] == "stochastic":
-        return (
-            f"Outside the catalogue: process noise is {noise_factor:.1f} times its nominal "
-            "standard deviation, and no cause explains that."
-        )
-    return (
-        f"Outside the catalogue: it acts on {listed(structure['acts_on'])} and depends on "
-        f"{listed(structure['depends_on'])}."
-    )
-
-
-def _left(gain: Gain, wrong: Sequence[dict]) -> str:
-    """The channel with the largest part of the error that the causes leave; empty without one."""
-    left = {
-        one["channel"]: one["share_of_error"] * (1.0 - gain.channels.get(one["channel"], 0.0))
-        for one in wrong
-    }
-    if not left:
-        return ""
-    channel, share = max(left.items(), key=lambda pair: pair[1])
-    return (
-        f"The largest unexplained part is in {channel.replace('_', ' ')}: {share:.0%} of the error."
-    )
-
-
-def _answer(name: str) -> str:
-    """One entry of the ranking, in words."""
-    if name == "none":
-        return "no change"
-    if name.startswith("unknown:"):
-        return f"something outside the catalogue ({name.partition(':')[2]})"
-    return name.replace("_", " ")
-
-
 def unseen_json(row: Dependence) -> dict:
     """One row of the table of inputs that the model does not have."""
     r2 = dict(zip((c.name for c in VELOCITY), row.r2, strict=True))
@@ -371,26 +232,3 @@ def rejected_json(reasons: Mapping[str, str]) -> tuple[dict, ...]:
         name, _, channel = label.partition(":")
         found.append({"name": name, "reason": f"{channel}: {why}" if channel else why})
     return tuple(found)
-
-
-def _likely(cause: dict) -> str:
-    """A cause's sentence, with its probability where that is below `thresholds.STATED`."""
-    if cause["probability"] >= thresholds.STATED:
-        return _or(cause)
-    how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
-    return f"{how}, and not surely ({cause['probability']:.0%}): {_or(cause)}"
-
-
-def _or(cause: dict) -> str:
-    """A cause's sentence, with the causes that these data cannot tell from it."""
-    others = cause["indistinguishable_from"]
-    if not others:
-        return cause["sentence"]
-    return (
-        f"{cause['sentence'].removesuffix('.')}; or it is {listed(others)}: these data cannot tell."
-    )
-
-
-def less(share: float) -> str:
-    """A relative reduction of the error, in words; a negative one is an increase."""
-    return f"{abs(share):.1%} {'less' if share >= 0.0 else 'more'}"

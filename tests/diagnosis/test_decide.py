@@ -10,6 +10,7 @@ from shiplog.diagnosis import decide as deciding
 from shiplog.diagnosis import fits, thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.result import PATTERN, REFUTED
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
@@ -240,7 +241,7 @@ def test_a_name_of_two_kinds_is_reported_in_the_likelier(trial):
 def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, monkeypatch):
     sure = {((), INTERMITTENT): 0.98, ((), NOMINAL): 0.02}
     for device, wanted in ((True, "named"), (False, "unknown")):
-        monkeypatch.setattr(deciding, "is_device", lambda *_, device=device: device)
+        monkeypatch.setattr(deciding, "of_one_device", lambda *_, device=device: float(device))
         found = verdict(trial, sure, side_force=SIDE_THRUST)
         assert found.verdict == wanted
         assert (found.side_force is SIDE_THRUST) == device
@@ -250,6 +251,28 @@ def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, mon
         )  # that the process noise has from then on
         assert found.fit.remainder.intermittent == (tuple(intermittent) if device else None)
         assert found.nothing.remainder == found.fit.remainder
+
+
+def test_an_intermittent_force_of_unclear_pattern_may_be_a_device_or_not(trial, monkeypatch):
+    monkeypatch.setattr(deciding, "of_one_device", lambda *_: 0.5)
+    found = verdict(trial, {((), INTERMITTENT): 0.98, ((), NOMINAL): 0.02}, side_force=SIDE_THRUST)
+    assert (found.verdict, found.why, found.side_force) == ("undecided", PATTERN, None)
+    assert found.ranking == pytest.approx(
+        {"side_thrust": 0.49, "unknown:intermittent": 0.49, "none": 0.02}
+    )
+
+
+def test_what_is_refuted_leaves_a_remainder_in_doubt(trial):
+    """Held-out voyages refute a model. Either it is not of this ship, or the cause is not there:
+    what is left without the cause is no surer than the cause."""
+    made = weighed.search(trial, {(DRAG, NOMINAL): 0.97, ((), "time"): 0.02, (LOAD, "time"): 0.01})
+    decision, _ = decide(made, {"drag": "it is worse"})
+    assert (decision.verdict, decision.why) == ("undecided", REFUTED)
+    assert decision.either == ("drag",)
+    assert set(list(decision.ranking)[:2]) == {"unknown:time", "drag"}
+    assert decision.ranking["drag"] == 0.5
+    assert decision.ranking["unknown:time"] == pytest.approx(0.5)
+    assert decision.ranking["load"] == pytest.approx(0.5 / 3.0, rel=0.01)
 
 
 def test_a_refuted_name_is_not_named_and_its_reason_is_kept(trial):

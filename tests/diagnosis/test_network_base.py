@@ -19,7 +19,7 @@ from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.setup import trial_of
 from shiplog.diagnosis.trial_voyages import in_ship_time, record_of
 from shiplog.exceptions import RunError
-from shiplog.report import verdict as verdicts
+from shiplog.report.verdict_sentence import less
 from shiplog.training import extension_file, load_model
 from shiplog.training.run_config import Config, Fast, NetworkSettings
 from shiplog.voyages.split_settings import Split
@@ -185,7 +185,7 @@ def test_a_networks_verdict_is_of_the_mmg_and_its_gain_of_the_network(afloat):
     assert done.verdict.gain.before == pytest.approx(afloat.held.losses_before.sum(1).mean())
     assert [c["name"] for c in done.verdict.causes] == ["current"]
     output = [n for n in done.verdict.notes if "MMG" in n]
-    assert "run is a network" in output[0] and verdicts.less(found.reduction) in output[1]
+    assert "run is a network" in output[0] and less(found.reduction) in output[1]
     trial, decision = done.simulated
     assert trial.reference.model.base.weights and done.whole.j.shape[-1] == 2  # the current's
     assert done.trial.reference.model.base is not trial.reference.model.base

@@ -1,6 +1,7 @@
 """Sentences of a verdict."""
 
-from shiplog.report.verdict import sentence
+from shiplog.diagnosis.result import EXPLAIN_MORE, PATTERN, REFUTED
+from shiplog.report.verdict_sentence import sentence
 from shiplog.simulation.error_reduction import Gain
 
 
@@ -86,9 +87,38 @@ def test_a_cause_or_something_outside_the_catalogue_is_undecided():
     ranking = [{"name": n, "probability": 0.5} for n in ("unknown:motion", "fouling")]
     structure = {"family": "motion", "acts_on": ["surge"], "depends_on": []}
     assert sentence(
-        "undecided", [], structure, None, 1.0, ranking=ranking, either=("fouling",)
+        "undecided",
+        [],
+        structure,
+        None,
+        1.0,
+        ranking=ranking,
+        either=("fouling",),
+        why=EXPLAIN_MORE,
     ) == (
         "Undecided: fouling (50%), or something outside the catalogue (motion) (50%). Both "
         "together explain most, and alone fouling more. Either the equations of the catalogue are "
         "not those of this ship, or something unknown acts."
+    )
+
+
+def test_what_held_out_voyages_refute_leaves_both_open():
+    ranking = [{"name": n, "probability": 0.5} for n in ("unknown:motion", "payload")]
+    structure = {"family": "motion", "acts_on": ["surge"], "depends_on": []}
+    assert sentence(
+        "undecided", [], structure, None, 1.0, ranking=ranking, either=("payload",), why=REFUTED
+    ) == (
+        "Undecided: payload (50%), or something outside the catalogue (motion) (50%). The log "
+        "Bayes factor favours payload, and held-out voyages refute it. Either the equations of the "
+        "catalogue are not those of this ship, or something unknown acts."
+    )
+
+
+def test_a_force_of_unclear_pattern_may_be_a_thruster():
+    ranking = [{"name": n, "probability": 0.5} for n in ("side_thrust", "unknown:intermittent")]
+    structure = {"family": "intermittent", "acts_on": ["sway"], "depends_on": []}
+    assert sentence("undecided", [], structure, None, 1.0, ranking=ranking, why=PATTERN) == (
+        "Undecided: side thrust (50%), or something outside the catalogue (intermittent) (50%). A "
+        "side force comes and goes: less clearly on or off than one device is, and more clearly "
+        "than a force that varies."
     )
