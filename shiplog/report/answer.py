@@ -105,8 +105,7 @@ def verdict(
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.side_force is not None:
         times = error_location.active_intervals(trial, decision, decision.side_force)
-        sure = decision.ranking.get("unknown:intermittent", 0.0)
-        causes.append(verdicts.side_force_json(decision, times, sure))
+        causes.append(verdicts.side_force_json(decision, times))
     word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)

@@ -132,7 +132,7 @@ def equation(named: Named) -> str:
     return named.cause.equation.format(**values)
 
 
-def side_force_json(decision: Decision, times: Sequence[dict], probability: float) -> dict:
+def side_force_json(decision: Decision, times: Sequence[dict]) -> dict:
     """An unrecorded thruster. `times`: voyage, start_s, end_s, force_N, sd_N."""
     found = decision.side_force
     assert found is not None
@@ -145,7 +145,7 @@ def side_force_json(decision: Decision, times: Sequence[dict], probability: floa
     where = "ahead of" if found.lever >= 0.0 else "abaft"
     return {
         "name": SIDE_THRUST,
-        "probability": probability,
+        "probability": min(decision.ranking[SIDE_THRUST], 1.0),
         "parameters": {"force": size},
         "times": list(times),
         "sentence": (

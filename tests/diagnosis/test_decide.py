@@ -12,6 +12,7 @@ from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.result import PATTERN, REFUTED
 from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.report.verdict import side_force_json
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
 WIND, GNSS = ("clock:wind",), ("clock:gnss",)
@@ -251,6 +252,9 @@ def test_an_intermittent_force_is_a_device_only_where_it_is_on_or_off(trial, mon
         )  # that the process noise has from then on
         assert found.fit.remainder.intermittent == (tuple(intermittent) if device else None)
         assert found.nothing.remainder == found.fit.remainder
+        if device:  # it is reported with the probability of the force
+            reported = side_force_json(found, [])
+            assert (reported["name"], reported["probability"]) == ("side_thrust", 0.98)
 
 
 def test_an_intermittent_force_of_unclear_pattern_may_be_a_device_or_not(trial, monkeypatch):
