@@ -101,7 +101,8 @@ def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict], why:
     reasons = {
         EXPLAIN_MORE: f"Both together explain most, and alone {causes} more. {OTHER_EQUATIONS}",
         REFUTED: (
-            f"The log Bayes factor favours {causes}, and held-out voyages refute it. "
+            f"The log Bayes factor favours {causes}, and held-out voyages refute "
+            f"{'it' if len(names) == 1 else 'them'}. "
             f"{OTHER_EQUATIONS}"
         ),
         PATTERN: (
