@@ -9,7 +9,7 @@ import straight
 
 from shiplog.diagnosis.fitted import Found
 from shiplog.diagnosis.hypothesis import Hypothesis
-from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -38,7 +38,7 @@ def search(
 
     evidence   of a hypothesis; 100 nats a cause where none is given
     sizes      of a label's numbers
-    raised     factor of raised process noise
+    raised     factor of raised process noise, alone or together with an intermittent force
     spread     standard deviation of every number
     """
     point = of.first
@@ -55,6 +55,9 @@ def search(
         noise = raised if kind == RAISED else 1.0
         found = Found("+".join(labels), output, noise, numbers, spread**2 * np.eye(count))
         remainder = Remainder(kind, 3.0)
+        if kind == INTERMITTENT:
+            beyond = np.sqrt(raised**2 - 1.0) * of.reference.process_noise.acceleration
+            remainder = Remainder(kind, intermittent=tuple(map(float, beyond)))
         score = float(np.log(p)) - 40.0
         made.table.found[labels, kind] = Hypothesis(
             tuple(sorted(labels)), remainder, output, score, point, found, side_force

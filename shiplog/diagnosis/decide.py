@@ -12,7 +12,6 @@ from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, name_of
-from shiplog.diagnosis.intermittent import force_at_nodes
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, Remainder
 from shiplog.diagnosis.result import (
@@ -42,7 +41,7 @@ def decide(
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
     fit = table.fit(best)
-    one_device = of_one_device(table, best, fit)
+    one_device, remains = posteriors.device(best), posteriors.practical_kind(table, best)
     device = one_device >= thresholds.STATED  # then what remains has a name, too
     in_doubt = _imitated(table, best, fit, names)
     sure = tuple(name for name in names if name not in in_doubt)
@@ -53,7 +52,7 @@ def decide(
     why = ""
     if sure and mostly:
         verdict, named = "named", _named(table, found, best, sure)
-    elif best.kind != NOMINAL and (kind is not None or names):
+    elif remains != NOMINAL and (kind is not None or names):
         structure = _structure(table, best, fit)
         probable = tuple(n for n in best.causes if name_of(n) in found.stated)
         if one_device == 0.0 and posteriors.explain_more(table, best, probable):
@@ -147,7 +146,8 @@ def _in_addition(
 ) -> tuple[str, ...]:
     """Names of which one acts in addition to those that are named. A remainder that is not slight
     could do their work, too."""
-    clear = best.kind == NOMINAL or posteriors.slight(table, best)
+    nominal = posteriors.practical_kind(table, best) == NOMINAL
+    clear = nominal or posteriors.slight(table, best)
     return found.one_of if named and clear else ()
 
 
@@ -172,15 +172,6 @@ def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
         channels = EVERYWHERE if family == STOCHASTIC else EVERYWHERE[1:]
         return Structure(family, gained, channels)
     return Structure(family, gained, fits.acts_on(table.trial, fit, best.kind))
-
-
-def of_one_device(table: Hypotheses, best: Hypothesis, fit: Fit) -> float:
-    """Probability that what remains is an intermittent force, and that of one device."""
-    if best.kind != INTERMITTENT or best.side_force is None:
-        return 0.0
-    with_it = _with_side_force(fit, best.side_force)
-    force, deviation = force_at_nodes(table.trial, with_it, best.side_force)
-    return posteriors.of_one_device(force, deviation)
 
 
 def _with_side_force(fit: Fit, side_force: SideForce) -> Fit:

@@ -114,7 +114,7 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
         large_in.append(by_name)
         for name, large in by_name.items():
             names[name] = names.get(name, 0.0) + float(p) * large
-        kind = practical_kind(one)
+        kind = practical_kind(search.table, one)
         kinds[kind] = kinds.get(kind, 0.0) + float(p)
         if kind == NOMINAL:
             none += float(p) * math.prod(1.0 - large for large in by_name.values())
@@ -171,18 +171,33 @@ def _deviations(covariance: np.ndarray) -> np.ndarray:
         return np.zeros((1, len(covariance)))
 
 
-def practical_kind(one: Hypothesis) -> str:
-    """Its kind of remainder; process noise as on an ordinary day is nominal."""
-    ordinary = one.kind == RAISED and one.noise_factor < thresholds.ORDINARY_NOISE
+def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
+    """Its kind of remainder; process noise as on an ordinary day is nominal. So is a force at one
+    place that varies as noise does and is no larger: gusts act at one place, and increase with the
+    wind."""
+    ordinary = False
+    if one.kind == RAISED:
+        ordinary = one.noise_factor < thresholds.ORDINARY_NOISE
+    elif one.kind == INTERMITTENT and not device(one):
+        acceleration = table.trial.reference.process_noise.acceleration
+        raised = one.remainder.with_force(one.found.noise_factor, acceleration)
+        ordinary = raised < thresholds.ORDINARY_NOISE
     return NOMINAL if ordinary else one.kind
+
+
+def device(one: Hypothesis) -> float:
+    """Probability that what remains is an intermittent force, and that of one device."""
+    return one.side_force.device if one.kind == INTERMITTENT and one.side_force else 0.0
 
 
 def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -> float:
     """Of what a hypothesis explains beyond nothing, the share that these of its causes explain:
     over nothing with nominal, or with raised process noise. What raised noise explains no cause
-    does. Nothing, where these causes alone were not weighed."""
+    does, nor what a force explains that counts as such. Nothing, where these causes alone were not
+    weighed."""
     shares = []
-    for kind in (NOMINAL, RAISED):
+    ordinary = practical_kind(table, one) == NOMINAL
+    for kind in dict.fromkeys((NOMINAL, RAISED, *((one.kind,) if ordinary else ()))):
         nothing, alone = table.found.get(((), kind)), table.found.get((tuple(causes), kind))
         if nothing is not None and one.evidence > nothing.evidence:
             gained = 0.0 if alone is None else alone.evidence - nothing.evidence
@@ -222,26 +237,3 @@ def best_with(found: Posterior, names: Sequence[str], kind: str | None = None) -
     likeliest = [h for h in holding
                  if set(names) <= {name_of(n) for n in h.causes if found.states(n)}]  # fmt: skip
     return (likeliest or holding or found.hypotheses)[0]
-
-
-def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
-    """Probability that a side force [S, J], N, is that of one device, which is on or off: one,
-    zero, or a half where its pattern is between both.
-
-    A force that merely varies is between its extremes for much of the time: a Gaussian one is 1.13
-    times as long between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever
-    between.
-    `deviation` [S, J] is the standard deviation of the estimate.
-    """
-    size = np.abs(force)
-    strongest = float(np.quantile(size, 0.95))
-    if strongest < 2.0 * float(np.median(deviation)):
-        return 0.0
-    on = size > 0.5 * strongest
-    between = (size > 0.2 * strongest) & ~on
-    share = between.sum() / on.sum()
-    if on.mean() > 0.5:  # what is on for most of the time is no device that comes and goes
-        return 0.0
-    if share < thresholds.BETWEEN:
-        return 1.0
-    return 0.5 if share < 1.0 else 0.0

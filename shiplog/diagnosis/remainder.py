@@ -53,6 +53,13 @@ class Remainder:
         """A common factor times the geometric mean of those of the channels."""
         return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
 
+    def with_force(self, noise_factor: float, acceleration: np.ndarray) -> float:
+        """Factor of the nominal process noise, of root mean square `acceleration` [3], that this
+        noise and the force at one place are together: geometric mean of the channels."""
+        channels = noise_factor * np.array(self.channels) * acceleration
+        force = np.zeros(3) if self.intermittent is None else np.array(self.intermittent)
+        return float(np.prod(np.hypot(channels, force) / acceleration) ** (1.0 / len(channels)))
+
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
         """The process noise with each channel's factor and the intermittent force in it."""
         if not self.shaped:

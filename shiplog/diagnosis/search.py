@@ -2,7 +2,9 @@
 
 Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
 remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
-set is left. The order in which sets are weighed does not matter.
+set is left. A remainder may explain a part of what a cause explains wholly: as long as one promises
+more than the best hypothesis has, it is added to nothing as well. The order in which sets are
+weighed does not matter.
 """
 
 from __future__ import annotations
@@ -56,7 +58,9 @@ class Search:
             self._scan_each_alone()
         while len(self._tried) < self._most:
             ranked = self.table.ranked(self.banned)
-            near = [h for h in ranked if h.score > ranked[0].score - SEARCH_NATS]
+            least = ranked[0].score - SEARCH_NATS
+            promising = max(self.scanned.values(), default=least) > least
+            near = [h for h in ranked if h.score > least or (promising and h is self.table.nothing)]
             fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
             if not fresh:
                 break
@@ -89,7 +93,8 @@ class Search:
         fit = self.table.fit(one)
         best = self.table.ranked(self.banned)[0].score
         for labels, numbers, predicted in self._additions(one, fit):
-            worth = predicted > best - SEARCH_NATS or not one.causes
+            first = not one.causes and one.score > best - SEARCH_NATS
+            worth = first or predicted > best - SEARCH_NATS
             if worth and labels not in self._tried and len(self._tried) < self._most:
                 self._weigh(labels, numbers, fit.point)
         for label in one.causes if len(one.causes) > 1 else ():

@@ -43,7 +43,8 @@ BASELINE = 0.5
 
 # Ratio of standard deviations. Process noise that is raised by less than this counts as no change:
 # the force of gusts goes with the square of the wind speed, and a wind that is a quarter stronger
-# than that of the nominal voyages is no fault of the model.
+# than that of the nominal voyages is no fault of the model. A force at one place that varies as
+# noise does counts as such.
 ORDINARY_NOISE = 1.5
 
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the

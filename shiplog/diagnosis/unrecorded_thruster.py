@@ -22,15 +22,22 @@ REACH_LENGTHS = 0.5  # lengths from midship
 
 @dataclass(frozen=True)
 class SideForce:
-    """The unrecorded thruster: log likelihood, its gain over process noise that is raised in each
-    channel by itself, place [m ahead of midship], root mean square force [N], and acceleration of
-    1 N [3]."""
+    """An intermittent side force at one place, such as an unrecorded thruster's.
+
+    value   log likelihood, nats
+    gain    nats over process noise that is raised in each channel by itself
+    lever   its place [m ahead of midship]
+    force   root mean square [N]
+    unit    [3] acceleration of 1 N
+    device  probability, by its pattern, that it is the force of one device
+    """
 
     value: float
     gain: float
     lever: float
     force: float
     unit: np.ndarray
+    device: float = 0.0
 
     @property
     def remainder(self) -> Remainder:

@@ -231,4 +231,4 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
         tried = table.intermittent(fit)
         fit = _fitted_with(table, labels, fit, tried.remainder)
     if tried.gain > 0.0 and fit.found.evidence > raised.evidence:
-        table.put(labels, fit.found.evidence, fit, tried)
+        table.put(labels, fit.found.evidence, fit, table.with_pattern(fit, tried))

@@ -15,6 +15,7 @@ from shiplog.diagnosis import (
     segments,
     unrecorded_thruster,
 )
+from shiplog.diagnosis.intermittent import of_one_device
 from shiplog.diagnosis.remainder import RAISED
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -179,3 +180,35 @@ def test_what_is_nominal_of_a_cause_is_no_intermittent_force(asked):
         before = likelihood.weighed(given, straight.PROCESS_NOISE).dd[:, 0, 0]
         assert not own.any() or before.min() > 3.0 * left[True].max()
     assert left[True] == pytest.approx(left[False], rel=0.1)
+
+
+# --- one device
+
+
+def test_a_force_that_is_on_or_off_is_one_device():
+    rng = np.random.default_rng(0)
+    on = np.repeat(rng.uniform(size=(30, 4)) < 0.25, 4, axis=1)
+    force = 5.0 * on + 0.3 * rng.standard_normal(on.shape)
+    assert of_one_device(force, np.full(on.shape, 0.3)) == 1.0
+    assert of_one_device(-force, np.full(on.shape, 0.3)) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("between", "probability"), [(4, 1.0), (5, 0.5), (9, 0.5), (10, 0.0), (14, 0.0)]
+)
+def test_an_unclear_pattern_is_as_probably_one_device_as_not(between, probability):
+    """Ten nodes at 5 N, some at 2 N, the others at none."""
+    force = np.repeat([5.0, 2.0, 0.0], [10, between, 40 - between])[None]
+    assert of_one_device(force, np.full(force.shape, 0.3)) == probability
+
+
+def test_a_force_that_merely_varies_is_none():
+    """Gaussian, from one node to the next or from one segment to the next: 1.13 times as
+    long between as above, and in a long trial hardly less."""
+    rng = np.random.default_rng(1)
+    varies = 5.0 * rng.standard_normal((600, 16))
+    slow = np.repeat(5.0 * rng.standard_normal((4000, 1)), 16, axis=1)
+    for force in (varies, slow):
+        assert of_one_device(force, np.full(force.shape, 0.3)) == 0.0
+    unmeasured = np.full(varies.shape, 2.0)
+    assert of_one_device(0.2 * varies, unmeasured) == 0.0

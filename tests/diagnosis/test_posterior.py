@@ -8,8 +8,9 @@ from shiplog import profile_file as profiles
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypothesis import name_of
-from shiplog.diagnosis.posterior import best_with, of_one_device, posterior, share_of_causes
+from shiplog.diagnosis.posterior import best_with, posterior, share_of_causes
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.models import causes
 from shiplog.models.causes import Setting
 
@@ -88,6 +89,20 @@ def test_noise_as_on_an_ordinary_day_is_no_change(trial, raised):
     assert found.names["drag"] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize(
+    ("raised", "device", "counts"),
+    [(1.49, 0.0, False), (1.51, 0.0, True), (1.49, 0.5, True), (1.49, 1.0, True)],
+)
+def test_a_force_at_one_place_as_on_an_ordinary_day_is_no_change(trial, raised, device, counts):
+    """Gusts act at one place. Not where its pattern may be a device's, be that ever so weak."""
+    force = SideForce(0.0, 60.0, 0.3, 4.0, np.array([0.0, 0.01, 0.004]), device)
+    kinds = {((), INTERMITTENT): 0.6, (DRAG, INTERMITTENT): 0.4}
+    found = posterior(weighed.search(trial, kinds, side_force=force, raised=raised))
+    assert found.none == pytest.approx(0.0 if counts else 0.6)
+    assert found.kinds.get(INTERMITTENT, 0.0) == pytest.approx(float(counts))
+    assert found.names["drag"] == pytest.approx(0.4)
+
+
 def test_one_of_two_stated_names_is_not_enough(trial):
     """A or B: together sure, each by itself not."""
     found = posterior(weighed.search(trial, {(DRAG, NOMINAL): 0.55, (LOAD, NOMINAL): 0.45}))
@@ -157,38 +172,6 @@ def test_share_of_what_is_explained_by_causes(trial):
     assert share_of_causes(both.table, of[DRAG, "position"], LOAD) == 0.0  # never weighed alone
     del of[DRAG, NOMINAL], of[DRAG, RAISED]
     assert share_of_causes(both.table, of[DRAG, "position"], DRAG) == 0.0
-
-
-# --- one device
-
-
-def test_a_force_that_is_on_or_off_is_one_device():
-    rng = np.random.default_rng(0)
-    on = np.repeat(rng.uniform(size=(30, 4)) < 0.25, 4, axis=1)
-    force = 5.0 * on + 0.3 * rng.standard_normal(on.shape)
-    assert of_one_device(force, np.full(on.shape, 0.3)) == 1.0
-    assert of_one_device(-force, np.full(on.shape, 0.3)) == 1.0
-
-
-@pytest.mark.parametrize(
-    ("between", "probability"), [(4, 1.0), (5, 0.5), (9, 0.5), (10, 0.0), (14, 0.0)]
-)
-def test_an_unclear_pattern_is_as_probably_one_device_as_not(between, probability):
-    """Ten nodes at 5 N, some at 2 N, the others at none."""
-    force = np.repeat([5.0, 2.0, 0.0], [10, between, 40 - between])[None]
-    assert of_one_device(force, np.full(force.shape, 0.3)) == probability
-
-
-def test_a_force_that_merely_varies_is_none():
-    """Gaussian, from one node to the next or from one segment to the next: 1.13 times as
-    long between as above, and in a long trial hardly less."""
-    rng = np.random.default_rng(1)
-    varies = 5.0 * rng.standard_normal((600, 16))
-    slow = np.repeat(5.0 * rng.standard_normal((4000, 1)), 16, axis=1)
-    for force in (varies, slow):
-        assert of_one_device(force, np.full(force.shape, 0.3)) == 0.0
-    unmeasured = np.full(varies.shape, 2.0)
-    assert of_one_device(0.2 * varies, unmeasured) == 0.0
 
 
 def test_a_causes_label_begins_with_its_name():

@@ -107,6 +107,28 @@ def test_a_cause_whose_fit_diverges_is_no_answer(monkeypatch):
     assert decision.named == ()
 
 
+def test_a_cause_is_weighed_however_far_behind_nothing_is(monkeypatch):
+    """A remainder may explain a part of what a cause explains wholly, and next to that remainder
+    the cause would add nothing."""
+    before, added = searching.weigh, Search._additions
+
+    def absorbs(table, labels, *given):
+        before(table, labels, *given)
+        if not labels:
+            nothing, remainder = table.nothing, Remainder("position")
+            score = nothing.score + 2.0 * searching.SEARCH_NATS
+            table.found[(), "position"] = replace(nothing, remainder=remainder, score=score)
+
+    def none_next_to_it(self, one, fit):
+        return added(self, one, fit) if one.kind == NOMINAL else []
+
+    monkeypatch.setattr(searching, "weigh", absorbs)
+    monkeypatch.setattr(Search, "_additions", none_next_to_it)
+    monkeypatch.setattr(hypotheses.Hypotheses, "rescore", lambda table: None)
+    best = searched({"drag": [1.2]}).table.ranked()[0]
+    assert (best.causes, best.kind) == (("drag",), NOMINAL)
+
+
 def test_the_order_of_the_catalogue_does_not_matter(one):
     """The same data with its causes in reverse: the same hypotheses with the same probabilities."""
     other = searched({"drag": [1.2]}, causes=CAUSES[::-1])
@@ -232,12 +254,14 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     trial, point = trial_with({}, accelerations=pushed)
     table = search_of(trial, point).table
     table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit)
+    table.with_pattern = lambda fit, force: replace(force, device=0.5)
     weigh(table, (), {}, point)
     if gain < 0.0:
         assert ((), INTERMITTENT) not in table.found
         return
     one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
     assert one.remainder.intermittent == pytest.approx(2.0 * unit)
+    assert one.side_force.device == 0.5
     again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
     assert one.evidence == pytest.approx(again.value)
     assert one.evidence > raised.evidence + 5.0
