@@ -205,6 +205,14 @@ def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeyp
         replay.replay(new, tmp_path / "third", stubs())
 
 
+def test_one_case_of_several_is_asked_again(tmp_path, stubs):
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))
+    again = replay.replay(out, tmp_path / "new", stubs(), every=2)
+    assert [p.label for p in again.cases] == ["5", "7"]
+    assert len(score.read(tmp_path / "new").answers) == 2
+
+
 def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, monkeypatch):
     """Two kept cases in which nothing was hidden; without the placebo a name would be reported."""
     out = tmp_path / "out"

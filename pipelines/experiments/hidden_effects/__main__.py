@@ -15,7 +15,8 @@ python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [-
     ships whose equations are not the home ship's, from pipelines.experiments.other_families
     each with --rivals: what simpler methods say of the same trials, too; of cases that were run
     with --keep before, give the command again
-python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals] [--shiplog COMMAND]
+python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals] [--every N]
+    [--shiplog COMMAND]
     the kept cases of DIR diagnosed again by the program as it is now, into another folder
 python -m pipelines.experiments.hidden_effects score DIR
     the tables again, of what is there by now
@@ -109,7 +110,7 @@ def _run(given: argparse.Namespace) -> None:
     )  # fmt: skip
     if given.what == "replay":
         given.out = given.out or replay.folder_of(given.source)
-        replay.replay(given.source, given.out, settings)
+        replay.replay(given.source, given.out, settings, given.every)
         return
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
@@ -138,6 +139,7 @@ def _parser() -> argparse.ArgumentParser:
     again = commands.add_parser("replay", help="kept cases, diagnosed again")
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
     again.add_argument("--out", type=Path, help="another folder; next to DIR unless given")
+    again.add_argument("--every", type=_positive, default=1, help="one case of so many")
     _how(again)
     again.set_defaults(share=False, oracle=False)
     scored = commands.add_parser("score", help="the tables of what is there by now")

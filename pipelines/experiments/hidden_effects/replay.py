@@ -28,19 +28,20 @@ def folder_of(source: Path) -> Path:
     return source.with_name(f"{source.name}-{name(identity()).replace(' ', '-')}")
 
 
-def replay(source: Path, out: Path, settings: Settings) -> Plan:
-    """The plan of what was replayed. Raises ShiplogError where no case of `source` was kept."""
+def replay(source: Path, out: Path, settings: Settings, every: int = 1) -> Plan:
+    """The plan of what was replayed: of the kept cases the first of so many. Raises ShiplogError
+    where no case of `source` was kept."""
     if source.resolve() == out.resolve():
         raise ShiplogError(
             f"{out} cannot hold its own replay.", hint="choose another folder with --out."
         )
     before = plans.load(source)
-    cases = tuple(one for one in before.cases if run.kept(source, one))
+    cases = tuple(one for one in before.cases if run.kept(source, one))[::every]
     if not cases:
         raise ShiplogError(
             f"{source} has no case with store and base.", hint="run the suite with --keep first."
         )
-    log.info("%d of %d cases were kept", len(cases), len(before.cases))
+    log.info("%d of %d cases are asked again", len(cases), len(before.cases))
     plan = plans.save(out, Plan(before.suite, before.first_seed, cases))
 
     def again(planned: Planned) -> str | None:

@@ -4,7 +4,8 @@ python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
     as `shiplog diagnose RUN ...`, without that part
 python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
     the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/,
-    and a table: how many are right and how many are misnamed
+    and a table: how many are right and how many are misnamed; with --every 7 the first of each
+    seven cases
 """
 
 from __future__ import annotations
@@ -171,18 +172,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--ablate", type=Path, required=True, metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="one case of so many")
     asked = parser.parse_args(given)
-    print(table(asked.ablate, asked.only, asked.jobs))
+    print(table(asked.ablate, asked.only, asked.jobs, asked.every))
     return 0
 
 
-def table(source: Path, parts: Sequence[str], jobs: int) -> str:
+def table(source: Path, parts: Sequence[str], jobs: int, every: int = 1) -> str:
     """One line a part: cases, right, misnamed, and how many answers differ from the whole's."""
     rows, whole = [], {}
     for part in parts:
         out = source.with_name(f"{source.name}-without") / part
         command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
-        replay.replay(source, out, Settings(jobs=jobs, shiplog=command))
+        replay.replay(source, out, Settings(jobs=jobs, shiplog=command), every)
         answers = {a.planned.label: a for a in score.read(out).answers}
         if part == WHOLE:
             whole = {label: _reported(a) for label, a in answers.items()}
