@@ -180,7 +180,7 @@ def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
         ordinary = one.noise_factor < thresholds.ORDINARY_NOISE
     elif one.kind == INTERMITTENT and not device(one):
         acceleration = table.trial.reference.process_noise.acceleration
-        raised = one.remainder.with_force(one.found.noise_factor, acceleration)
+        raised = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
         ordinary = raised < thresholds.ORDINARY_NOISE
     return NOMINAL if ordinary else one.kind
 
@@ -195,9 +195,10 @@ def share_of_causes(table: Hypotheses, one: Hypothesis, causes: Sequence[str]) -
     over nothing with nominal, or with raised process noise. What raised noise explains no cause
     does, nor what a force explains that counts as such. Nothing, where these causes alone were not
     weighed."""
-    shares = []
-    ordinary = practical_kind(table, one) == NOMINAL
-    for kind in dict.fromkeys((NOMINAL, RAISED, *((one.kind,) if ordinary else ()))):
+    shares, kinds = [], {NOMINAL, RAISED}
+    if practical_kind(table, one) == NOMINAL:
+        kinds.add(one.kind)
+    for kind in kinds:
         nothing, alone = table.found.get(((), kind)), table.found.get((tuple(causes), kind))
         if nothing is not None and one.evidence > nothing.evidence:
             gained = 0.0 if alone is None else alone.evidence - nothing.evidence

@@ -53,7 +53,7 @@ class Remainder:
         """A common factor times the geometric mean of those of the channels."""
         return noise_factor * float(np.prod(self.channels)) ** (1.0 / len(self.channels))
 
-    def with_force(self, noise_factor: float, acceleration: np.ndarray) -> float:
+    def factor_with_force(self, noise_factor: float, acceleration: np.ndarray) -> float:
         """Factor of the nominal process noise, of root mean square `acceleration` [3], that this
         noise and the force at one place are together: geometric mean of the channels."""
         channels = noise_factor * np.array(self.channels) * acceleration

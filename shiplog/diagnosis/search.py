@@ -2,9 +2,9 @@
 
 Each set of causes is linearised again at its most probable numbers, and weighed under every kind of
 remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
-set is left. A remainder may explain a part of what a cause explains wholly: as long as one promises
-more than the best hypothesis has, it is added to nothing as well. The order in which sets are
-weighed does not matter.
+set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
+promises about as much as the best hypothesis has, it is therefore added to nothing as well. The
+order in which sets are weighed does not matter.
 """
 
 from __future__ import annotations

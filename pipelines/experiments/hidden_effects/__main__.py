@@ -135,11 +135,13 @@ def _parser() -> argparse.ArgumentParser:
         if name not in ("fixed", "brief"):
             suite.add_argument("--first-seed", type=int, default=first, help="of the block")
         if name != "fixed":
-            suite.add_argument("--count", type=_positive, default=count, help="cases, or a row's")
+            suite.add_argument(
+                "--count", type=plan.positive, default=count, help="cases, or a row's"
+            )
     again = commands.add_parser("replay", help="kept cases, diagnosed again")
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
     again.add_argument("--out", type=Path, help="another folder; next to DIR unless given")
-    again.add_argument("--every", type=_positive, default=1, help="one case of so many")
+    again.add_argument("--every", type=plan.positive, default=1, help="one case of so many")
     _how(again)
     again.set_defaults(share=False, oracle=False)
     scored = commands.add_parser("score", help="the tables of what is there by now")
@@ -160,17 +162,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def _how(command: argparse.ArgumentParser) -> None:
     """What a suite and a replay have in common."""
-    command.add_argument("--jobs", type=_positive, default=1, help="ships at a time")
+    command.add_argument("--jobs", type=plan.positive, default=1, help="ships at a time")
     command.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
     command.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
     command.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
-
-
-def _positive(word: str) -> int:
-    if (number := int(word)) < 1:
-        raise argparse.ArgumentTypeError(f"{word} is not positive")
-    return number
 
 
 if __name__ == "__main__":

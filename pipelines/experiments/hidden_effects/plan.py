@@ -11,11 +11,19 @@ OUT/bases/SEED/       with --share, the model of a ship's nominal campaign
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from shiplog.exceptions import ShiplogError
+
+
+def positive(word: str) -> int:
+    """A count given on the command line. Raises argparse.ArgumentTypeError below 1."""
+    if (number := int(word)) < 1:
+        raise argparse.ArgumentTypeError(f"{word} is not positive")
+    return number
 
 
 @dataclass(frozen=True, slots=True)

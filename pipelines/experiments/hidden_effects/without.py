@@ -22,6 +22,7 @@ from unittest.mock import patch
 import numpy as np
 
 from pipelines.experiments.hidden_effects import replay, score
+from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli
 from shiplog.diagnosis import (
@@ -172,7 +173,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--ablate", type=Path, required=True, metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
-    parser.add_argument("--every", type=int, default=1, metavar="N", help="one case of so many")
+    parser.add_argument(
+        "--every", type=positive, default=1, metavar="N", help="one case of so many"
+    )
     asked = parser.parse_args(given)
     print(table(asked.ablate, asked.only, asked.jobs, asked.every))
     return 0
