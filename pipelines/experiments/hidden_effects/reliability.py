@@ -94,5 +94,6 @@ def _panel(left: float, title: str, found: Sequence[Bin]) -> list[str]:
         low, high = clopper_pearson(sum(one.hits), len(one.hits))
         parts.append(line((one.mean, low), (one.mean, high), 'stroke="#1f5fa8"'))
         parts.append(f'<circle cx="{x(one.mean)}" cy="{y(one.share)}" r="4" fill="#1f5fa8"/>')
-        parts.append(text((x(one.mean), f"{MARGIN - 4:.1f}"), str(len(one.hits))))
+        middle = 0.5 * (one.low + one.high)  # two means may meet at an edge
+        parts.append(text((x(middle), f"{MARGIN - 4:.1f}"), str(len(one.hits))))
     return parts
