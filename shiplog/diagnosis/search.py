@@ -38,12 +38,15 @@ class Search:
     expected  label → expected log Bayes factor of that cause, by its size
     scanned   label → score of that cause by itself, scanned before any set is searched
     banned    names of causes without which the search went on
+    likely    numbers of a set of causes that is likely from the start, by label
     """
 
     def __init__(
-        self, trial: Trial, point: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
-    ) -> None:
+        self, trial: Trial, point: Point, placebo: Mapping[str, float],
+        banned: Sequence[str] = (), likely: Mapping[str, np.ndarray] | None = None,
+    ) -> None:  # fmt: skip
         self.table = Hypotheses(trial, point, placebo, banned)
+        self.likely = dict(likely or {})
         self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
         self.banned: set[str] = set()
@@ -56,6 +59,8 @@ class Search:
         if () not in self._tried:
             self._weigh((), {}, self.table.first)
             self._scan_each_alone()
+            if self.likely:
+                self._weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
         while len(self._tried) < self._most:
             ranked = self.table.ranked(self.banned)
             least = ranked[0].score - SEARCH_NATS

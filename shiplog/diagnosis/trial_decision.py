@@ -2,7 +2,8 @@
 
 Of a given model no nominal campaign shows the discrepancy. It is learned from the voyages in
 question, where it absorbs the effects of causes; so it is learned again without the effects of
-the named causes, until the same causes are named.
+the named causes, until the same causes are named. Each further search starts from nothing and from
+these causes.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def decided(
 
     def once(numbers: Mapping[str, np.ndarray] | None = None) -> Decided:
         made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers)
-        return _once(run, made, cut, reach)
+        return _once(run, made, cut, reach, numbers)
 
     done = once()
     for _ in range(MOST_ROUNDS if nominal is None and run.given else 0):
@@ -76,8 +77,9 @@ def _names(done: Decided) -> list[str]:
 
 
 def _once(
-    run: Run, made: setup.Setup, cut: Windows | None, reach: Callable[[str], None]
-) -> Decided:
+    run: Run, made: setup.Setup, cut: Windows | None, reach: Callable[[str], None],
+    likely: Mapping[str, np.ndarray] | None,
+) -> Decided:  # fmt: skip
     trial, point = evidence.begin(made.trial, run.extension_numbers())
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
@@ -86,7 +88,7 @@ def _once(
     )  # fmt: skip
     judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
     reach("hypotheses")
-    search = Search(trial, point, placebo.placebos(trial.campaign))
+    search = Search(trial, point, placebo.placebos(trial.campaign), likely=likely)
     search.run()
     reach("held-out voyages")
     decision, _, gain, refuted = refutation.judged(search, judge)

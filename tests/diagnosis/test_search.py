@@ -54,16 +54,16 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
     return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
 
 
-def search_of(trial, point, placebo=None, banned=()) -> Search:
-    made = Search(trial, point, placebo or {}, banned)
+def search_of(trial, point, placebo=None, banned=(), likely=None) -> Search:
+    made = Search(trial, point, placebo or {}, banned, likely)
     made.table.intermittent = straight.no_hull
     made.table.nominal_side_force = None
     return made
 
 
-def searched(hidden, placebo=None, banned=(), **setting) -> Search:
+def searched(hidden, placebo=None, banned=(), likely=None, **setting) -> Search:
     trial, point = trial_with(hidden, **setting)
-    found = search_of(trial, point, placebo, banned)
+    found = search_of(trial, point, placebo, banned, likely)
     found.run()
     return found
 
@@ -152,6 +152,24 @@ def test_two_hidden_causes_are_both_found(hidden):
     assert {n.cause.label for n in decision.named} == set(hidden)
     # the set without either was weighed as well
     assert {((label,), NOMINAL) for label in hidden} & set(found.table.found)
+
+
+@pytest.mark.parametrize("likely", [{"drag": [0.9], "load": [0.9]}, {"clock:wind": [0.5]}])
+def test_a_likely_set_is_weighed_first_and_decides_nothing(monkeypatch, likely):
+    """Right or wrong, the most probable hypothesis is the same one."""
+    order, before = [], searching.weigh
+
+    def noted(table, labels, *given):
+        order.append(labels)
+        before(table, labels, *given)
+
+    hidden = {"drag": [1.2], "load": [1.2]}
+    whole = searched(hidden).table.ranked()[0]
+    monkeypatch.setattr(searching, "weigh", noted)
+    found = searched(hidden, likely={n: np.array(v) for n, v in likely.items()}).table.ranked()[0]
+    assert order[:2] == [(), tuple(sorted(likely))]
+    assert (found.causes, found.kind) == (whole.causes, whole.kind) == (("drag", "load"), NOMINAL)
+    assert found.score == pytest.approx(whole.score, abs=0.01)
 
 
 def test_nothing_hidden_is_nothing():
