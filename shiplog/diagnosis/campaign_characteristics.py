@@ -14,12 +14,18 @@ from shiplog.diagnosis import (
     likelihood,
     linearisation,
     nominal_fit,
-    nominal_reference,
     segment_nodes,
     segments,
     voyage_effects,
 )
-from shiplog.diagnosis.campaign_parts import parts_of, picked, products, robust_weights, squares
+from shiplog.diagnosis.campaign_parts import (
+    marginal,
+    parts_of,
+    picked,
+    products,
+    robust_weights,
+    squares,
+)
 from shiplog.diagnosis.campaign_prior import prior
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
@@ -213,9 +219,7 @@ def _solved(
     by = np.concatenate(([1.0], columns.unit))
     total = modes.total(np.ones(len(linear.e))) * np.outer(by, by)
     both = total[1:, 1:] + np.diag(columns.known)
-    value = (
-        nominal_reference.marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
-    )
+    value = marginal(total, np.diag(columns.known), held) - 0.5 * modes.log_volume()
     return np.linalg.solve(both, total[1:, 0] + held) * columns.unit, value
 
 
@@ -239,6 +243,6 @@ def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
             gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
             gram, logdet = reduced(gram, effects.deviation)
             volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
-            scores.append(nominal_reference.marginal(gram, information, pull) - 0.5 * volume)
+            scores.append(marginal(gram, information, pull) - 0.5 * volume)
         found.append(math.log(tried[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))

@@ -66,3 +66,12 @@ def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray
     square = np.einsum("i,sij,j->s", left, modes.dd, left, optimize=True)
     square += ((2.0 * along + modes.felt * accelerations) * accelerations).sum(-1)
     return square - ((along + modes.felt * accelerations) ** 2 / (modes.felt + noise**-2.0)).sum(-1)
+
+
+def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
+    """Log likelihood of [e | J] with its numbers integrated out, up to what no number changes."""
+    both = gram[1:, 1:] + information
+    towards = gram[1:, 0] + pull
+    square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
+    square -= towards @ np.linalg.solve(both, towards)
+    return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])

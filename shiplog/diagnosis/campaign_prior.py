@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shiplog.diagnosis import nominal_reference
+from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.voyage_effects import VoyageEffects, reduced
 
 VOYAGE_SPREADS = (0.0, 0.25, 0.5, 1.0)  # of voyages, in deviations of their parts; each as likely
@@ -81,7 +81,7 @@ def learn(
             for left, (gram, volume) in enumerate(zip(each, volumes, strict=True)):
                 kept = [g for j, g in enumerate(each) if j != left]
                 given = prior(kept, known, anchor, np.zeros(len(known)), share)
-                scores[i] += nominal_reference.marginal(gram, *given) - 0.5 * volume
+                scores[i] += marginal(gram, *given) - 0.5 * volume
         whole = float(np.logaddexp.reduce(scores))
         if whole < best:
             break

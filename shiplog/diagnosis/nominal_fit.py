@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from shiplog.diagnosis import discrepancy, likelihood, linearisation, segment_nodes, segments
+from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path, Wide
 from shiplog.diagnosis.measurement_correction import read
 from shiplog.diagnosis.parameter_layout import Columns
+from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.causes import Setting
 from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
@@ -21,7 +24,9 @@ from shiplog.voyages.recording import Record
 LINEARISATIONS = 20  # of moving the coefficients to where they are linearised, at most
 LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
 NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
-AT_BOUNDS = 0.05  # plausible spreads: all that can still move has converged
+NO_ROOM = 1e-9  # plausible spreads that a coefficient may move beyond its bounds
+LOST_NATS = 50.0  # of the campaign's log density: a move that loses more is halved
+MOST_HALVINGS = 3  # of one move, at most
 ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are estimated
 FREE = 2.0  # times the process noise: the allowed acceleration at a path's nodes
 PROCESS_NOISE_TIME_S = 4.0  # s, of a three-metre ship
@@ -50,56 +55,170 @@ def converged(
     the discrepancy of the families `seen`; without rounds the coefficients stay where they are.
 
     Without its discrepancy a model that describes the ship badly would be moved to coefficients,
-    and the noise to sizes, that make up for it."""
-    columns = columns_of(model, setting, start)
-    wide, g = wide_of(setting), segments.grid(record)
-    cut, moved, observed = read(model, setting, record, segments.begins(record))
-    base, linearised = columns.base, columns.linearised
-    theta = np.clip(start.values, start.low, start.high)
-    of = record.timescale
-    process_noise = ProcessNoise(
-        wide.noise,
-        0.04 * wide.acceleration,
-        PROCESS_NOISE_TIME_S * of.factor,
-        wide.start,
-        bin=of.bin,
-        knot=of.knot,
-    )
-    families = discrepancy.of(
-        record.profile, process_noise.acceleration, linearised, seen, segment_nodes.at_knots(cut, g)
-    )
-    accelerations = families.accelerations(cut, g)
-    columns = columns.with_misfit(families.count)
-    sizes = {family.name: FIRST_SIZE for family in families.families}
-    path = linear = about = None
-    last = False
-    whole, firm = np.concatenate((theta, np.zeros(linearised - base))), wide
-    for round_ in range(rounds + 1):
-        if linear is None:
-            path = linearisation.pulled(model, whole, cut, g, firm)
-        else:
-            before, whole = whole, np.concatenate((theta, np.zeros(linearised - base)))
-            path = linearisation.ahead(linear, whole - before, firm, about)
-        held = anchored(start, theta, columns)
-        linear = linearisation.linear(model, whole, cut, g, path, moved, observed)
-        joint = _Joint(linear, accelerations, columns, held, families.families)
-        found, _, _ = joint.solved(process_noise, sizes)
-        process_noise = joint.noise(found, process_noise, ON_THE_WAY)
-        firm = hold(process_noise, process_noise.acceleration)
-        found, gain, weights = joint.solved(process_noise, sizes)
-        about = accelerations @ weights
-        far = float(np.abs(found[:base]).max(initial=0.0))
-        if last or round_ == rounds or (gain < NEAR and far < CLOSE):
-            process_noise = joint.noise(found, process_noise, AT_REST)
+    and the noise to sizes, that make up for it. A move after which the campaign is far less
+    probable is halved. A fit that does not converge is where the campaign was most probable.
+    """
+    campaign = _Campaign.of(model, setting, start, record, seen)
+    here = best = campaign.first()
+    halvings, damping = 0, 1.0  # of a move; it grows back once moves are accepted
+    ended = here.converged
+    for _ in range(rounds):
+        if ended:
             break
-        moved_to = theta + (found * columns.unit)[:base] * min(1.0, LONGEST_MOVE / far)
-        edge = 1e-6 * (start.high - start.low)
+        there = campaign.at(campaign.after(here, damping), here)
+        if there is None or there.solution.value < here.solution.value - LOST_NATS:
+            if halvings == MOST_HALVINGS:
+                break
+            halvings, damping = halvings + 1, 0.5 * damping
+            continue
+        ended = there.converged
+        damping = damping if halvings else min(2.0 * damping, 1.0)
+        here, halvings = there, 0
+        if here.solution.value > best.solution.value:
+            best = here
+    return (here if ended else best).at_rest()
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """A campaign linearised with coefficients theta [P], and what is most probable there."""
+
+    theta: np.ndarray
+    whole: np.ndarray
+    path: Path
+    joint: _Joint
+    process_noise: ProcessNoise
+    sizes: Mapping[str, float]
+    solution: _Solution
+
+    @property
+    def far(self) -> float:
+        """Plausible spreads that a coefficient is still to move, at most."""
+        return float(np.abs(self.solution.found[: len(self.theta)]).max(initial=0.0))
+
+    @property
+    def converged(self) -> bool:
+        return self.solution.gain < NEAR and self.far < CLOSE
+
+    def at_rest(self) -> Converged:
+        noise = self.joint.noise(self.solution.found, self.process_noise, AT_REST)
+        return Converged(self.theta, self.path, noise)
+
+
+@dataclass(frozen=True)
+class _Campaign:
+    """A nominal campaign that is linearised again and again, with its discrepancy's families.
+
+    moved, observed  as `measurement_correction.read` gives them
+    accelerations    [S, 3J, W] of each weight of the discrepancy
+    begin            process noise before any is estimated
+    """
+
+    model: Extended
+    start: Start
+    cut: Cut
+    moved: np.ndarray
+    observed: np.ndarray
+    grid: SegmentGrid
+    wide: Wide
+    columns: Columns
+    families: Sequence[discrepancy.Family]
+    accelerations: np.ndarray
+    begin: ProcessNoise
+
+    @classmethod
+    def of(
+        cls, model: Extended, setting: Setting, start: Start, record: Record, seen: Sequence[str]
+    ) -> _Campaign:
+        columns = columns_of(model, setting, start)
+        wide, grid, of = wide_of(setting), segments.grid(record), record.timescale
+        cut, moved, observed = read(model, setting, record, segments.begins(record))
+        begin = ProcessNoise(
+            wide.noise, 0.04 * wide.acceleration, PROCESS_NOISE_TIME_S * of.factor, wide.start,
+            bin=of.bin, knot=of.knot,
+        )  # fmt: skip
+        found = discrepancy.of(
+            record.profile, begin.acceleration, columns.linearised, seen,
+            segment_nodes.at_knots(cut, grid),
+        )  # fmt: skip
+        return cls(
+            model, start, cut, moved, observed, grid, wide, columns.with_misfit(found.count),
+            found.families, found.accelerations(cut, grid), begin,
+        )  # fmt: skip
+
+    def first(self) -> _Iterate:
+        """With the coefficients that the fit starts from, about paths onto the measurement."""
+        theta = np.clip(self.start.values, self.start.low, self.start.high)
+        whole = self._whole(theta)
+        path = linearisation.pulled(self.model, whole, self.cut, self.grid, self.wide)
+        sizes = {family.name: FIRST_SIZE for family in self.families}
+        return self._solved(theta, whole, path, self.begin, sizes)
+
+    def at(self, theta: np.ndarray, near: _Iterate) -> _Iterate | None:
+        """With other coefficients, about paths that a linearisation near them predicts; None where
+        the model diverges."""
+        whole = self._whole(theta)
+        path = linearisation.ahead(
+            near.joint.linear, whole - near.whole,
+            hold(near.process_noise, near.process_noise.acceleration),
+            self.accelerations @ near.solution.weights,
+        )  # fmt: skip
+        try:
+            return self._solved(theta, whole, path, near.process_noise, near.sizes)
+        except np.linalg.LinAlgError:
+            return None
+
+    def after(self, here: _Iterate, damping: float) -> np.ndarray:
+        """Coefficients [P] one damped step on."""
+        step = (here.solution.found * self.columns.unit)[: len(here.theta)]
+        return here.theta + step * damping * min(1.0, LONGEST_MOVE / max(here.far, 1e-12))
+
+    def _room(self, theta: np.ndarray) -> np.ndarray:
+        """[2, P] how far each coefficient may move, in units: to just inside its bounds."""
+        edge = 1e-6 * (self.start.high - self.start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
-        moved_to = np.clip(moved_to, start.low + edge, start.high - edge)
-        step = np.abs((moved_to - theta) / columns.unit[:base])
-        last, theta = float(step.max(initial=0.0)) < AT_BOUNDS, moved_to
-    assert path is not None
-    return Converged(theta, path, process_noise)
+        ends = np.stack((self.start.low + edge, self.start.high - edge)) - theta
+        room = ends / self.columns.unit[: len(theta)]
+        return np.stack((np.minimum(room[0], -NO_ROOM), np.maximum(room[1], NO_ROOM)))
+
+    def _whole(self, theta: np.ndarray) -> np.ndarray:
+        return np.concatenate((theta, np.zeros(self.columns.linearised - self.columns.base)))
+
+    def _solved(
+        self, theta: np.ndarray, whole: np.ndarray, path: Path, process_noise: ProcessNoise,
+        sizes: Mapping[str, float],
+    ) -> _Iterate:  # fmt: skip
+        """Noise, then all numbers, of the campaign about a path."""
+        linear = linearisation.linear(
+            self.model, whole, self.cut, self.grid, path, self.moved, self.observed
+        )
+        held = anchored(self.start, theta, self.columns)
+        joint = _Joint(
+            linear, self.accelerations, self.columns, held, self.families, self._room(theta)
+        )
+        before = joint.solved(process_noise, sizes)
+        process_noise = joint.noise(before.found, process_noise, ON_THE_WAY)
+        solution = joint.solved(process_noise, before.sizes)
+        return _Iterate(theta, whole, path, joint, process_noise, solution.sizes, solution)
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """What is most probable on one linearised campaign.
+
+    found    [C] numbers, in units, the coefficients within their bounds
+    gain     log Bayes factor [nats] of moving the coefficients there in the linear model
+    weights  [W] as `discrepancy_here` gives them
+    sizes    of each family's weights
+    value    log density of the campaign and of the coefficients where it is linearised: all other
+             numbers are integrated out
+    """
+
+    found: np.ndarray
+    gain: float
+    weights: np.ndarray
+    sizes: Mapping[str, float]
+    value: float
 
 
 @dataclass(frozen=True)
@@ -107,6 +226,7 @@ class _Joint:
     """Coefficients, causes' numbers and weights of the discrepancy on one linearised campaign.
 
     accelerations  [S, 3J, W] of each weight; held [C] as `anchored` gives it
+    room           [2, P] least and greatest move of each coefficient, in units
     """
 
     linear: Linear
@@ -114,31 +234,37 @@ class _Joint:
     columns: Columns
     held: np.ndarray
     families: Sequence[discrepancy.Family]
+    room: np.ndarray
 
-    def solved(
-        self, process_noise: ProcessNoise, sizes: dict[str, float]
-    ) -> tuple[np.ndarray, float, np.ndarray]:
-        """[C] most probable numbers, in units; and the log Bayes factor, in nats, of moving the
-        base's there in the linear model (half a Newton decrement); and weights [W] as
-        `discrepancy_here` gives them. `sizes`, of each family's weights, are estimated on the way.
-        """
-        base, by = self.columns.base, np.concatenate(([1.0], self.columns.unit))
+    def solved(self, process_noise: ProcessNoise, sizes: Mapping[str, float]) -> _Solution:
+        """All numbers; the `sizes` of each family's weights are estimated on the way."""
+        by = np.concatenate(([1.0], self.columns.unit))
         modes = likelihood.modes(likelihood.weighed(self.linear, process_noise), process_noise)
         modes = modes.joined(self.accelerations)
         total = modes.total(np.ones(len(self.linear.e))) * np.outer(by, by)
+        sizes = dict(sizes)
         for step in range(SIZE_STEPS + 1):
             known = self._known(sizes)
             inverse = np.linalg.inv(total[1:, 1:] + np.diag(known))
-            found = inverse @ (total[1:, 0] + self.held)
+            found, gain = within(inverse @ (total[1:, 0] + self.held), inverse, self.room)
             if step == SIZE_STEPS or not self.families:
                 break
             for family in self.families:
                 at = family.columns
                 square = float((found[at] ** 2 + np.diagonal(inverse)[at]).mean())
                 sizes[family.name] = max(math.sqrt(square), LEAST_SIZE)
-        moved = found[:base]
-        gain = 0.5 * float(moved @ np.linalg.solve(inverse[:base, :base], moved))
-        return found, gain, discrepancy_here(total, known, self.columns)
+        weights = discrepancy_here(total, known, self.columns)
+        value = self._density(total, known) - 0.5 * modes.log_volume()
+        return _Solution(found, gain, weights, sizes, value)
+
+    def _density(self, total: np.ndarray, known: np.ndarray) -> float:
+        """Log density of [e | J] and of the coefficients where they are."""
+        base = self.columns.base
+        others = np.append(0, np.arange(1 + base, len(total)))
+        found = marginal(
+            total[np.ix_(others, others)], np.diag(known[base:]), self.held[base:]
+        )  # fmt: skip
+        return found - 0.5 * float(self.held[:base] @ self.held[:base])
 
     def _known(self, sizes: Mapping[str, float]) -> np.ndarray:
         known = self.columns.known.copy()
@@ -152,6 +278,24 @@ class _Joint:
         left = self.linear.less(self.accelerations @ found[count:])
         numbers = (found * self.columns.unit)[:count]
         return likelihood.learnt(left, numbers, process_noise, rounds=rounds)
+
+
+def within(free: np.ndarray, covariance: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, float]:
+    """The most probable numbers [C] with the first P of them within `room` [2, P], and the nats
+    that those gain by moving there from zero.
+
+    free    [C] the most probable numbers without bounds; covariance [C, C] theirs
+    """
+    count = room.shape[1]
+    if not count:
+        return free, 0.0
+    information = np.linalg.inv(covariance[:count, :count])
+    size, axes = np.linalg.eigh(0.5 * (information + information.T))
+    root = np.sqrt(np.maximum(size, 0.0))[:, None] * axes.T
+    moved = lsq_linear(root, root @ free[:count], tuple(room), method="bvls").x
+    gain = float(moved @ information @ (free[:count] - 0.5 * moved))
+    # the other numbers go with those that a bound keeps from where they would be
+    return free + covariance[:, :count] @ information @ (moved - free[:count]), gain
 
 
 def discrepancy_here(total: np.ndarray, known: np.ndarray, columns: Columns) -> np.ndarray:

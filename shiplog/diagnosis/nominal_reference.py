@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from shiplog.diagnosis import input_misfit, likelihood, linearisation, nominal_fit, segments
+from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.input_misfit import Misfit
 from shiplog.diagnosis.likelihood import Modes, ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Wide
@@ -184,15 +185,6 @@ def inflation(
             score += marginal(left, *nominal_information(total - left, kappa, known, held))
         scores.append(score)
     return tried[int(np.argmax(scores))]
-
-
-def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
-    """Log likelihood of [e | J] with its numbers integrated out, up to what no number changes."""
-    both = gram[1:, 1:] + information
-    towards = gram[1:, 0] + pull
-    square = gram[0, 0] + pull @ np.linalg.solve(information, pull)
-    square -= towards @ np.linalg.solve(both, towards)
-    return -0.5 * float(square + np.linalg.slogdet(both)[1] - np.linalg.slogdet(information)[1])
 
 
 def assume(

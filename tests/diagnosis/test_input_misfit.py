@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shiplog.diagnosis import input_misfit, likelihood
+from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
-from shiplog.diagnosis.nominal_reference import marginal
 from shiplog.diagnosis.segment_nodes import at_knots
 from shiplog.diagnosis.segments import Cut, SegmentGrid
 from shiplog.models.compiled_network import Network

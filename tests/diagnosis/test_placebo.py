@@ -7,7 +7,7 @@ import pytest
 import straight
 from straight import CAUSES
 
-from shiplog.diagnosis.nominal_reference import marginal
+from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.placebo import placebos
 from shiplog.diagnosis.remainder import CHANGE_SIZES
 
