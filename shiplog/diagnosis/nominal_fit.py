@@ -7,9 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
-from shiplog.diagnosis import discrepancy, likelihood, linearisation, segment_nodes, segments
+from shiplog.diagnosis import (
+    bounds,
+    discrepancy,
+    likelihood,
+    linearisation,
+    segment_nodes,
+    segments,
+)
 from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path, Wide
@@ -286,16 +292,12 @@ def within(free: np.ndarray, covariance: np.ndarray, room: np.ndarray) -> tuple[
 
     free    [C] the most probable numbers without bounds; covariance [C, C] theirs
     """
-    count = room.shape[1]
-    if not count:
-        return free, 0.0
-    information = np.linalg.inv(covariance[:count, :count])
-    size, axes = np.linalg.eigh(0.5 * (information + information.T))
-    root = np.sqrt(np.maximum(size, 0.0))[:, None] * axes.T
-    moved = lsq_linear(root, root @ free[:count], tuple(room), method="bvls").x
-    gain = float(moved @ information @ (free[:count] - 0.5 * moved))
+    first = slice(room.shape[1])
+    moved = bounds.within(free[first], covariance[first, first], *room)
+    information = np.linalg.inv(covariance[first, first])
+    gain = float(moved @ information @ (free[first] - 0.5 * moved))
     # the other numbers go with those that a bound keeps from where they would be
-    return free + covariance[:, :count] @ information @ (moved - free[:count]), gain
+    return free + covariance[:, first] @ information @ (moved - free[first]), gain
 
 
 def discrepancy_here(total: np.ndarray, known: np.ndarray, columns: Columns) -> np.ndarray:
