@@ -158,12 +158,13 @@ def delay(c: Columns, t: np.ndarray, seconds: float, *names: str) -> None:
 
 
 def hold_back(c: Columns, t: np.ndarray, seconds: float, name: str) -> None:
-    """What is shown, that the ship's own follows with this time constant; of its own without steps,
-    or what is shown would be a row of spikes."""
-    second = np.ones(11) / 11.0
+    """What is shown, that the ship's own follows with this time constant; of its own averaged twice
+    over three samples, or what is shown would be a row of spikes. Over a second, the ship's own
+    would no longer follow what is shown as a lag does: it would run ahead of its mean."""
+    three = np.ones(3) / 3.0
     for n in _of(c, name):
-        ends = np.pad(c[n], 10, mode="edge")
-        smooth = np.convolve(np.convolve(ends, second, "valid"), second, "valid")
+        ends = np.pad(c[n], 2, mode="edge")
+        smooth = np.convolve(np.convolve(ends, three, "valid"), three, "valid")
         c[n] = smooth + seconds * np.gradient(smooth, t)
 
 
