@@ -7,24 +7,29 @@ JUDGEMENTS: dict[str, str] = {
         "Believable. The tests are of one ship, from July to November 2020, and no change of the "
         "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late ([Esso "
         "Osaka](results/esso_osaka.md)); such berthings are among the nominal voyages, too, so "
-        "that this is no change between the two campaigns. On tests that were held out, the "
-        "physics have half of the regression's L."
+        "that this is no change between the two campaigns. The voyages of this pond differ by "
+        "much, so that the eight tests in question do not make it sure. On tests that "
+        "were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
         "position and velocity. The random tests alone say, too, that the wind force athwart is "
-        "half of that published, as it is with a wind that is measured 1.47 times too strong. That "
-        "it is the anemometer and not the force, and the wind's clock, are unconfirmed, and half "
-        "of the error is unexplained."
+        "half of that published, as it is with a wind that is measured 1.49 times too strong. That "
+        "it is the anemometer and not the force, and the wind's clock, are unconfirmed. Nothing "
+        "else says that the compass is 3.25 deg off: coefficients of another pond may do that. "
+        "Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "
         "predicts zigzags better than the physics, and `evaluate` says so."
     ),
-    "kvlcc2, full scale": ("Believable. All six tests are of one series."),
+    "kvlcc2, full scale": (
+        "Believable. All six tests are of one series: no change comes first, and is not sure."
+    ),
     "blueboat": (
-        "Believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "
-        "nothing is known to have changed, and the data are too few to be sure of it."
+        "Not believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "
+        "nothing is known to have changed. On 5 of the 53 segments of the nominal runs the model "
+        "diverges; the process noise is estimated from the others, and is too small."
     ),
     "milliampere": (
         "Believable. These are three runs at about 0.1 m/s; the answer says how much more is "
