@@ -69,7 +69,12 @@ def squares(modes: Modes, numbers: np.ndarray, noise: float = 1.0) -> np.ndarray
 
 
 def marginal(gram: np.ndarray, information: np.ndarray, pull: np.ndarray) -> float:
-    """Log likelihood of [e | J] with its numbers integrated out, up to what no number changes."""
+    """Log likelihood [nats] of [e | J] with its numbers integrated out, up to a constant
+    (a Gaussian integral).
+
+    gram          products [1 + C, 1 + C] of [e | J]
+    information   [C, C] on the numbers before any data; pull [C] what it pulls towards
+    """
     both = gram[1:, 1:] + information
     towards = gram[1:, 0] + pull
     square = gram[0, 0] + pull @ np.linalg.solve(information, pull)

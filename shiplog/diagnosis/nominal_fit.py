@@ -30,7 +30,7 @@ from shiplog.voyages.recording import Record
 LINEARISATIONS = 20  # of moving the coefficients to where they are linearised, at most
 LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
 NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
-NO_ROOM = 1e-9  # plausible spreads that a coefficient may move beyond its bounds
+NO_ROOM = 1e-9  # plausible spreads beyond a bound: bounded least squares needs some room
 LOST_NATS = 50.0  # of the campaign's log density: a move that loses more is halved
 MOST_HALVINGS = 3  # of one move, at most
 ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are estimated
@@ -107,6 +107,7 @@ class _Iterate:
         return self.solution.gain < NEAR and self.far < CLOSE
 
     def at_rest(self) -> Converged:
+        """The fit that ends here, with the noise estimated once more."""
         noise = self.joint.noise(self.solution.found, self.process_noise, AT_REST)
         return Converged(self.theta, self.path, noise)
 
@@ -216,8 +217,8 @@ class _Solution:
     gain     log Bayes factor [nats] of moving the coefficients there in the linear model
     weights  [W] as `discrepancy_here` gives them
     sizes    of each family's weights
-    value    log density of the campaign and of the coefficients where it is linearised: all other
-             numbers are integrated out
+    value    log density [nats] of the campaign and of the coefficients where it is linearised: all
+             other numbers are integrated out; segments on which the model diverges are not in it
     """
 
     found: np.ndarray
@@ -267,9 +268,8 @@ class _Joint:
         """Log density of [e | J] and of the coefficients where they are."""
         base = self.columns.base
         others = np.append(0, np.arange(1 + base, len(total)))
-        found = marginal(
-            total[np.ix_(others, others)], np.diag(known[base:]), self.held[base:]
-        )  # fmt: skip
+        known, pull = np.diag(known[base:]), self.held[base:]
+        found = marginal(total[np.ix_(others, others)], known, pull)
         return found - 0.5 * float(self.held[:base] @ self.held[:base])
 
     def _known(self, sizes: Mapping[str, float]) -> np.ndarray:

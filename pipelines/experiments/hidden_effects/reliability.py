@@ -86,6 +86,8 @@ def _panel(left: float, title: str, found: Sequence[Bin]) -> list[str]:
         line((0, 0), (1, 1), 'stroke="#999" stroke-dasharray="4 3"'),
         text((x(0.5), above), f"{title}: {sum(len(one.hits) for one in found)} answers"),
         text((x(0.5), f"{MARGIN + SIDE + 32:.1f}"), "probability said"),
+        f'<g transform="translate({left - 26:.1f} {y(0.25)}) rotate(-90)">'
+        f"{text(('0', '0'), 'share right')}</g>",
     ]
     for tick in (0.0, 0.5, 1.0):
         parts.append(text((x(tick), below), f"{tick:g}"))

@@ -7,9 +7,8 @@ JUDGEMENTS: dict[str, str] = {
         "Believable. The tests are of one ship, from July to November 2020, and no change of the "
         "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late ([Esso "
         "Osaka](results/esso_osaka.md)); such berthings are among the nominal voyages, too, so "
-        "that this is no change between the two campaigns. The voyages of this pond differ by "
-        "much, so that the eight tests in question do not make it sure. On tests that "
-        "were held out, the physics have half of the regression's L."
+        "that this is no change between the two campaigns. Eight tests do not make it sure. On "
+        "tests that were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
@@ -29,7 +28,7 @@ JUDGEMENTS: dict[str, str] = {
     "blueboat": (
         "Not believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "
         "nothing is known to have changed. On 5 of the 53 segments of the nominal runs the model "
-        "diverges; the process noise is estimated from the others, and is too small."
+        "diverges, and the nominal process noise is that of the others."
     ),
     "milliampere": (
         "Believable. These are three runs at about 0.1 m/s; the answer says how much more is "
