@@ -1,9 +1,10 @@
-"""Voyages in question to a decision: set-up, search, refutation; for a given model more than once.
+"""Voyages in question to a decision: set-up, search, refutation; for a given model twice.
 
 Of a given model no nominal campaign shows the discrepancy. It is learned from the voyages in
-question, where it absorbs the effects of causes; so it is learned again without the effects of
-the named causes, until the same causes are named. Each further search starts from nothing and from
-these causes.
+question, where it absorbs the effects of causes. The causes that a first search names are therefore
+taken out, the discrepancy is learned again, and a second search decides. It starts from nothing and
+from these causes. One repetition is enough: a third search would start from numbers that differ
+from those of the first by what the discrepancy had absorbed of them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shiplog.diagnosis import evidence, placebo, refutation, setup, trial_voyages
+from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Point
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.result import Decision
@@ -26,8 +28,6 @@ from shiplog.simulation.error_reduction import Gain
 from shiplog.training.load_model import Run
 from shiplog.voyages.recording import Record
 from shiplog.voyages.windows import Windows
-
-MOST_ROUNDS = 3  # of learning a given model's discrepancy again
 
 log = logging.getLogger(__name__)
 
@@ -57,39 +57,50 @@ def decided(
 ) -> Decided:  # fmt: skip
     """As `setup.trial_of`; `cut` are the voyages' windows, and `reach` is called at each stage."""
 
-    def once(numbers: Mapping[str, np.ndarray] | None = None) -> Decided:
+    def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
         made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers)
-        return _once(run, made, cut, reach, numbers)
+        return _searched(run, made, reach, numbers)
 
-    done = once()
-    for _ in range(MOST_ROUNDS if nominal is None and run.given else 0):
-        names = _names(done)
-        if not names:
-            break
-        before, done = names, once({n: done.decision.fit.found.numbers[n] for n in names})
-        if set(before) == set(_names(done)):
-            break
-    return done
-
-
-def _names(done: Decided) -> list[str]:
-    return [one.cause.label for one in done.decision.named]
+    found = searched()
+    if nominal is None and run.given and (numbers := found.numbers):
+        del found  # its products, before those of the next one
+        found = searched(numbers)
+    trial = found.trial
+    judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
+    reach("held-out voyages")
+    decision, _, gain, refuted = refutation.judged(found.search, judge)
+    return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)
 
 
-def _once(
-    run: Run, made: setup.Setup, cut: Windows | None, reach: Callable[[str], None],
+@dataclass(frozen=True)
+class _Searched:
+    """A trial with the hypotheses that were weighed; `untested` and `point` as in `Decided`."""
+
+    trial: Trial
+    untested: Mapping[str, str]
+    point: Point
+    search: Search
+
+    @property
+    def numbers(self) -> dict[str, np.ndarray]:
+        """Label → numbers of the causes that would be named, whatever held-out voyages say."""
+        decision, _ = decide(self.search)
+        return {
+            one.cause.label: decision.fit.found.numbers[one.cause.label] for one in decision.named
+        }
+
+
+def _searched(
+    run: Run, made: setup.Setup, reach: Callable[[str], None],
     likely: Mapping[str, np.ndarray] | None,
-) -> Decided:  # fmt: skip
+) -> _Searched:  # fmt: skip
     trial, point = evidence.begin(made.trial, run.extension_numbers())
     log.info(
         "%s against %s: %d segments of %d s, of which a share of %.2f counts",
         listed(trial.record.names, most=4), run.name, len(trial.rows), trial.grid.seconds,
         trial.reference.counts,
     )  # fmt: skip
-    judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
     reach("hypotheses")
     search = Search(trial, point, placebo.placebos(trial.campaign), likely=likely)
     search.run()
-    reach("held-out voyages")
-    decision, _, gain, refuted = refutation.judged(search, judge)
-    return Decided(trial, made.untested, point, judge, decision, gain, refuted)
+    return _Searched(trial, made.untested, point, search)
