@@ -109,7 +109,8 @@ def _imitated(
 def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
     """How large a remainder of this kind would be if it had to do the work of a cause: in the most
     probable hypothesis without it. With the cause, it is only what the cause leaves."""
-    others = (h.remainder.size for h in table.ranked((name,)) if h.kind == remainder.kind)
+    rest = table.ranked((frozenset((name,)),))
+    others = (h.remainder.size for h in rest if h.kind == remainder.kind)
     return max(remainder.size, next(others, 0.0))
 
 

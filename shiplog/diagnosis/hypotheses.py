@@ -11,7 +11,7 @@ import numpy as np
 
 from shiplog.diagnosis import intermittent, raised_noise
 from shiplog.diagnosis.fitted import Fit, Point
-from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, name_of
+from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, holds_one
 from shiplog.diagnosis.remainder import NOMINAL, Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
@@ -60,9 +60,9 @@ class Hypotheses:
         same = (h for (_, other), h in self.found.items() if other == kind)
         return max(same, key=lambda h: h.score, default=None)
 
-    def ranked(self, without: Collection[str] = ()) -> list[Hypothesis]:
-        """Best first; without those that contain a cause of these names."""
-        kept = (h for h in self.found.values() if not set(without) & set(map(name_of, h.causes)))
+    def ranked(self, without: Collection[frozenset[str]] = ()) -> list[Hypothesis]:
+        """Best first; without those whose causes have all names of one of these sets."""
+        kept = (h for h in self.found.values() if not holds_one(without, h.causes))
         return sorted(kept, key=lambda h: -h.score)
 
     def fit(self, one: Hypothesis) -> Fit:
@@ -104,7 +104,7 @@ class Hypotheses:
             for key, h in self.found.items()
         }
 
-    def forget(self, without: Collection[str] = ()) -> None:
+    def forget(self, without: Collection[frozenset[str]] = ()) -> None:
         """Drop the linearisations of all but the best hypotheses: each takes 50 MB and more."""
         best = [self.nothing, *self.ranked(without)]
         points = dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point))

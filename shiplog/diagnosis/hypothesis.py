@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +57,12 @@ class Hypothesis:
 def name_of(label: str) -> str:
     """`clock_offset:wind` is the wind's clock."""
     return label.partition(":")[0]
+
+
+def holds_one(without: Collection[frozenset[str]], labels: Sequence[str]) -> bool:
+    """Whether these causes have all names of one of the sets."""
+    names = set(map(name_of, labels))
+    return any(one <= names for one in without)
 
 
 class Priors:

@@ -96,7 +96,7 @@ class Posterior:
 
 def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     """Of the weighed hypotheses, without those that contain a refuted cause (by name)."""
-    kept = search.table.ranked({*search.banned, *refuted})
+    kept = search.table.ranked({*search.banned, *(frozenset((name,)) for name in refuted)})
     score = np.array([h.score for h in kept])
     share = np.exp(score - score.max())
     share /= share.sum()

@@ -2,17 +2,21 @@
 
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
-probabilities are those of the hypotheses that do not contain it.
+probabilities are those of the hypotheses that do not contain it. Its gain is that over the other
+names. If one of them is a cause from which it can hardly be told, either may do the work of both:
+only the two together are refuted.
 
-With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Nor is
-it one of a cause that takes the place of a more probable one, which is refuted. Causes are then
-named only if the whole interval is a gain. A remainder so slight that it can be an error of the
-causes' own equations puts none in doubt.
+With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
+are then named only if the whole interval is a gain. A remainder so slight that it can be an error
+of the causes' own equations puts none in doubt.
+
+Nor is a log Bayes factor a proof of a cause that takes the place of a more probable one, which is
+refuted. It is named only if the whole interval of its own gain is one, whatever the others gain.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -22,9 +26,11 @@ from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.posterior import Posterior
 from shiplog.diagnosis.remainder import NOMINAL
-from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.result import Decision, Named
 from shiplog.diagnosis.search import Search
 from shiplog.simulation.error_reduction import Gain
+
+TAKES_A_PLACE = "held-out voyages refute what is more probable"
 
 
 class Judge(Protocol):
@@ -52,7 +58,7 @@ def _why_in_doubt(
     """
     names = [one.cause.name for one in decision.named]
     if not set(names) <= set(first):
-        return "held-out voyages refute what is more probable"
+        return TAKES_A_PLACE
     if decision.side_force is not None:
         return ""
     best = posteriors.best_with(found, names)
@@ -60,6 +66,26 @@ def _why_in_doubt(
     if remains >= thresholds.STATED and not posteriors.slight(search.table, best):
         return "the catalogue does not explain all of the trial"
     return ""
+
+
+def _alike(one: Named, named: Sequence[Named]) -> str:
+    """Name of another named cause from which one can hardly be told; empty without any."""
+    for other in (n.cause for n in named if n.cause.name != one.cause.name):
+        if other.name in one.cause.separated_by or one.cause.name in other.separated_by:
+            return other.name
+    return ""
+
+
+def _unproved(
+    asked: Sequence[tuple[Named, Gain]], first: Collection[str]
+) -> tuple[Named, Gain] | None:
+    """Of causes that take a refuted one's place, next to others that do not, the one that gains
+    least; none where each surely gains something."""
+    others = [pair for pair in asked if pair[0].cause.name not in first]
+    unsure = [pair for pair in others if not pair[1].real]
+    if not unsure or len(others) == len(asked):
+        return None
+    return min(unsure, key=lambda pair: pair[1].low)
 
 
 def judged(
@@ -73,10 +99,10 @@ def judged(
     Of several causes the one that takes most off the held-out error comes first.
     """
     refuted: dict[str, str] = {}
-    first: set[str] = set()  # names before any is refuted
+    first: set[str] | None = None  # names before any is refuted
     while True:
         decision, found = decide(search, refuted)
-        first = first if refuted else {one.cause.name for one in decision.named}
+        first = {one.cause.name for one in decision.named} if first is None else first
         if held is None or not decision.named:
             return decision, found, None, refuted
         gain = held.gain(decision)
@@ -96,14 +122,25 @@ def judged(
             )
             doubted = {one.cause.name: why for one in decision.named}
             if not {*doubted} <= first:  # held-out voyages confirm no answer: all are listed
-                search.banned.difference_update(refuted)
+                search.banned.difference_update(frozenset((name,)) for name in refuted)
                 doubted, refuted = refuted | doubted, {}
             return *decide(search, refuted, doubted), None, refuted
+        if not worse and (pair := _unproved(asked, first)):
+            one, worth = pair
+            refuted[one.cause.name] = (
+                f"{TAKES_A_PLACE}, so this one is named only if it surely reduces the held-out "
+                f"error: here by {worth.low:.1%} to {worth.high:.1%}"
+            )
+            search.without(one.cause.name)
+            continue
         if not worse:
             order = sorted(asked, key=lambda pair: -pair[1].reduction)
             ordered = replace(decision, named=tuple(one for one, _ in order))
             return ordered, found, gain, refuted
         one, worth = min(worse, key=lambda pair: pair[1].high)
+        if alike := _alike(one, decision.named):
+            search.without(one.cause.name, alike)
+            continue
         refuted[one.cause.name] = (
             f"held-out voyages refute it: with it the error is {-worth.high:.1%} to "
             f"{-worth.low:.1%} greater"

@@ -17,7 +17,7 @@ import numpy as np
 from shiplog.diagnosis import evidence, thresholds
 from shiplog.diagnosis.fitted import ExpectedEvidence, Fit, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.weighing import SEARCH_NATS, weigh
@@ -37,7 +37,8 @@ class Search:
     table     the hypotheses weighed so far
     expected  label → expected log Bayes factor of that cause, by its size
     scanned   label → score of that cause by itself, scanned before any set is searched
-    banned    names of causes without which the search went on
+    banned    names of causes without which the search went on: sets, of which a hypothesis does not
+              hold all names
     likely    numbers of a set of causes that is likely from the start, by label
     """
 
@@ -49,7 +50,7 @@ class Search:
         self.likely = dict(likely or {})
         self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
-        self.banned: set[str] = set()
+        self.banned: set[frozenset[str]] = set()
         self._most = MOST_SETS
         self._tried: set[tuple[str, ...]] = set()
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
@@ -72,9 +73,10 @@ class Search:
             self._expand(fresh[0])
         self.table.rescore()
 
-    def without(self, name: str) -> None:
-        """Go on without a cause, for as many sets again: those behind it were hardly weighed."""
-        self.banned.add(name)
+    def without(self, *names: str) -> None:
+        """Go on without a cause, or without these together, for as many sets again: those behind
+        were hardly weighed."""
+        self.banned.add(frozenset(names))
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
         self.run()
@@ -116,7 +118,7 @@ class Search:
         table = self.table
         candidates = [
             c for c in table.catalogue
-            if c.label not in one.causes and c.name not in self.banned
+            if c.label not in one.causes and not holds_one(self.banned, (*one.causes, c.label))
             and all(c.compatible(label) for label in one.causes)
         ]  # fmt: skip
         _, found = evidence.scan(

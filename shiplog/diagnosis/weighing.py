@@ -58,12 +58,12 @@ class Change:
 
 def weigh(
     table: Hypotheses, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point,
-    banned: Collection[str] = (),
+    banned: Collection[frozenset[str]] = (),
 ) -> None:  # fmt: skip
     """Put the hypotheses of these causes into the table; none, where their fit diverges.
 
     numbers   of the causes, to start from; at: a point whose path is to start from
-    banned    names of causes whose linearisations need not be kept
+    banned    sets of names: linearisations that hold all of one need not be kept
     """
     trial, included = table.trial, table.included(labels)
     point, near = at, None

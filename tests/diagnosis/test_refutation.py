@@ -137,6 +137,58 @@ def test_what_takes_the_place_of_a_refuted_name_must_prove_itself(trial):
     assert decision.ranking["load"] == pytest.approx(0.039, abs=0.001)
 
 
+@pytest.mark.parametrize(("own", "named"), [(BETTER, ["drag", "two"]), (UNSURE, ["drag"])])
+def test_next_to_other_names_it_must_prove_itself_by_its_own_gain(trial, own, named):
+    """Drag gains enough for both. What stands in the place of the load is named for its own gain
+    only; without it the others are judged again."""
+    both, other = ("drag", "load"), ("drag", "two")
+    made = weighed.search(
+        trial, {(both, NOMINAL): 0.96, (other, NOMINAL): 0.039, (DRAG, NOMINAL): 1e-4}
+    )
+    held = HeldOut(
+        {both: BETTER, other: BETTER, DRAG: BETTER}, {"drag": BETTER, "load": WORSE, "two": own}
+    )
+    decision, _, gained, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == named
+    assert gained.low == BETTER[0]
+    assert set(refuted) == {"load", "two"} - set(named)
+    reason = decision.rejected.get("two", "")
+    assert reason.startswith("held-out voyages refute what is more probable") == (own == UNSURE)
+
+
+@pytest.mark.parametrize(("which", "alike"), [("drag", "load"), ("load", "drag"), ("two", "drag")])
+def test_of_two_that_can_hardly_be_told_only_both_are_refuted(trial, monkeypatch, which, alike):
+    """Drag and load together are surely worse than the load alone, which says nothing of drag alone
+    where one can do the other's work. The relation holds whichever of them states it."""
+    by = {cause.name: cause for cause in weighed.search(trial, {}).table.catalogue}
+    monkeypatch.setattr(type(by[which]), "separated_by", {alike: "a test"}, raising=False)
+    made = weighed.search(
+        trial, {(("drag", "load"), NOMINAL): 0.9, (DRAG, NOMINAL): 0.09, (LOAD, NOMINAL): 0.001}
+    )
+    held = HeldOut(
+        {("drag", "load"): BETTER, DRAG: BETTER, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
+    )
+    decision, found, _, refuted = judged(made, held)
+    told = which == "two"  # it is not there
+    assert [one.cause.label for one in decision.named] == (["load"] if told else ["drag"])
+    assert list(refuted) == (["drag"] if told else [])
+    assert all(set(h.causes) != {"drag", "load"} for h in found.hypotheses)
+
+
+def test_one_of_two_alike_may_be_refuted_after_both(trial, monkeypatch):
+    by = {cause.name: cause for cause in weighed.search(trial, {}).table.catalogue}
+    monkeypatch.setattr(type(by["drag"]), "separated_by", {"load": "a test"}, raising=False)
+    made = weighed.search(
+        trial, {(("drag", "load"), NOMINAL): 0.9, (DRAG, NOMINAL): 0.09, (LOAD, NOMINAL): 0.001}
+    )
+    held = HeldOut(
+        {("drag", "load"): BETTER, DRAG: WORSE, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
+    )
+    decision, _, _, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == ["load"]
+    assert list(refuted) == ["drag"]
+
+
 def test_what_was_named_together_with_a_refuted_name_need_not(trial):
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
     held = HeldOut({("drag", "load"): BETTER, LOAD: UNSURE}, {"drag": (-0.5, -0.2), "load": UNSURE})
