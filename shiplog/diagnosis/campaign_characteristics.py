@@ -228,7 +228,7 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
     each family of the discrepancy."""
     part = np.array([name.split(".")[0] for name in model.base.names])
     found = {name: np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())}
-    found |= {c.label: columns.of[c.label] for c in model.causes if c.nominal}
+    found |= {c.label: columns.of[c.label] for c in model.causes if c.varies}
     return found | {family.name: family.columns for family in families.families}
 
 

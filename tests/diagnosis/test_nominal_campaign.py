@@ -1,6 +1,7 @@
 """Parts of a campaign, the prior that they make, and how much of itself a trial counts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,9 +20,13 @@ from shiplog.diagnosis import (
     segments,
     voyage_effects,
 )
+from shiplog.diagnosis.campaign_characteristics import groups_of
 from shiplog.diagnosis.campaign_parts import FEWEST_PARTS, parts_of
 from shiplog.diagnosis.campaign_prior import prior
+from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.nominal_fit import Converged
+from shiplog.diagnosis.parameter_layout import Columns
+from shiplog.models.causes import CATALOGUE
 from shiplog.models.starting_values import Start
 
 
@@ -289,3 +294,15 @@ def test_coefficients_are_at_least_as_free_as_the_causes_that_scale_them(model):
     assert nominal_campaign.widened(Model(), SETTING, start).spread == pytest.approx([1.5, 2.0])
     # of a cause that no fit absorbs nothing follows
     assert nominal_campaign.widened(model, SETTING, start).spread == pytest.approx([0.3, 2.0])
+
+
+def test_a_clock_that_two_channels_share_has_a_variance_of_its_own():
+    by = {cause.label: cause for cause in CATALOGUE}
+    shared = [by[f"clock_offset:{channel}"] for channel in ("position", "velocity", "gnss")]
+    causes = (*shared, by["rudder_delay"])
+    model = SimpleNamespace(base=SimpleNamespace(names=()), causes=causes)
+    columns = Columns(0, causes, np.ones(4))
+    found = groups_of(model, columns, Discrepancy((), np.ones(3)))
+    assert {name: rows.tolist() for name, rows in found.items()} == {
+        cause.label: [at] for at, cause in enumerate(shared)
+    }

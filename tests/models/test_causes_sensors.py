@@ -136,3 +136,14 @@ def test_two_rudders_have_two_offsets_and_one_has_one():
     observed = closed.record(SINGLE)
     moved = one.read(observed, np.array([0.1])).actuator - observed.actuator
     assert moved == pytest.approx(np.broadcast_to([0.1, 0.0], moved.shape), abs=1e-12)
+
+
+def test_parts_may_differ_in_the_clock_that_position_and_velocity_share():
+    """It has no nominal value beside theirs. A rudder's delay, an alias of one lag, has neither."""
+    by = {cause.label: cause for cause in CATALOGUE}
+    clocks = [by[f"clock_offset:{channel}"] for channel in ("position", "velocity", "gnss")]
+    assert [(clock.nominal, clock.varies) for clock in clocks] == [(True, True)] * 2 + [
+        (False, True)
+    ]
+    assert all(c.varies == c.nominal for c in CATALOGUE if c.name != "clock_offset")
+    assert not by["rudder_delay"].varies

@@ -164,6 +164,12 @@ class Cause:
         return not self.absorbed
 
     @property
+    def varies(self) -> bool:
+        """Whether parts of the nominal campaign may differ in it. That of an alias of several other
+        causes does where they vary together: each by itself would vary by as much."""
+        return self.nominal
+
+    @property
     def reads(self) -> bool:
         """Whether it changes what was recorded, and not the ship's motion."""
         return type(self).read is not Cause.read

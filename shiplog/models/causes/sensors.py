@@ -125,6 +125,10 @@ class ClockOffset(Cause):
     def nominal(self) -> bool:
         return self.channel != "gnss"  # that is position and velocity together
 
+    @property
+    def varies(self) -> bool:
+        return True  # position and velocity have one clock, and what looks like one, as well
+
     def compatible(self, label: str) -> bool:
         """`gnss` is position and velocity together: two of the three determine the third."""
         both = {f"{self.name}:{channel}" for channel in ("position", "velocity")}
