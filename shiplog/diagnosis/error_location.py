@@ -43,9 +43,10 @@ PAUSE_NODES = 2.5  # nodes that an intermittent force may pause for
 def external(
     trial: Trial, point: Point, whole: Linear, remainder: Remainder, nominal: Record | None
 ) -> tuple[list[Interval], np.ndarray]:
-    """Stretches that no force of the ship explains, and the segments [S] bool that they touch: no
-    hypothesis is judged on those. The point is of the model as it stands, `whole` its pass with
-    the segments between its own; `nominal` the voyages of the nominal campaign, if there is one."""
+    """Stretches that no force of the ship explains, and the segments [S] bool that they touch: what
+    is fitted after the decision leaves those out. The point is of the model as it stands, `whole`
+    its pass with the segments between its own; `nominal` the voyages of the nominal campaign, if
+    there is one."""
     ref = trial.reference
     physics, values = ref.model.stand_in, np.array(list(ref.coefficients.values()))
     base, _ = evidence.scan(trial, point, (), trial.fixed, remainder=remainder)

@@ -18,6 +18,13 @@ from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
+# How the pattern of a force is read. Its strongest is a quantile, since a single knot may be off.
+STRONGEST = 0.95
+ON, BETWEEN = 0.5, 0.2  # shares of the strongest, above which it is on, or between on and off
+KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no pattern
+COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
+VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
+
 
 def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
     """Acceleration [3], root mean square, of nominal process noise that acts at one place; None
@@ -96,14 +103,14 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
     `deviation` [S, J] is the standard deviation of the estimate.
     """
     size = np.abs(force)
-    strongest = float(np.quantile(size, 0.95))
-    if strongest < 2.0 * float(np.median(deviation)):
+    strongest = float(np.quantile(size, STRONGEST))
+    if strongest < KNOWN * float(np.median(deviation)):
         return 0.0
-    on = size > 0.5 * strongest
-    between = (size > 0.2 * strongest) & ~on
+    on = size > ON * strongest
+    between = (size > BETWEEN * strongest) & ~on
     share = between.sum() / on.sum()
-    if on.mean() > 0.5:  # what is on for most of the time is no device that comes and goes
+    if on.mean() > COMES_AND_GOES:
         return 0.0
     if share < thresholds.BETWEEN:
         return 1.0
-    return 0.5 if share < 1.0 else 0.0
+    return 0.5 if share < VARIES else 0.0

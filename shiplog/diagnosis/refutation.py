@@ -7,11 +7,12 @@ names. If one of them is a cause from which it can hardly be told, either may do
 only the two together are refuted.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
-are then named only if the whole interval is a gain. A remainder so slight that it can be an error
-of the causes' own equations puts none in doubt.
+are then named only if the whole interval of what all of them gain is a gain. A remainder so slight
+that it can be an error of the causes' own equations puts none in doubt.
 
-Nor is a log Bayes factor a proof of a cause that takes the place of a more probable one, which is
-refuted. It is named only if the whole interval of its own gain is one, whatever the others gain.
+Nor is a log Bayes factor a proof of causes that take the place of a more probable one, which is
+refuted. What all of them gain has to be sure, too; and next to causes that were named from the
+start, each one's own gain, whatever the others gain.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every number that a verdict depends on: name, unit, reason. No other module decides by a number.
+"""The thresholds between verdicts: name, unit, reason. Settings of one method are in its module.
 
 Ten decide between hypotheses. The others say when there is nothing to decide on, and what is
 listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
@@ -13,7 +13,7 @@ from __future__ import annotations
 # statements have to be right, which the calibration table checks.
 STATED = 0.9
 
-# Share of trials without any change, before any data.
+# Share of trials in which no cause acts, before any data.
 NO_CHANGE = 0.5
 
 # Share. How much rarer each further cause is than the one before it.

@@ -59,7 +59,7 @@ def _row(one: Way) -> tuple[object, ...]:
         reported = named or ": ".join(filter(None, (verdict["verdict"], family)))
         explained = f"{verdict.get('explained') or 0.0:.0%}"
     elif one.stopped:
-        reported = "ends before"
+        reported = "no diagnosis"
     counted = (len(one.voyages), usable, windows) if one.voyages else ("-", "-", "-")
     return (DATA_SETS[one.name].ship, *counted, *losses, reported, explained, f"{one.cpu_s:.0f}")
 
