@@ -225,11 +225,12 @@ def _solved(
 
 def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[str, np.ndarray]:
     """Columns that share one variance: coefficients of one part of the ship, each cause's numbers,
-    each family of the discrepancy."""
+    each family of the discrepancy. Ship and discrepancy both have a part called wind."""
     part = np.array([name.split(".")[0] for name in model.base.names])
-    found = {name: np.flatnonzero(part == name) for name in dict.fromkeys(part.tolist())}
+    found = {f"{name} coefficients": np.flatnonzero(part == name)
+             for name in dict.fromkeys(part.tolist())}  # fmt: skip
     found |= {c.label: columns.of[c.label] for c in model.causes if c.varies}
-    return found | {family.name: family.columns for family in families.families}
+    return found | {f"{f.name} discrepancy": f.columns for f in families.families}
 
 
 def _noise(modes, rows, columns, effects, information, pull, weight) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -25,6 +26,8 @@ from shiplog.diagnosis.result import (
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
+# A cause that is at most 100 times less probable than the named one may stand in its place.
+INSTEAD_NATS = 2.0 * math.log(10.0)
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
 
@@ -33,10 +36,10 @@ def decide(
     refuted: Mapping[str, str] | None = None,
     doubted: Mapping[str, str] | None = None,
 ) -> tuple[Decision, Posterior]:
-    """The verdict, without the names that held-out data refute, and without any if the names are
-    in doubt; each with its reason."""
+    """The verdict, and without any name if the names are in doubt; name → reason, also of those
+    that held-out data refute, whose hypotheses are banned."""
     refuted, table = dict(refuted or {}), search.table
-    found = posteriors.posterior(search, tuple(refuted))
+    found = posteriors.posterior(search)
     names = () if doubted else found.stated
     kind = found.remainder
     best = posteriors.best_with(found, names, kind if not names else None)
@@ -109,8 +112,7 @@ def _imitated(
 def _size_without(table: Hypotheses, remainder: Remainder, name: str) -> float:
     """How large a remainder of this kind would be if it had to do the work of a cause: in the most
     probable hypothesis without it. With the cause, it is only what the cause leaves."""
-    rest = table.ranked((frozenset((name,)),))
-    others = (h.remainder.size for h in rest if h.kind == remainder.kind)
+    others = (h.remainder.size for h in table.ranked(name) if h.kind == remainder.kind)
     return max(remainder.size, next(others, 0.0))
 
 
@@ -118,15 +120,13 @@ def _named(
     table: Hypotheses, found: Posterior, best: Hypothesis, names: Sequence[str]
 ) -> tuple[Named, ...]:
     """The causes of a hypothesis that have these names, with what else they may be."""
-    by = {c.label: c for c in table.catalogue}
-    columns = table.trial.reference.columns
+    by, columns = table.by, table.trial.reference.columns
     given, at = [], 0
     for label in best.found.numbers:
         part = slice(at, at + len(columns.of[label]))
         at = part.stop
         if label not in by or name_of(label) not in names or not found.states(label):
             continue
-        others = _instead(found, best, label)
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
         form = thresholds.FORM_ERROR * numbers  # its equations are no better than that
@@ -136,7 +136,7 @@ def _named(
                 by[label], table.alone.get(label, float("nan")),
                 found.names.get(name_of(label), 0.0), numbers,
                 best.found.covariance[part, part] + np.diag(form**2) + np.outer(unit, unit),
-                tuple(others), others, table.trial.reference.freedom,
+                _instead(found, best, label), table.trial.reference.freedom,
             )
         )  # fmt: skip
     return tuple(given)
@@ -152,18 +152,18 @@ def _in_addition(
     return found.one_of if named and clear else ()
 
 
-def _instead(found: Posterior, best: Hypothesis, label: str) -> dict[str, float]:
-    """Names of causes that may stand in a cause's place → nats by which they are less likely."""
+def _instead(found: Posterior, best: Hypothesis, label: str) -> tuple[str, ...]:
+    """Labels of causes of another name that may stand in a cause's place."""
     rest = set(best.causes) - {label}
-    others: dict[str, float] = {}
+    others: dict[str, None] = {}
     for one in found.hypotheses:
         more = set(one.causes) - rest
-        if len(more) == 1 and rest <= set(one.causes) and one.kind == best.kind:
-            other = name_of(next(iter(more)))
-            behind = best.score - one.score
-            if other != name_of(label) and behind < np.log(1.0 / (1.0 - thresholds.STATED)) * 2.0:
-                others.setdefault(other, float(behind))
-    return others
+        near = best.score - one.score < INSTEAD_NATS and one.kind == best.kind
+        if near and len(more) == 1 and rest <= set(one.causes):
+            (other,) = more
+            if name_of(other) != name_of(label):
+                others.setdefault(other)
+    return tuple(others)
 
 
 def _structure(table: Hypotheses, best: Hypothesis, fit: Fit) -> Structure:
@@ -184,8 +184,8 @@ def _reasons(
     search: Search, found: Posterior, refuted: Mapping[str, str], named: Sequence[Named]
 ) -> dict[str, str]:
     """Label → why it is not named."""
-    reasons, table = dict(refuted), search.table
-    kept = {n.cause.name for n in named}
+    table, kept = search.table, {n.cause.name for n in named}
+    reasons = {name: why for name, why in refuted.items() if name not in kept}
     for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:8]:
         name = name_of(label)
         if name in kept or name in reasons:

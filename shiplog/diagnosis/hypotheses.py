@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -24,22 +24,20 @@ class Hypotheses:
 
     first      the trial linearised with the model as it stands
     placebo    label or remainder → its log Bayes factor on nominal voyages, in nats
-    catalogue  causes that a hypothesis may contain in addition to those of the model
+    catalogue  causes that a hypothesis may contain in addition to those of the model; `by` label
     found      causes and kind of remainder → hypothesis
     alone      label → log Bayes factor of that cause by itself, over no cause
+    banned     sets of names: a hypothesis that holds all names of one does not count any more
     """
 
-    def __init__(
-        self, trial: Trial, first: Point, placebo: Mapping[str, float], banned: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, trial: Trial, first: Point, placebo: Mapping[str, float]) -> None:
         self.trial, self.first, self.placebo = trial, first, placebo
-        self.catalogue = [
-            c for c in trial.reference.model.causes
-            if c.label not in trial.fixed and c.label not in banned
-        ]  # fmt: skip
+        self.catalogue = [c for c in trial.reference.model.causes if c.label not in trial.fixed]
+        self.by = {cause.label: cause for cause in self.catalogue}
         self.priors = Priors(self.catalogue, tuple(trial.families))
         self.found: dict[tuple[tuple[str, ...], str], Hypothesis] = {}
         self.alone: dict[str, float] = {}
+        self.banned: set[frozenset[str]] = set()
 
     @property
     def fixed(self) -> dict[str, np.ndarray]:
@@ -57,12 +55,13 @@ class Hypotheses:
 
     def best_of(self, kind: str) -> Hypothesis | None:
         """The most probable one so far with this kind of remainder."""
-        same = (h for (_, other), h in self.found.items() if other == kind)
-        return max(same, key=lambda h: h.score, default=None)
+        return next((h for h in self.ranked() if h.kind == kind), None)
 
-    def ranked(self, without: Collection[frozenset[str]] = ()) -> list[Hypothesis]:
-        """Best first; without those whose causes have all names of one of these sets."""
-        kept = (h for h in self.found.values() if not holds_one(without, h.causes))
+    def ranked(self, without: str = "") -> list[Hypothesis]:
+        """Best first, of those that are not banned; without those that contain a cause of this
+        name."""
+        banned = {*self.banned, frozenset((without,))}
+        kept = (h for h in self.found.values() if not holds_one(banned, h.causes))
         return sorted(kept, key=lambda h: -h.score)
 
     def fit(self, one: Hypothesis) -> Fit:
@@ -104,9 +103,9 @@ class Hypotheses:
             for key, h in self.found.items()
         }
 
-    def forget(self, without: Collection[frozenset[str]] = ()) -> None:
+    def forget(self) -> None:
         """Drop the linearisations of all but the best hypotheses: each takes 50 MB and more."""
-        best = [self.nothing, *self.ranked(without)]
+        best = [self.nothing, *self.ranked()]
         points = dict.fromkeys(id(h.point) for h in best if isinstance(h.point, Point))
         kept = list(points)[:KEPT_LINEARISATIONS]
         for key, one in self.found.items():

@@ -116,10 +116,11 @@ class Campaign:
 
 def learn(
     model: Extended, setting: Setting, start: Start, record: Record, at: Converged,
-    found: Characteristics,
+    found: Characteristics, numbers: Mapping[str, np.ndarray] | None = None,
 ) -> Campaign:  # fmt: skip
-    """The campaign as a trial's causes see it, which depend on where the trial was."""
-    made = nominal_pass(model, setting, start, record, replace(at, path=found.path))
+    """The campaign as a trial's causes see it, which depend on where the trial was. `numbers` as in
+    `assumed`."""
+    made = nominal_pass(model, setting, start, record, replace(at, path=found.path), numbers)
     columns, held, families = made.columns, made.held, made.families
     process_noise, known = found.process_noise, made.columns.known
     modes = likelihood.modes(likelihood.weighed(made.linear, process_noise), process_noise).joined(
@@ -207,7 +208,7 @@ def assumed(
     # how parts differ is learned with coefficients as free as they plausibly are: what all parts
     # have in common must not look like a difference
     found = characteristics(model, setting, start, record, at, numbers)
-    whole = learn(model, setting, start, record, at, found)
+    whole = learn(model, setting, start, record, at, found, numbers)
     columns, known = whole.reference.columns, whole.effects.size**-2.0
     known[columns.base : columns.linearised] = HELD_INFORMATION
     if given:

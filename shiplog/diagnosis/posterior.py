@@ -15,7 +15,7 @@ import numpy as np
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
 from shiplog.diagnosis.result import REFUTED, SIDE_THRUST
 from shiplog.diagnosis.search import Search
@@ -85,8 +85,8 @@ class Posterior:
             force = of.pop(f"unknown:{INTERMITTENT}")
             of[SIDE_THRUST] = device * force
             of |= {f"unknown:{INTERMITTENT}": (1.0 - device) * force} if device < 1.0 else {}
-        of |= dict.fromkeys(either if why == REFUTED else (), half)
         of |= {n: half * p if n in either else rest * p for n, p in self.names.items()}
+        of |= dict.fromkeys(either if why == REFUTED else (), half)
         of["none"] = rest * self.none
         whole = 1.0 + sum(self.hidden.values())
         for name, p in self.hidden.items():
@@ -94,9 +94,9 @@ class Posterior:
         return dict(sorted(((n, p / whole) for n, p in of.items()), key=lambda pair: -pair[1]))
 
 
-def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
-    """Of the weighed hypotheses, without those that contain a refuted cause (by name)."""
-    kept = search.table.ranked({*search.banned, *(frozenset((name,)) for name in refuted)})
+def posterior(search: Search) -> Posterior:
+    """Of the weighed hypotheses, without those that are banned."""
+    kept = search.table.ranked()
     score = np.array([h.score for h in kept])
     share = np.exp(score - score.max())
     share /= share.sum()
@@ -123,7 +123,7 @@ def posterior(search: Search, refuted: Sequence[str] = ()) -> Posterior:
     hidden: dict[str, float] = {}
     weighed = {h.causes for h in kept} | {(label,) for label in search.diverged}
     for label, one in search.scanned.items():
-        if name_of(label) not in refuted and (label,) not in weighed:
+        if not holds_one(search.table.banned, (label,)) and (label,) not in weighed:
             name = name_of(label)
             hidden[name] = hidden.get(name, 0.0) + float(np.exp(one - score.max())) / weight
     order = sorted(names, key=lambda name: -names[name])
@@ -148,7 +148,6 @@ def _one_of(
 def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
     """Label → probability, given this hypothesis, that its numbers are large enough to matter."""
     reference, covariance = table.trial.reference, one.found.covariance
-    by = {c.label: c for c in table.catalogue}
     found, at = {}, 0
     for label, numbers in one.found.numbers.items():
         part = slice(at, at + len(reference.columns.of[label]))
@@ -158,7 +157,7 @@ def practical(table: Hypotheses, one: Hypothesis) -> dict[str, float]:
         drawn = np.asarray(numbers)[None]
         if covariance is not None:
             drawn = drawn + _deviations(covariance[part, part])
-        found[label] = float(np.mean(by[label].practical(drawn, reference.setting)))
+        found[label] = float(np.mean(table.by[label].practical(drawn, reference.setting)))
     return found
 
 

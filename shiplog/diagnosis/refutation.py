@@ -11,8 +11,8 @@ are then named only if the whole interval of what all of them gain is a gain. A 
 that it can be an error of the causes' own equations puts none in doubt.
 
 Nor is a log Bayes factor a proof of causes that take the place of a more probable one, which is
-refuted. What all of them gain has to be sure, too; and next to causes that were named from the
-start, each one's own gain, whatever the others gain.
+refuted. What all causes gain has to be sure, too; and of several causes the own gain of each that
+takes a place, whatever the others gain.
 """
 
 from __future__ import annotations
@@ -69,24 +69,34 @@ def _why_in_doubt(
     return ""
 
 
-def _alike(one: Named, named: Sequence[Named]) -> str:
-    """Name of another named cause from which one can hardly be told; empty without any."""
-    for other in (n.cause for n in named if n.cause.name != one.cause.name):
+def _refuted(asked: Sequence[tuple[Named, Gain]]) -> tuple[frozenset[str], str] | None:
+    """Of causes whose whole interval is a loss the one that surely loses most, and why; together
+    with another one from which it is hard to separate."""
+    worse = [pair for pair in asked if pair[1].high < 0.0]
+    if not worse:
+        return None
+    one, worth = min(worse, key=lambda pair: pair[1].high)
+    loss = f"the error is {-worth.high:.1%} to {-worth.low:.1%} greater"
+    for other in (n.cause for n, _ in asked if n.cause.name != one.cause.name):
         if other.name in one.cause.separated_by or one.cause.name in other.separated_by:
-            return other.name
-    return ""
+            both = frozenset((one.cause.name, other.name))
+            return both, f"held-out voyages refute it together with another: with both {loss}"
+    return frozenset((one.cause.name,)), f"held-out voyages refute it: with it {loss}"
 
 
 def _unproved(
     asked: Sequence[tuple[Named, Gain]], first: Collection[str]
-) -> tuple[Named, Gain] | None:
-    """Of causes that take a refuted one's place, next to others that do not, the one that gains
-    least; none where each surely gains something."""
-    others = [pair for pair in asked if pair[0].cause.name not in first]
-    unsure = [pair for pair in others if not pair[1].real]
-    if not unsure or len(others) == len(asked):
+) -> tuple[frozenset[str], str] | None:
+    """Of causes that take a refuted one's place, next to others, the one that surely gains least,
+    and why; none where each surely gains something."""
+    unsure = [pair for pair in asked if pair[0].cause.name not in first and not pair[1].real]
+    if not unsure or len(asked) == 1:
         return None
-    return min(unsure, key=lambda pair: pair[1].low)
+    one, worth = min(unsure, key=lambda pair: pair[1].low)
+    return frozenset((one.cause.name,)), (
+        f"{TAKES_A_PLACE}, so this one is named only if it surely reduces the held-out error: "
+        f"here by {worth.low:.1%} to {worth.high:.1%}"
+    )
 
 
 def judged(
@@ -99,13 +109,16 @@ def judged(
 
     Of several causes the one that takes most off the held-out error comes first.
     """
-    refuted: dict[str, str] = {}
+    bans: dict[frozenset[str], str] = {}  # names → why hypotheses with all of them do not count
     first: set[str] | None = None  # names before any is refuted
     while True:
+        refuted = {name: why for names, why in bans.items() for name in sorted(names)}
         decision, found = decide(search, refuted)
-        first = {one.cause.name for one in decision.named} if first is None else first
-        if held is None or not decision.named:
-            return decision, found, None, refuted
+        named = {one.cause.name for one in decision.named}
+        first = named if first is None else first
+        kept = {name: why for name, why in refuted.items() if name not in named}
+        if held is None or not named:
+            return decision, found, None, kept
         gain = held.gain(decision)
         worths = [gain]
         if len(decision.named) > 1:
@@ -114,36 +127,22 @@ def judged(
             ]
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
-        worse = [pair for pair in asked if pair[1].high < 0.0]  # the whole interval is a loss
-        why = _why_in_doubt(search, found, decision, first)
-        if not worse and not gain.real and why:
+        if refutable := _refuted(asked) or _unproved(asked, first):
+            names, why = refutable
+            bans[names] = why
+            search.without(*names)
+            continue
+        why = "" if gain.real else _why_in_doubt(search, found, decision, first)
+        if why:
             why += (
                 ", so a cause is named only if it surely reduces the held-out error: "
                 f"here by {gain.low:.1%} to {gain.high:.1%}"
             )
-            doubted = {one.cause.name: why for one in decision.named}
-            if not {*doubted} <= first:  # held-out voyages confirm no answer: all are listed
-                search.banned.difference_update(frozenset((name,)) for name in refuted)
-                doubted, refuted = refuted | doubted, {}
-            return *decide(search, refuted, doubted), None, refuted
-        if not worse and (pair := _unproved(asked, first)):
-            one, worth = pair
-            refuted[one.cause.name] = (
-                f"{TAKES_A_PLACE}, so this one is named only if it surely reduces the held-out "
-                f"error: here by {worth.low:.1%} to {worth.high:.1%}"
-            )
-            search.without(one.cause.name)
-            continue
-        if not worse:
-            order = sorted(asked, key=lambda pair: -pair[1].reduction)
-            ordered = replace(decision, named=tuple(one for one, _ in order))
-            return ordered, found, gain, refuted
-        one, worth = min(worse, key=lambda pair: pair[1].high)
-        if alike := _alike(one, decision.named):
-            search.without(one.cause.name, alike)
-            continue
-        refuted[one.cause.name] = (
-            f"held-out voyages refute it: with it the error is {-worth.high:.1%} to "
-            f"{-worth.low:.1%} greater"
-        )
-        search.without(one.cause.name)
+            doubted = dict.fromkeys(sorted(named), why)
+            if not named <= first:  # held-out voyages confirm no answer: all are listed
+                search.table.banned.difference_update(bans)
+                doubted, kept = refuted | doubted, {}
+            return *decide(search, kept, doubted), None, kept
+        order = sorted(asked, key=lambda pair: -pair[1].reduction)
+        ordered = replace(decision, named=tuple(one for one, _ in order))
+        return ordered, found, gain, kept

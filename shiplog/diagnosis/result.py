@@ -25,8 +25,7 @@ SIDE_THRUST = "side_thrust"
 class Named:
     """One cause of the verdict. `numbers` and `covariance` are of the change from nominal.
 
-    alike    labels of causes that these data cannot distinguish from it
-    beaten   label → log Bayes factor over that cause in its place, in nats
+    alike    labels of causes that may stand in its place: these data cannot tell
     freedom  degrees of it with which the covariance's size is known
     """
 
@@ -36,7 +35,6 @@ class Named:
     numbers: np.ndarray
     covariance: np.ndarray
     alike: tuple[str, ...] = ()
-    beaten: Mapping[str, float] = field(default_factory=dict)
     freedom: float = math.inf
 
     @property

@@ -4,7 +4,7 @@ Each set of causes is linearised again at its most probable numbers, and weighed
 remainder. One cause is then added to the best hypotheses or dropped from them, until no promising
 set is left. A remainder may explain a part of what a cause explains wholly. As long as a cause
 promises about as much as the best hypothesis has, it is therefore added to nothing as well. The
-order in which sets are weighed does not matter.
+order in which sets are weighed matters for those alone that are far behind.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from shiplog.diagnosis.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.weighing import SEARCH_NATS, weigh
+from shiplog.models.causes import Cause
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
 MOST_SETS = 16  # that are linearised; the others are far behind
@@ -37,20 +38,17 @@ class Search:
     table     the hypotheses weighed so far
     expected  label → expected log Bayes factor of that cause, by its size
     scanned   label → score of that cause by itself, scanned before any set is searched
-    banned    names of causes without which the search went on: sets, of which a hypothesis does not
-              hold all names
     likely    numbers of a set of causes that is likely from the start, by label
     """
 
     def __init__(
         self, trial: Trial, point: Point, placebo: Mapping[str, float],
-        banned: Sequence[str] = (), likely: Mapping[str, np.ndarray] | None = None,
+        likely: Mapping[str, np.ndarray] | None = None,
     ) -> None:  # fmt: skip
-        self.table = Hypotheses(trial, point, placebo, banned)
+        self.table = Hypotheses(trial, point, placebo)
         self.likely = dict(likely or {})
         self.expected: dict[str, ExpectedEvidence] = {}
         self.scanned: dict[str, float] = {}
-        self.banned: set[frozenset[str]] = set()
         self._most = MOST_SETS
         self._tried: set[tuple[str, ...]] = set()
         self._expanded: set[tuple[tuple[str, ...], str]] = set()
@@ -63,9 +61,10 @@ class Search:
             if self.likely:
                 self._weigh(tuple(sorted(self.likely)), self.likely, self.table.first)
         while len(self._tried) < self._most:
-            ranked = self.table.ranked(self.banned)
+            ranked = self.table.ranked()
             least = ranked[0].score - SEARCH_NATS
-            promising = max(self.scanned.values(), default=least) > least
+            allowed = (s for label, s in self.scanned.items() if not self._banned((label,)))
+            promising = max(allowed, default=least) > least
             near = [h for h in ranked if h.score > least or (promising and h is self.table.nothing)]
             fresh = [h for h in near if (h.causes, h.kind) not in self._expanded]
             if not fresh:
@@ -76,7 +75,7 @@ class Search:
     def without(self, *names: str) -> None:
         """Go on without a cause, or without these together, for as many sets again: those behind
         were hardly weighed."""
-        self.banned.add(frozenset(names))
+        self.table.banned.add(frozenset(names))
         self._most = len(self._tried) + MOST_SETS
         self._expanded.clear()
         self.run()
@@ -90,15 +89,18 @@ class Search:
             if len(labels) == 1 and (labels, NOMINAL) not in self.table.found
         }  # fmt: skip
 
+    def _banned(self, labels: Sequence[str]) -> bool:
+        return holds_one(self.table.banned, labels)
+
     def _weigh(self, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point) -> None:
         self._tried.add(labels)
-        weigh(self.table, labels, numbers, at, self.banned)
+        weigh(self.table, labels, numbers, at)
 
     def _expand(self, one: Hypothesis) -> None:
         """The sets with one cause more or less than a hypothesis has."""
         self._expanded.add((one.causes, one.kind))
         fit = self.table.fit(one)
-        best = self.table.ranked(self.banned)[0].score
+        best = self.table.ranked()[0].score
         for labels, numbers, predicted in self._additions(one, fit):
             first = not one.causes and one.score > best - SEARCH_NATS
             worth = first or predicted > best - SEARCH_NATS
@@ -106,7 +108,7 @@ class Search:
                 self._weigh(labels, numbers, fit.point)
         for label in one.causes if len(one.causes) > 1 else ():
             labels = tuple(n for n in one.causes if n != label)
-            if labels not in self._tried:
+            if labels not in self._tried and len(self._tried) < self._most:
                 self._weigh(labels, {n: one.found.numbers[n] for n in labels}, fit.point)
 
     def _additions(
@@ -118,8 +120,8 @@ class Search:
         table = self.table
         candidates = [
             c for c in table.catalogue
-            if c.label not in one.causes and not holds_one(self.banned, (*one.causes, c.label))
-            and all(c.compatible(label) for label in one.causes)
+            if c.label not in one.causes and not self._banned((*one.causes, c.label))
+            and all(_compatible(c, table.by[label]) for label in one.causes)
         ]  # fmt: skip
         _, found = evidence.scan(
             table.trial, fit.point, candidates, table.included(one.causes),
@@ -158,3 +160,8 @@ class Search:
         blind = [f"{name_of(n)} below {s:.0%}" for n, s in shares.items() if s > 1.0]
         if blind:
             log.info("not detectable at realistic size: %s", ", ".join(dict.fromkeys(blind)))
+
+
+def _compatible(one: Cause, other: Cause) -> bool:
+    """Whether both may be in one hypothesis: either may say that they may not."""
+    return one.compatible(other.label) and other.compatible(one.label)

@@ -49,8 +49,9 @@ def trial_of(
     model, start = model_of(run, every, setting)
     if nominal is None:
         inputs = None if run.judges_itself else run.base()[0]
+        there = {**run.extension_numbers(), **(numbers or {})}
         campaign = nominal_campaign.assumed(
-            model, setting, start, recorded, run.given, inputs, numbers
+            model, setting, start, recorded, run.given, inputs, there
         )
     else:
         # where the coefficients converge depends on the nominal voyages alone: it can be kept

@@ -3,8 +3,8 @@
 Of a given model no nominal campaign shows the discrepancy. It is learned from the voyages in
 question, where it absorbs the effects of causes. The causes that a first search names are therefore
 taken out, the discrepancy is learned again, and a second search decides. It starts from nothing and
-from these causes. One repetition is enough: a third search would start from numbers that differ
-from those of the first by what the discrepancy had absorbed of them.
+from these causes. What is then refuted stays out of the discrepancy: a third search would cost as
+much as the first two.
 """
 
 from __future__ import annotations

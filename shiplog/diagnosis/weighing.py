@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,13 +57,11 @@ class Change:
 
 
 def weigh(
-    table: Hypotheses, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point,
-    banned: Collection[frozenset[str]] = (),
-) -> None:  # fmt: skip
+    table: Hypotheses, labels: tuple[str, ...], numbers: Mapping[str, np.ndarray], at: Point
+) -> None:
     """Put the hypotheses of these causes into the table; none, where their fit diverges.
 
     numbers   of the causes, to start from; at: a point whose path is to start from
-    banned    sets of names: linearisations that hold all of one need not be kept
     """
     trial, included = table.trial, table.included(labels)
     point, near = at, None
@@ -92,7 +90,7 @@ def weigh(
     if plain.best.noise_factor > RAISED_FROM:
         _weigh_intermittent(table, labels)
     _weigh_families(table, labels, plain, rough)
-    table.forget(banned)
+    table.forget()
 
 
 def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:

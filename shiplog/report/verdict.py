@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from shiplog.channels import VELOCITY
 from shiplog.diagnosis import thresholds
+from shiplog.diagnosis.hypothesis import name_of
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.next_manoeuvre import Advice
 from shiplog.diagnosis.omitted_inputs import Dependence
@@ -89,18 +90,19 @@ DEPENDS = {
 
 def cause_json(named: Named, advice: Advice | None = None) -> dict:
     estimates = named.estimates
+    alike = list(dict.fromkeys(name_of(label) for label in named.alike))
     content = {
         "name": named.cause.name,
         "probability": min(max(named.probability, 0.0), 1.0),
         "parameters": {k: v.as_json() for k, v in estimates.items()} | _which(named),
         "sentence": named.cause.sentence(estimates),
         "equation": equation(named),
-        "indistinguishable_from": list(dict.fromkeys(n.split(":")[0] for n in named.alike)),
+        "indistinguishable_from": alike,
     }
     if math.isfinite(named.evidence):  # chosen on whole windows, it has none
         content["evidence_nats"] = named.evidence
-    tests = [named.cause.separated_by[n] for n in named.alike if n in named.cause.separated_by]
-    if named.alike:
+    tests = [named.cause.separated_by[n] for n in alike if n in named.cause.separated_by]
+    if alike:
         content["next_test"] = "; ".join(dict.fromkeys(tests)) or (
             advice.words if advice else "the same manoeuvres again, with turns both ways and stops"
         )

@@ -121,7 +121,7 @@ def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:
     if not one_of:
         return ""
     likely = {one["name"]: one["probability"] for one in ranking}
-    text = " or ".join(f"{_answer(name)} ({likely[name]:.0%})" for name in one_of)
+    text = " or ".join(f"{_answer(name)} ({likely.get(name, 0.0):.0%})" for name in one_of)
     return f"By the log Bayes factor, {text} acts as well: these data cannot tell which."
 
 

@@ -11,7 +11,6 @@ from straight import CAUSES, PROCESS_NOISE, SETTING
 from shiplog.diagnosis import (
     campaign_characteristics,
     campaign_parts,
-    campaign_prior,
     discrepancy,
     likelihood,
     nominal_campaign,
@@ -167,10 +166,12 @@ def test_degrees_of_freedom_are_those_of_voyages_and_parts_of_one_share_its_devi
 
 def test_characteristics_say_every_group_once(learned):
     found, made = learned
-    assert set(found.deviation) == {"hull", "rudder", "two", "drag", "motion", "controls", "wind"}
+    assert set(found.deviation) == {
+        "hull coefficients", "rudder coefficients", "two", "drag",
+        "motion discrepancy", "controls discrepancy", "wind discrepancy",
+    }  # fmt: skip
     assert set(found.size) == set(discrepancy.SEEN)
     assert all(0.0 < value < 1.0 for value in found.deviation.values())
-    assert found.share in campaign_prior.INFORMATION_SHARES
     # what a trial is given is by these names, column by column
     columns = made.reference.columns
     for label in ("two", "drag"):
@@ -306,3 +307,15 @@ def test_a_clock_that_two_channels_share_has_a_variance_of_its_own():
     assert {name: rows.tolist() for name, rows in found.items()} == {
         cause.label: [at] for at, cause in enumerate(shared)
     }
+
+
+def test_the_wind_of_the_ship_and_that_of_the_discrepancy_are_two_groups():
+    """Coefficients, numbers of a cause and weights of a family, whatever they are called."""
+    wind = SimpleNamespace(label="hull", count=1, nominal=True, varies=True)
+    model = SimpleNamespace(
+        base=SimpleNamespace(names=("wind.x0", "hull.x", "wind.y")), causes=(wind,)
+    )
+    columns = Columns(3, (wind,), np.ones(6))
+    family = SimpleNamespace(name="wind", columns=np.array([4, 5]))
+    found = groups_of(model, columns, SimpleNamespace(families=(family,)))
+    assert sorted(rows.tolist() for rows in found.values()) == [[0, 2], [1], [3], [4, 5]]

@@ -171,7 +171,10 @@ def test_of_two_that_can_hardly_be_told_only_both_are_refuted(trial, monkeypatch
     decision, found, _, refuted = judged(made, held)
     told = which == "two"  # it is not there
     assert [one.cause.label for one in decision.named] == (["load"] if told else ["drag"])
-    assert list(refuted) == (["drag"] if told else [])
+    assert list(refuted) == (["drag"] if told else ["load"])
+    if not told:
+        assert "together with another" in decision.rejected["load"]
+        assert "drag" not in decision.rejected
     assert all(set(h.causes) != {"drag", "load"} for h in found.hypotheses)
 
 
@@ -187,6 +190,46 @@ def test_one_of_two_alike_may_be_refuted_after_both(trial, monkeypatch):
     decision, _, _, refuted = judged(made, held)
     assert [one.cause.label for one in decision.named] == ["load"]
     assert list(refuted) == ["drag"]
+
+
+def test_after_two_are_refuted_together_a_remainder_is_no_surer_than_they(trial, monkeypatch):
+    by = {cause.name: cause for cause in weighed.search(trial, {}).table.catalogue}
+    monkeypatch.setattr(type(by["drag"]), "separated_by", {"load": "a test"}, raising=False)
+    made = weighed.search(
+        trial, {(("drag", "load"), NOMINAL): 0.97, ((), "time"): 0.02, (DRAG, NOMINAL): 1e-5}
+    )
+    held = HeldOut({("drag", "load"): BETTER}, {"drag": WORSE, "load": UNSURE})
+    decision, _, _, refuted = judged(made, held)
+    assert (decision.verdict, decision.named) == ("undecided", ())
+    assert set(refuted) == {"drag", "load"} == set(decision.either)
+    assert [decision.ranking[name] for name in ("drag", "load")] == [0.5, 0.5]
+
+
+@pytest.mark.parametrize("joint", [BETTER, UNSURE])
+def test_what_gains_nothing_in_a_refuted_place_takes_no_other_name_with_it(trial, joint):
+    """Drag was named from the start, and needs no gain that is sure; two, in the place of the load,
+    does."""
+    both, other = ("drag", "load"), ("drag", "two")
+    made = weighed.search(
+        trial, {(both, NOMINAL): 0.96, (other, NOMINAL): 0.039, (DRAG, NOMINAL): 1e-4}
+    )
+    held = HeldOut(
+        {both: BETTER, other: joint, DRAG: UNSURE}, {"drag": UNSURE, "load": WORSE, "two": UNSURE}
+    )
+    decision, _, _, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == ["drag"]
+    assert set(refuted) == {"load", "two"}
+
+
+def test_of_several_in_a_refuted_place_each_must_gain(trial):
+    pair = ("load", "two")
+    made = weighed.search(
+        trial, {(DRAG, NOMINAL): 0.96, (pair, NOMINAL): 0.039, (LOAD, NOMINAL): 1e-3}
+    )
+    held = HeldOut({DRAG: WORSE, pair: BETTER, LOAD: BETTER}, {"load": BETTER, "two": UNSURE})
+    decision, _, _, refuted = judged(made, held)
+    assert [one.cause.label for one in decision.named] == ["load"]
+    assert set(refuted) == {"drag", "two"}
 
 
 def test_what_was_named_together_with_a_refuted_name_need_not(trial):

@@ -54,16 +54,16 @@ def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
     return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
 
 
-def search_of(trial, point, placebo=None, banned=(), likely=None) -> Search:
-    made = Search(trial, point, placebo or {}, banned, likely)
+def search_of(trial, point, placebo=None, likely=None) -> Search:
+    made = Search(trial, point, placebo or {}, likely)
     made.table.intermittent = straight.no_hull
     made.table.nominal_side_force = None
     return made
 
 
-def searched(hidden, placebo=None, banned=(), likely=None, **setting) -> Search:
+def searched(hidden, placebo=None, likely=None, **setting) -> Search:
     trial, point = trial_with(hidden, **setting)
-    found = search_of(trial, point, placebo, banned, likely)
+    found = search_of(trial, point, placebo, likely)
     found.run()
     return found
 
@@ -205,10 +205,21 @@ def test_a_placebo_is_taken_off(one):
     assert "drag" not in {n for h in gone.table.ranked()[:1] for n in h.causes}
 
 
-def test_what_is_banned_is_not_in_any_hypothesis():
-    found = searched({"drag": [1.2]}, banned=("drag",))
-    assert not [labels for labels, _ in found.table.found if "drag" in labels]
-    assert "drag" not in found.table.priors.each
+def test_either_of_two_causes_may_exclude_the_other(monkeypatch):
+    """The load says that it is in no hypothesis with drag; drag says nothing of the load."""
+    (load,) = (cause for cause in CAUSES if cause.label == "load")
+    monkeypatch.setattr(type(load), "compatible", lambda self, label: label not in ("load", "drag"))
+    found = searched({"drag": [1.2], "load": [1.2]})
+    assert (("load",), NOMINAL) in found.table.found and (("drag",), NOMINAL) in found.table.found
+    assert not [labels for labels, _ in found.table.found if {"drag", "load"} <= set(labels)]
+
+
+def test_what_is_banned_together_stays_alone(monkeypatch):
+    found = search_of(*trial_with({"drag": [1.2], "load": [1.2]}))
+    found.table.banned.add(frozenset(("drag", "load")))
+    found.run()
+    assert not [labels for labels, _ in found.table.found if {"drag", "load"} <= set(labels)]
+    assert {("drag",), ("load",)} & {h.causes for h in found.table.ranked()[:4]}
 
 
 def test_what_a_model_has_already_stays_with_what_is_found():
@@ -336,7 +347,8 @@ def test_without_a_cause_the_search_goes_on_to_what_stood_behind_it(monkeypatch)
     weighed = {h.causes for h in found.table.ranked()}
     assert ("load",) not in weighed
     found.without("drag")
-    assert found.table.ranked(found.banned)[0].causes == ("load",)
+    assert found.table.ranked()[0].causes == ("load",)
+    assert found.table.best_of(NOMINAL).causes == ("load",)
     assert all("drag" not in h.causes for h in posteriors.posterior(found).hypotheses)
     assert set(found.scanned) == {c.label for c in CAUSES}
 

@@ -46,10 +46,28 @@ def test_none_is_none():
         ("x = 1\n", "defines no cause"),
         ("from shiplog.models.causes.environment import Current\n", "defines no cause"),
         (GOOD.replace('"tide_gate"', '"current"'), "'current' already"),
+        # of the catalogue's clocks each has this name, and a channel in its label
+        (GOOD.replace('"tide_gate"', '"clock_offset"'), "'clock_offset' already"),
+        (GOOD.replace('"tide_gate"', '"unknown"'), "'unknown' already"),
+        (
+            GOOD.replace('    name = "tide_gate"', '    depth: float\n    name = "tide_gate"'),
+            "depth",
+        ),
         (GOOD.replace('    kind = "environment"\n', ""), "Tide has no kind"),
         (GOOD.replace("    story =", "    tale ="), "Tide has no story"),
     ],
-    ids=("syntax", "import", "none", "imported", "taken", "kind", "story"),
+    ids=(
+        "syntax",
+        "import",
+        "none",
+        "imported",
+        "taken",
+        "clock",
+        "answer",
+        "field",
+        "kind",
+        "story",
+    ),
 )
 def test_a_file_that_cannot_be_taken_says_why(tmp_path, text, words):
     path = write(tmp_path, text)

@@ -11,20 +11,23 @@ from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.paths import check_causes
 
+ANSWERS = {"side_thrust", "none", "unknown", "undecided", "coverage", "external"}
+
 
 def load(paths: Sequence[Path]) -> tuple[Cause, ...]:
     """Every cause that the files define. Raises RunError for a file that cannot be run, holds
-    none, or takes a name of the catalogue."""
+    none, or takes a name of the catalogue or of another answer."""
     found: list[Cause] = []
     for path in paths:
         found += _of(Path(path))
-    taken = {cause.label for cause in CATALOGUE}
+    taken = {cause.name for cause in CATALOGUE} | ANSWERS
     for cause in found:
-        if cause.label in taken:
+        if cause.name in taken:
             raise RunError(
-                f"There is a cause {cause.label!r} already.", hint="give yours another `name`."
+                f"There is a cause or an answer {cause.name!r} already.",
+                hint="give yours another `name`.",
             )
-        taken.add(cause.label)
+        taken.add(cause.name)
     return tuple(found)
 
 
@@ -56,7 +59,13 @@ def _of(path: Path) -> list[Cause]:
                 hint="a cause has name, kind, story, equation, parameters and one hook.",
             )
         kind.user = True
-        causes.append(kind())
+        try:
+            causes.append(kind())
+        except Exception as error:  # a field without a default, say
+            raise RunError(
+                f"{path}: {kind.__name__}() cannot be made: {type(error).__name__}: {error}.",
+                hint="a cause is made without arguments: give each field a default.",
+            ) from error
     if not causes:
         raise RunError(
             f"{path} defines no cause.",
