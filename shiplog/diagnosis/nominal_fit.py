@@ -72,7 +72,7 @@ def converged(
         if ended:
             break
         there = campaign.at(campaign.after(here, damping), here)
-        if there is None or there.solution.value < here.solution.value - LOST_NATS:
+        if there is None or here.better(there, LOST_NATS):
             if halvings == MOST_HALVINGS:
                 break
             halvings, damping = halvings + 1, 0.5 * damping
@@ -80,7 +80,7 @@ def converged(
         ended = there.converged
         damping = damping if halvings else min(2.0 * damping, 1.0)
         here, halvings = there, 0
-        if here.solution.value > best.solution.value:
+        if here.better(best):
             best = here
     return (here if ended else best).at_rest()
 
@@ -101,6 +101,14 @@ class _Iterate:
     def far(self) -> float:
         """Plausible spreads that a coefficient is still to move, at most."""
         return float(np.abs(self.solution.found[: len(self.theta)]).max(initial=0.0))
+
+    def better(self, other: _Iterate, nats: float = 0.0) -> bool:
+        """Whether its model diverges on fewer segments; on as many, whether the campaign is more
+        probable, by more than these nats: what a model diverges on is not in its density."""
+        lost, lost_there = (int(of.joint.linear.lost.sum()) for of in (self, other))
+        if lost != lost_there:
+            return lost < lost_there
+        return self.solution.value > other.solution.value + nats
 
     @property
     def converged(self) -> bool:

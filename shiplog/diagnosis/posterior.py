@@ -23,6 +23,7 @@ from shiplog.models.causes.base import deviations
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
+SPREADS = 2.0  # standard deviations of a campaign's process noise that an ordinary day may be off
 DRAWS = 400  # of a cause's numbers; a probability of 0.9 is then known to 0.015
 
 
@@ -173,15 +174,15 @@ def _deviations(covariance: np.ndarray) -> np.ndarray:
 def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
     """Its kind of remainder; process noise as on an ordinary day is nominal. So is a force at one
     place that varies as noise does and is no larger: gusts act at one place, and increase with the
-    wind."""
-    ordinary = False
-    if one.kind == RAISED:
-        ordinary = one.noise_factor < thresholds.ORDINARY_NOISE
-    elif one.kind == INTERMITTENT and not device(one):
-        acceleration = table.trial.reference.process_noise.acceleration
-        raised = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
-        ordinary = raised < thresholds.ORDINARY_NOISE
-    return NOMINAL if ordinary else one.kind
+    wind. Noise that no ordinary day has is raised, under whatever prior it was weighed."""
+    if one.kind not in (NOMINAL, RAISED, INTERMITTENT) or device(one):
+        return one.kind
+    acceleration = table.trial.reference.process_noise.acceleration
+    factor = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
+    ordinary = math.exp(SPREADS * table.trial.nominal_spread)
+    if factor < max(thresholds.ORDINARY_NOISE, ordinary):
+        return NOMINAL
+    return RAISED if one.kind == NOMINAL else one.kind
 
 
 def device(one: Hypothesis) -> float:

@@ -1,6 +1,7 @@
 """The fit of a nominal campaign: bounds that it keeps, and moves that it takes back."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -111,3 +112,20 @@ def test_without_rounds_the_coefficients_stay(monkeypatch):
     found, asked = fitted(monkeypatch, start, rounds=0)
     assert found.theta.tolist() == [BEGIN, 0.0]
     assert len(asked) == 1
+
+
+@pytest.mark.parametrize(
+    ("lost", "value", "better"),
+    [((1, 5), (-900.0, 0.0), True), ((5, 1), (0.0, -900.0), False),
+     ((2, 2), (1.0, 0.0), True), ((2, 2), (0.0, 1.0), False)],
+)  # fmt: skip
+def test_what_diverges_on_fewer_segments_is_better_whatever_the_others_say(lost, value, better):
+    """Segments on which it diverges are not in the density."""
+    one, other = (
+        SimpleNamespace(
+            joint=SimpleNamespace(linear=SimpleNamespace(lost=np.arange(9) < count)),
+            solution=SimpleNamespace(value=nats),
+        )
+        for count, nats in zip(lost, value, strict=True)
+    )
+    assert nominal_fit._Iterate.better(one, other) is better

@@ -1,5 +1,7 @@
 """Sums of probabilities over hypotheses that are made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import weighed
@@ -188,3 +190,18 @@ def test_a_causes_label_begins_with_its_name():
         for cause in causes.CATALOGUE:
             for one in cause.each(of):
                 assert name_of(one.label) == one.name == cause.name
+
+
+@pytest.mark.parametrize(
+    ("noise", "spread", "kind"),
+    [(1.4, 0.1, NOMINAL), (1.6, 0.1, RAISED), (3.0, 0.6, NOMINAL), (3.5, 0.6, RAISED)],
+)
+def test_noise_that_no_ordinary_day_has_is_raised_under_whatever_prior(trial, noise, spread, kind):
+    """A half more, or two standard deviations from voyage to voyage: e^1.2 is 3.3."""
+    campaign = replace(trial.campaign, noise=spread)
+    made = weighed.search(replace(trial, campaign=campaign), {(DRAG, NOMINAL): 1.0})
+    one = made.table.found[DRAG, NOMINAL]
+    made.table.found[DRAG, NOMINAL] = replace(one, found=replace(one.found, noise_factor=noise))
+    assert posterior(made).kinds[kind] == pytest.approx(1.0)
+    made = weighed.search(replace(trial, campaign=campaign), {(DRAG, RAISED): 1.0}, raised=noise)
+    assert posterior(made).kinds[kind] == pytest.approx(1.0)

@@ -50,8 +50,8 @@ def test_none_is_none():
         (GOOD.replace('"tide_gate"', '"clock_offset"'), "'clock_offset' already"),
         (GOOD.replace('"tide_gate"', '"unknown"'), "'unknown' already"),
         (
-            GOOD.replace('    name = "tide_gate"', '    depth: float\n    name = "tide_gate"'),
-            "depth",
+            GOOD.replace("    def force", "    def __init__(self, d): ...\n\n    def force"),
+            "argument",
         ),
         (GOOD.replace('    kind = "environment"\n', ""), "Tide has no kind"),
         (GOOD.replace("    story =", "    tale ="), "Tide has no story"),
