@@ -72,13 +72,6 @@ class Stretch:
             "does that."
         )
 
-    def as_json(self) -> dict:
-        """One of the contract's `intervals`."""
-        return {
-            "voyage": self.voyage, "start_s": self.start_s, "end_s": self.end_s,
-            "kind": "external", "sentence": self.sentence,
-        }  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Balance:

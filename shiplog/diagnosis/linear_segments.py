@@ -49,16 +49,6 @@ class Linear:
         if len(self.lost) != len(self.cut):
             object.__setattr__(self, "lost", np.zeros(len(self.cut), dtype=bool))
 
-    @property
-    def sentence(self) -> str:
-        """How many segments were left out; empty where none was."""
-        if not self.lost.any():
-            return ""
-        return (
-            f"{int(self.lost.sum())} of {len(self.lost)} segments were left out: "
-            "the model diverges there."
-        )
-
     def pick(self, keep: np.ndarray) -> Linear:
         """Some of the segments."""
         path = Path(self.path.start[keep], self.path.acceleration[keep])

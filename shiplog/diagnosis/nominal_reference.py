@@ -46,7 +46,6 @@ class Reference:
                  model was trained on the very data that are diagnosed
     freedom      degrees of freedom with which κ is known; intervals are wider with fewer
     adapts       whether the model has absorbed causes there, and is fitted again with them
-    learned      whether it stands for such a network, of whose training no voyage was held out
     misfit       the error of its MMG as a function of the network's inputs
     counts       share of itself that a trial counts, as its voyages have errors of their own
     expected     [W] weights of the discrepancy that a path follows; none where None
@@ -66,7 +65,6 @@ class Reference:
     modes: Modes | None
     freedom: float
     adapts: bool = False
-    learned: bool = False
     misfit: Misfit | None = None
     counts: float = 1.0
     expected: np.ndarray | None = None
@@ -209,7 +207,7 @@ def assume(
     information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD_INFORMATION
     return replace(
         whole, information=information, pull=whole.anchor, nominal=None, modes=None,
-        adapts=not given, learned=inputs is not None,
+        adapts=not given,
         counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if inputs is not None else 1.0,
     )  # fmt: skip
 

@@ -36,13 +36,11 @@ class Dependence:
     """How far one omitted input predicts the residual acceleration.
 
     r2      share of the variance of each channel, on voyages left out; below 0: worse than none
-    chance  the largest share when the variable is shifted in time against all else
     folds   what was left out in turn: "voyages", "groups of voyages" or "halves" of the only one
     """
 
     variable: str  # a family of the contract: heading, position, time or controls
     r2: tuple[float, float, float]  # surge, sway, yaw_rate
-    chance: tuple[float, float, float]
     acts_on: tuple[str, ...]
     folds: str
 
@@ -113,7 +111,7 @@ def table(
         acts_on = tuple(
             c for c, a, b in zip(CHANNELS, r2, np.maximum(limit, LEAST_R2), strict=True) if a > b
         )
-        found.append(Dependence(variable, _three(r2), _three(null.max(0)), acts_on, folds))
+        found.append(Dependence(variable, _three(r2), acts_on, folds))
     return tuple(found)
 
 

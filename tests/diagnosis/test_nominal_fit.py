@@ -101,6 +101,9 @@ def test_a_coefficient_at_its_bound_does_not_move_the_others(monkeypatch):
     start = Start(np.array([BEGIN, 0.0]), np.array([20.0, 2.0]), low, np.full(2, 99.0))
     found, asked = fitted(monkeypatch, start, shape=lambda x: x, slope=lambda x: 1.0)
     assert found.theta[0] == pytest.approx(1.0, abs=1e-3)
+    # where the free fit has it as well, but for the noise of 24 segments
+    free, _ = fitted(monkeypatch, replace(start, low=np.full(2, -99.0)), lambda x: x, lambda x: 1.0)
+    assert found.theta[1] == pytest.approx(free.theta[1], abs=0.1)
     assert (asked[:, 0] >= 1.0).all()
     assert len(asked) <= 4
 

@@ -47,7 +47,6 @@ class _Factor(Cause):
 
     scaled: ClassVar[tuple[str, ...]]
     kind = "ship"
-    parameters = (Parameter("factor", "1", 0.4, 0.04, low=-1.0),)
 
     @property
     def absorbed(self) -> bool:
@@ -352,7 +351,7 @@ class RudderLag(_OnRudders):
 def _lagged(record: Record, values: np.ndarray, time: float) -> np.ndarray:
     """First-order lag of values [n, k] that go straight from row to row, exactly.
 
-    A negative time is the first-order lead, which a derivative about zero needs.
+    A negative time is the first-order lead, its inverse.
     """
     rate = np.gradient(values, record.step, axis=0)
     starts = record.starts
