@@ -23,6 +23,7 @@ from shiplog.voyages import timescale
 from shiplog.voyages.recording import Record
 
 RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
+FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
 OPEN = ("unknown", "undecided")  # what may be such an error
@@ -204,7 +205,10 @@ def _made(run: Run, before_effect: bool) -> str:
 
 def enough(recorded: Record) -> bool:
     """Whether the record is long enough for a verdict."""
-    return recorded.seconds >= thresholds.LEAST_RECORD_S and len(segments.begins(recorded)) >= 4
+    return (
+        recorded.seconds >= thresholds.LEAST_RECORD_S
+        and len(segments.begins(recorded)) >= FEWEST_SEGMENTS
+    )
 
 
 def runs_away(run: Run, before_effect: bool) -> Verdict:
@@ -218,11 +222,12 @@ def runs_away(run: Run, before_effect: bool) -> Verdict:
 
 
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
-    least = thresholds.LEAST_RECORD_S
-    short = max(least - recorded.seconds, recorded.timescale.seconds * 4 - recorded.seconds, 0.0)
+    least, segment = thresholds.LEAST_RECORD_S, recorded.timescale.seconds
+    lacking = FEWEST_SEGMENTS - len(segments.begins(recorded))
+    short = max(least - recorded.seconds, lacking * segment)
     sentence = (
         f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {least:.0f} s are "
-        f"needed in unbroken stretches of {recorded.timescale.seconds:.0f} s. "
+        f"needed in unbroken stretches of {segment:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
-from shiplog.report.verdict import HOPELESS, Verdict
+from shiplog.report.verdict import HOPELESS, WHICH, Verdict
 from shiplog.report.verdict_sentence import less
 
 
@@ -82,7 +82,8 @@ def _limits(verdict: Verdict) -> list[str]:
         numbers = ", ".join(
             f"{k.replace('_', ' ')} {_change(**v)}" for k, v in one["parameters"].items()
         )
-        label = f"{one['name']} ({one['channel']})" if "channel" in one else one["name"]
+        which = next((one[key] for key in WHICH if key in one), "")
+        label = f"{one['name']} ({which})" if which else one["name"]
         share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
         lines.append(f"| {label} | {numbers} | {share} |")
     return [*lines, ""]

@@ -164,7 +164,7 @@ def trace_json(named: Named) -> dict:
     """A cause that is present, but too small to matter."""
     return {
         "name": named.cause.name,
-        "parameters": {k: v.as_json() for k, v in named.estimates.items()},
+        "parameters": {k: v.as_json() for k, v in named.estimates.items()} | _which(named),
         "sentence": f"Present, but below practical size: {named.cause.sentence(named.estimates)}",
     }
 

@@ -1,0 +1,32 @@
+"""What a verdict says of too little data, and of causes of one unit or channel."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shiplog.report import answer, page
+
+
+@pytest.mark.parametrize(
+    ("seconds", "unbroken", "more"), [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140)]
+)
+def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken, more):
+    """240 s in all, and four segments of 30 s each: pieces of 25 s hold none, however many."""
+    monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(unbroken, dtype=int))
+    record = SimpleNamespace(seconds=seconds, timescale=SimpleNamespace(seconds=30.0))
+    found = answer.too_little(SimpleNamespace(name="run"), record, True)
+    assert not answer.enough(record)
+    assert f"Log at least {more} s more" in found.sentence
+
+
+def test_each_unit_and_channel_has_a_row_of_its_own():
+    limits = [
+        {"name": "thrust_loss", "actuator": "port", "share": 0.5, "parameters": {}},
+        {"name": "clock_offset", "channel": "wind", "share": 0.5, "parameters": {}},
+        {"name": "fouling", "share": 0.5, "parameters": {}},
+    ]
+    rows = page._limits(SimpleNamespace(limits=limits))
+    assert [row.split("|")[1].strip() for row in rows[6:9]] == [
+        "thrust_loss (port)", "clock_offset (wind)", "fouling",
+    ]  # fmt: skip
