@@ -107,18 +107,20 @@ def strays(time: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def ordered(time: np.ndarray, value: np.ndarray, tolerance_s: float | None) -> Samples:
-    """Sort by measurement time, drop repeated stamps (the first stays), set blank ones aside.
+    """Sort by measurement time, set blank rows aside, drop repeated stamps (the first stays). A
+    stamp is blank where each of its rows is: one may hold what another instrument measured.
 
     time [n] ns, value [n, k]; the tolerance is one and a half median periods unless given, and
     only a given one is kept to the letter.
     """
     order = np.argsort(time, kind="stable")
     time, value = time[order], value[order]
+    finite = np.isfinite(value).all(axis=1)
+    unmeasured, time, value = time[~finite], time[finite], value[finite]
     first = np.ones(len(time), bool)
     first[1:] = np.diff(time) > 0
     time, value = time[first], value[first]
-    finite = np.isfinite(value).all(axis=1)
-    blank, time, value = time[~finite], time[finite], value[finite]
+    blank = np.setdiff1d(unmeasured, time)
     period = float(np.median(np.diff(time))) * 1e-9 if len(time) > 1 else 1.0 / RATE_HZ
     tolerance = tolerance_s or max(1.5 * period, LEAST_TOLERANCE_S)
     none = np.zeros(len(time), bool)

@@ -283,3 +283,20 @@ def test_long_work_speaks_and_short_work_does_not(caplog):
         pass
     assert len(caplog.records) == spoken
     assert heartbeat.EVERY_S <= 2.0
+
+
+@pytest.mark.parametrize("stamp", ["2016-12-31T23:59:60Z", "2024-02-30 00:00:00"])
+def test_a_receive_stamp_that_is_no_time_costs_no_log(tmp_path, stamp):
+    """A leap second, or a damaged digit: the line takes the time of those around it."""
+    lines = [f"2024-02-28T10:00:0{k}Z $HEHDT,{k}.0,T" for k in range(5)]
+    lines.insert(2, f"{stamp} $HEHDT,9.0,T")
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    (series,), damaged = read_nmea(tmp_path / "a.nmea")
+    assert damaged == 0
+    assert (series.topic, series.time[0] // 10**9) == ("/gyro", 1_709_114_400)
+    assert len(series.time) >= 5 and np.diff(series.time).max() <= 10**9
+
+
+def test_a_date_that_was_not_written_is_no_date():
+    found = clock.dates(pl.Series([240124.0, None, float("nan")]))
+    assert found.null_count() == 2 and found[0] == 1_706_054_400_000_000_000

@@ -61,3 +61,14 @@ def test_order_of_arrival_does_not_matter_and_a_repeated_stamp_keeps_the_first()
     assert ordered.time.tolist() == [0, S // 10, S // 5]
     assert ordered.value[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert ordered.tolerance_s == pytest.approx(0.15)
+
+
+def test_of_two_rows_of_one_time_what_one_of_them_measured_counts():
+    """A table with a row for each instrument: the other's row is blank, and often the first."""
+    time = np.repeat(np.arange(0.0, 1.0, 0.1), 2)
+    value = np.where(np.arange(20) % 2, np.arange(20) // 2, np.nan)
+    found = samples(time, value)
+    assert found.value[:, 0].tolist() == list(range(10))
+    assert not len(found.blank)
+    found = samples([0.0, 0.1, 0.1, 0.2], [0.0, np.nan, np.nan, 2.0])
+    assert found.blank.tolist() == [S // 10]

@@ -58,7 +58,7 @@ def dates(values: pl.Series, form: str | None = None) -> pl.Series:
     if values.dtype == pl.Date or isinstance(values.dtype, pl.Datetime):
         return values.cast(pl.Date).cast(pl.Datetime("ns")).to_physical()
     if values.dtype.is_numeric():
-        values = values.cast(pl.Int64).cast(pl.String).str.zfill(6)
+        values = values.fill_nan(None).cast(pl.Int64, strict=False).cast(pl.String).str.zfill(6)
     return _best(values, (form,) if form else (*DATE_FORMATS, *SLASHED), pl.Date)
 
 

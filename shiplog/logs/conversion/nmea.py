@@ -161,10 +161,14 @@ class _Reader:
         return day + (of_day < before - DAY_NS // 2) - (of_day > before + DAY_NS // 2)
 
     def _stamp(self, around: str) -> int | None:
-        """The receive stamp [ns] in the text around the sentence; None without one."""
+        """The receive stamp [ns] in the text around the sentence; None without one, or where it is
+        no time: a leap second, or a damaged digit."""
         if iso := ISO.search(around):
             zone = (iso[4] or "Z").replace("Z", "+00:00")
-            whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
+            try:
+                whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
+            except ValueError:
+                return None
             return int(whole.timestamp()) * SECOND_NS + _fraction(iso[3])
         if number := NUMBER.search(around):
             for _, per in UNIX:
