@@ -6,6 +6,7 @@ contract's words. `profile_file` reads one.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -297,6 +298,16 @@ class Site(Section):
         default=None, description="[latitude, longitude] of x0 = y0 = 0, deg; the first fix where "
         "left out"
     )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _walls(self) -> Site:
+        """A wall has a direction between any two of its points."""
+        for number, line in enumerate(self.banks, 1):
+            if len(line) < 2 or any(a == b for a, b in pairwise(line)):
+                raise ValueError(
+                    f"bank {number} needs two points at least, and none twice in a row"
+                )
+        return self
 
 
 class Column(Section):

@@ -191,3 +191,10 @@ def test_a_folder_of_its_name_hides_no_shipped_profile(tmp_path, monkeypatch):
     assert profile_file.load("kvlcc2").source == "kvlcc2"
     with pytest.raises(ProfileError, match="mine is a folder"):
         profile_file.load("mine")
+
+
+@pytest.mark.parametrize("bank", ["[[0.0, 0.0]]", "[[0.0, 0.0], [0.0, 0.0], [50.0, 0.0]]"])
+def test_a_bank_has_a_direction_between_its_points(bank):
+    """Between two that coincide every simulation would have no number."""
+    with pytest.raises(ProfileError, match="bank 1 needs two points"):
+        sailing.profile(sailing.PROFILE + f"\n[site]\nbanks = [{bank}]\n")

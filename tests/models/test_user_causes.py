@@ -48,6 +48,7 @@ def test_none_is_none():
         (GOOD.replace('"tide_gate"', '"current"'), "'current' already"),
         # of the catalogue's clocks each has this name, and a channel in its label
         (GOOD.replace('"tide_gate"', '"clock_offset"'), "'clock_offset' already"),
+        (GOOD.replace("X = {north", "X = {u} {north"), "equation"),
         (GOOD.replace('"tide_gate"', '"unknown"'), "'unknown' already"),
         (
             GOOD.replace("    def force", "    def __init__(self, d): ...\n\n    def force"),
@@ -63,6 +64,7 @@ def test_none_is_none():
         "imported",
         "taken",
         "clock",
+        "braces",
         "answer",
         "field",
         "kind",

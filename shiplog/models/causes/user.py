@@ -7,6 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.paths import check_causes
@@ -60,12 +62,22 @@ def _of(path: Path) -> list[Cause]:
             )
         kind.user = True
         try:
-            causes.append(kind())
+            made = kind()
         except Exception as error:  # a field without a default, say
             raise RunError(
                 f"{path}: {kind.__name__}() cannot be made: {type(error).__name__}: {error}.",
                 hint="a cause is made without arguments: give each field a default.",
             ) from error
+        shown = dict.fromkeys((*(p.name for p in made.parameters),
+                               *made.displayed(np.zeros(made.count))), 0.0)  # fmt: skip
+        try:
+            made.equation.format(**shown)
+        except (LookupError, ValueError) as error:
+            raise RunError(
+                f"{path}: the equation of {kind.__name__} cannot be written: {made.equation!r}.",
+                hint=f"only parameters stand in braces: {', '.join(shown)}; others are {{{{}}}}.",
+            ) from error
+        causes.append(made)
     if not causes:
         raise RunError(
             f"{path} defines no cause.",
