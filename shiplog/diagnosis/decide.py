@@ -26,8 +26,8 @@ from shiplog.diagnosis.result import (
 from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
-# A cause that is at most 100 times less probable than the named one may stand in its place.
-INSTEAD_NATS = 2.0 * math.log(10.0)
+# A cause that is at most 100 times less probable than a named one may stand in its place.
+INSTEAD_NATS = -2.0 * math.log(1.0 - thresholds.STATED)
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
 
@@ -36,8 +36,11 @@ def decide(
     refuted: Mapping[str, str] | None = None,
     doubted: Mapping[str, str] | None = None,
 ) -> tuple[Decision, Posterior]:
-    """The verdict, and without any name if the names are in doubt; name → reason, also of those
-    that held-out data refute, whose hypotheses are banned."""
+    """The verdict of the hypotheses that are not banned.
+
+    refuted   name → why held-out voyages refute it; its hypotheses are banned already
+    doubted   name → why it is not named, whatever its probability; with any, nothing is named
+    """
     refuted, table = dict(refuted or {}), search.table
     found = posteriors.posterior(search)
     names = () if doubted else found.stated

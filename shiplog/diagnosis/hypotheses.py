@@ -24,7 +24,8 @@ class Hypotheses:
 
     first      the trial linearised with the model as it stands
     placebo    label or remainder → its log Bayes factor on nominal voyages, in nats
-    catalogue  causes that a hypothesis may contain in addition to those of the model; `by` label
+    catalogue  causes that a hypothesis may contain in addition to those of the model
+    by         label → cause of the catalogue
     found      causes and kind of remainder → hypothesis
     alone      label → log Bayes factor of that cause by itself, over no cause
     banned     sets of names: a hypothesis that holds all names of one does not count any more
@@ -60,7 +61,7 @@ class Hypotheses:
     def ranked(self, without: str = "") -> list[Hypothesis]:
         """Best first, of those that are not banned; without those that contain a cause of this
         name."""
-        banned = {*self.banned, frozenset((without,))}
+        banned = self.banned | ({frozenset((without,))} if without else set())
         kept = (h for h in self.found.values() if not holds_one(banned, h.causes))
         return sorted(kept, key=lambda h: -h.score)
 

@@ -20,7 +20,7 @@ from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 # How the pattern of a force is read. Its strongest is a quantile, since a single knot may be off.
 STRONGEST = 0.95
-ON, BETWEEN = 0.5, 0.2  # shares of the strongest, above which it is on, or between on and off
+ON, OFF = 0.5, 0.2  # shares of the strongest, above which it is on, and below which it is off
 KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no pattern
 COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
@@ -107,7 +107,7 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
     if strongest < KNOWN * float(np.median(deviation)):
         return 0.0
     on = size > ON * strongest
-    between = (size > BETWEEN * strongest) & ~on
+    between = (size > OFF * strongest) & ~on
     share = between.sum() / on.sum()
     if on.mean() > COMES_AND_GOES:
         return 0.0

@@ -23,7 +23,6 @@ from shiplog.models.causes.base import deviations
 
 STOCHASTIC = "stochastic"  # the contract's word for raised process noise
 FAMILY = {RAISED: STOCHASTIC}
-SPREADS = 2.0  # standard deviations of a campaign's process noise that an ordinary day may be off
 DRAWS = 400  # of a cause's numbers; a probability of 0.9 is then known to 0.015
 
 
@@ -179,7 +178,7 @@ def practical_kind(table: Hypotheses, one: Hypothesis) -> str:
         return one.kind
     acceleration = table.trial.reference.process_noise.acceleration
     factor = one.remainder.factor_with_force(one.found.noise_factor, acceleration)
-    ordinary = math.exp(SPREADS * table.trial.nominal_spread)
+    ordinary = math.exp(thresholds.ORDINARY_SPREADS * table.trial.nominal_spread)
     if factor < max(thresholds.ORDINARY_NOISE, ordinary):
         return NOMINAL
     return RAISED if one.kind == NOMINAL else one.kind

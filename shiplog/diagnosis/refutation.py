@@ -3,16 +3,16 @@
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it. Its gain is that over the other
-names. If one of them is a cause from which it can hardly be told, either may do the work of both:
+names. If one of them is an alias in the catalogue (`separated_by`), either may do the work of both:
 only the two together are refuted.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
-are then named only if the whole interval of what all of them gain is a gain. A remainder so slight
-that it can be an error of the causes' own equations puts none in doubt.
+are then named only if the interval of their joint gain lies above zero. A remainder so slight that
+it can be an error of the causes' own equations puts none in doubt.
 
-Nor is a log Bayes factor a proof of causes that take the place of a more probable one, which is
-refuted. What all causes gain has to be sure, too; and of several causes the own gain of each that
-takes a place, whatever the others gain.
+Nor is a log Bayes factor a proof of causes that take the place of a refuted one, which was more
+probable. Their joint gain has to be sure, too. Next to other named causes, so has the own gain of
+each of them.
 """
 
 from __future__ import annotations
@@ -77,11 +77,14 @@ def _refuted(asked: Sequence[tuple[Named, Gain]]) -> tuple[frozenset[str], str] 
         return None
     one, worth = min(worse, key=lambda pair: pair[1].high)
     loss = f"the error is {-worth.high:.1%} to {-worth.low:.1%} greater"
+    name = one.cause.name
     for other in (n.cause for n, _ in asked if n.cause.name != one.cause.name):
-        if other.name in one.cause.separated_by or one.cause.name in other.separated_by:
-            both = frozenset((one.cause.name, other.name))
-            return both, f"held-out voyages refute it together with another: with both {loss}"
-    return frozenset((one.cause.name,)), f"held-out voyages refute it: with it {loss}"
+        if other.name in one.cause.separated_by or name in other.separated_by:
+            return frozenset((name, other.name)), (
+                "held-out voyages refute it together with another: "
+                f"with both {name} and {other.name} {loss}"
+            )
+    return frozenset((name,)), f"held-out voyages refute it: with it {loss}"
 
 
 def _unproved(

@@ -1,6 +1,6 @@
 """The thresholds between verdicts: name, unit, reason. Settings of one method are in its module.
 
-Ten decide between hypotheses. The others say when there is nothing to decide on, and what is
+Eleven decide between hypotheses. The others say when there is nothing to decide on, and what is
 listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
 factor.
 """
@@ -46,6 +46,11 @@ BASELINE = 0.5
 # than that of the nominal voyages is no fault of the model. A force at one place that varies as
 # noise does counts as such.
 ORDINARY_NOISE = 1.5
+
+# Standard deviations of a campaign's process noise from voyage to voyage. Where voyages differ by
+# more than ORDINARY_NOISE, noise that is raised by less than this is an ordinary day's, too: 95 %
+# of nominal voyages are nearer.
+ORDINARY_SPREADS = 2.0
 
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
 # time that it is on. A force that merely varies is between as long as above; where a force is less

@@ -157,7 +157,7 @@ def test_next_to_other_names_it_must_prove_itself_by_its_own_gain(trial, own, na
 
 
 @pytest.mark.parametrize(("which", "alike"), [("drag", "load"), ("load", "drag"), ("two", "drag")])
-def test_of_two_that_can_hardly_be_told_only_both_are_refuted(trial, monkeypatch, which, alike):
+def test_of_two_aliases_only_both_together_are_refuted(trial, monkeypatch, which, alike):
     """Drag and load together are surely worse than the load alone, which says nothing of drag alone
     where one can do the other's work. The relation holds whichever of them states it."""
     by = {cause.name: cause for cause in weighed.search(trial, {}).table.catalogue}

@@ -139,7 +139,8 @@ def test_two_rudders_have_two_offsets_and_one_has_one():
 
 
 def test_parts_may_differ_in_the_clock_that_position_and_velocity_share():
-    """It has no nominal value beside theirs. A rudder's delay, an alias of one lag, has neither."""
+    """It has no nominal value beside theirs. A rudder's delay, an alias of its lag alone, does not
+    vary, either."""
     by = {cause.label: cause for cause in CATALOGUE}
     clocks = [by[f"clock_offset:{channel}"] for channel in ("position", "velocity", "gnss")]
     assert [(clock.nominal, clock.varies) for clock in clocks] == [(True, True)] * 2 + [

@@ -13,6 +13,7 @@ from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.paths import check_causes
 
+# What a verdict or its ranking may say beside the names of the catalogue.
 ANSWERS = {"side_thrust", "none", "unknown", "undecided", "coverage", "external"}
 
 
@@ -61,26 +62,32 @@ def _of(path: Path) -> list[Cause]:
                 hint="a cause has name, kind, story, equation, parameters and one hook.",
             )
         kind.user = True
-        try:
-            made = kind()
-        except Exception as error:  # a field without a default, say
-            raise RunError(
-                f"{path}: {kind.__name__}() cannot be made: {type(error).__name__}: {error}.",
-                hint="a cause is made without arguments: give each field a default.",
-            ) from error
-        shown = dict.fromkeys((*(p.name for p in made.parameters),
-                               *made.displayed(np.zeros(made.count))), 0.0)  # fmt: skip
-        try:
-            made.equation.format(**shown)
-        except (LookupError, ValueError) as error:
-            raise RunError(
-                f"{path}: the equation of {kind.__name__} cannot be written: {made.equation!r}.",
-                hint=f"only parameters stand in braces: {', '.join(shown)}; others are {{{{}}}}.",
-            ) from error
-        causes.append(made)
+        causes.append(_made(path, kind))
     if not causes:
         raise RunError(
             f"{path} defines no cause.",
             hint="derive a class from shiplog.models.causes.Cause in it, with a name and one hook.",
         )
     return causes
+
+
+def _made(path: Path, kind: type[Cause]) -> Cause:
+    """Its cause, whose equation can be written with its parameters. Raises RunError."""
+    try:
+        made = kind()
+        shown = dict.fromkeys(p.name for p in made.parameters) | made.displayed(
+            np.zeros(made.count)
+        )
+    except Exception as error:  # a field without a default, say
+        raise RunError(
+            f"{path}: {kind.__name__}() cannot be made: {type(error).__name__}: {error}.",
+            hint="a cause is made without arguments: give each field a default.",
+        ) from error
+    try:
+        made.equation.format(**dict.fromkeys(shown, 0.0))
+    except (LookupError, ValueError) as error:
+        raise RunError(
+            f"{path}: the equation of {kind.__name__} cannot be written: {made.equation!r}.",
+            hint=f"only parameters stand in braces: {', '.join(shown)}; others are {{{{}}}}.",
+        ) from error
+    return made
