@@ -85,7 +85,7 @@ def _panel(left: float, title: str, found: Sequence[Bin]) -> list[str]:
         f'<rect x="{x(0)}" y="{y(1)}" width="{SIDE}" height="{SIDE}" fill="none" stroke="#444"/>',
         line((0, 0), (1, 1), 'stroke="#999" stroke-dasharray="4 3"'),
         text((x(0.5), above), f"{title}: {sum(len(one.hits) for one in found)} answers"),
-        text((x(0.5), f"{MARGIN + SIDE + 32:.1f}"), "probability said"),
+        text((x(0.5), f"{MARGIN + SIDE + 32:.1f}"), "reported probability"),
         f'<g transform="translate({left - 26:.1f} {y(0.25)}) rotate(-90)">'
         f"{text(('0', '0'), 'share right')}</g>",
     ]
