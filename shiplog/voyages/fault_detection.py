@@ -142,12 +142,14 @@ def held_on_grid(
     runs: list[tuple[int, int]],
     travel: np.ndarray | None,
     least: float,
+    drift: float = 0.0,
 ) -> list[tuple[int, int]]:
     """Runs of repeats as grid rows, where the ship moved by more than the instrument would show.
 
-    times [m] ns; sampled [n] ns; travel [m]: how far the channel should have gone by each row,
+    times [m] ns; sampled [n] ns; travel [m, k]: where the channel should be at each row,
     integrated from its rate (None: no rate is known, and the runs are taken as they are);
-    least: the smallest change that is detected, in the channel's unit.
+    least: the smallest change that is detected, in the channel's unit; drift: how fast a rate of
+    zero may be said to move, in that unit per second.
     """
     kept = []
     for first, last in runs:
@@ -155,8 +157,11 @@ def held_on_grid(
         b = int(np.searchsorted(times, sampled[last], side="right")) - 1
         if b <= a or a >= len(times):
             continue
-        if travel is None or abs(travel[b] - travel[a]) > least:
-            kept.append((a, b))
+        if travel is not None:
+            span = float(np.linalg.norm(np.ptp(travel[a : b + 1], axis=0)))
+            if span <= least + drift * (b - a) * STEP_NS * 1e-9:
+                continue
+        kept.append((a, b))
     return kept
 
 

@@ -63,8 +63,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     table, grid = aligned.table, aligned.grid
     estimates = tuple(sensor_consistency.estimates(table, profile))
     consistency = sensor_consistency.findings(estimates, table.height, profile)
-    named = table.lazy().with_columns(voyage=pl.lit(""))
-    usable_s, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    usable_s, windows = usable(table, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,
         messages_read=reading.health.messages_read,
@@ -77,6 +76,12 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         instruments=tuple(_instrument(*one) for one in aligned.samples),
     )
     return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
+
+
+def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
+    """Seconds and windows of a voyage's 10 Hz rows, as `one_hertz.usable` counts them."""
+    named = table.lazy().with_columns(voyage=pl.lit(""))
+    return tables.usable(tables.resample([named], profile.columns, profile.circular))
 
 
 def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:

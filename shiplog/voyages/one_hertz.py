@@ -42,8 +42,12 @@ def averages(
     circular = set(circular)
     means = [mean_angle(c) if c in circular else pl.col(c).mean() for c in columns]
     good = pl.col("quality") & int(UNUSABLE) == 0
+    jump = pl.col("quality") & int(Quality.JUMP) != 0
     shifted = pl.col("time").dt.offset_by("500ms")
-    rows = table.filter(good).with_columns(time=shifted).collect().rechunk()
+    rows = table.filter(good | jump).with_columns(time=shifted).collect().rechunk()
+    unseen = rows.filter(~good)["time"].dt.truncate("1s").unique()  # where the jump's row is bad
+    if len(unseen):
+        rows = rows.filter(good)
     if not rows["time"].is_sorted():
         rows = rows.sort("time", maintain_order=True)
     return (
@@ -53,9 +57,10 @@ def averages(
             pl.col("voyage").first(),
             *means,
             samples=pl.len(),
-            jump=(pl.col("quality") & int(Quality.JUMP) != 0).any(),
+            jump=jump.any(),
         )
         .filter((pl.col("samples") >= least) & ~pl.col("jump"))
+        .filter(~pl.col("time").is_in(unseen.implode()))
         .select("voyage", pl.exclude("voyage", "jump"))
     )
 
@@ -126,11 +131,17 @@ def with_elapsed(seconds: pl.DataFrame) -> pl.DataFrame:
 
 
 def twins(seconds: pl.DataFrame) -> dict[str, str]:
-    """Voyage → the first of those that hold the same data under other names."""
+    """Voyage → the first of those that hold the same data under other names.
+
+    Two that share nothing are one where both share rows with a third.
+    """
     first: dict[str, str] = {}
     for left, right, _ in shared_rows(seconds).iter_rows():
-        first[str(right)] = first.get(str(left), str(left))
-    return first
+        both = first.get(left, left), first.get(right, right)
+        root = min(both)
+        first = {name: root if of in both else of for name, of in first.items()}
+        first |= {name: root for name in (left, right, *both)}
+    return {name: root for name, root in first.items() if name != root}
 
 
 def shared_rows(seconds: pl.DataFrame, least: int = 10) -> pl.DataFrame:

@@ -19,7 +19,7 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import fault_detection
 from shiplog.voyages import instrument_faults as faults
-from shiplog.voyages.ingest import Voyage
+from shiplog.voyages.ingest import Voyage, usable
 from shiplog.voyages.recording import Record
 from shiplog.voyages.sensor_consistency import Estimate
 
@@ -70,7 +70,10 @@ def corrected(voyage: Voyage) -> Voyage:
         replace(f, sentence=f"{f.sentence} Corrected.") if (f.kind, f.channel) in sure else f
         for f in voyage.report.findings
     ]
-    report = replace(voyage.report, findings=(*applied, *gaps))
+    usable_s, windows = usable(table, voyage.profile)
+    report = replace(
+        voyage.report, findings=(*applied, *gaps), usable_s=usable_s, windows=windows
+    )
     return replace(voyage, table=table, report=report, corrected=done)
 
 

@@ -71,19 +71,22 @@ def mark_gaps(grid: VoyageGrid) -> None:
 def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
     """Values that repeat although the ship moves; frozen ones, too long to be data.
 
-    What an instrument counts in steps stands still until the ship has gone a step.
+    What an instrument counts in steps stands still until the ship has gone a step. What the rate
+    says may be noise and bias, and a rate's bias is no larger than its noise.
     """
-    speed = np.nan_to_num(np.hypot(grid.columns["surge"], grid.columns["sway"]))
-    turning = np.abs(np.nan_to_num(grid.columns["yaw_rate"]))
-    travel = {"position": np.cumsum(speed) * STEP_S}
-    if profile.sensors.yaw_rate is not None:  # else it is the heading's own derivative
-        travel["heading"] = np.cumsum(turning) * STEP_S
+    sensors = profile.sensors
+    speed = np.nan_to_num(_over_ground(grid))
+    travel = {"position": (np.cumsum(speed, axis=0) * STEP_S, sensors.noise("velocity"))}
+    if sensors.yaw_rate is not None:  # else it is the heading's own derivative
+        turning = np.nan_to_num(grid.columns["yaw_rate"])[:, None]
+        travel["heading"] = np.cumsum(turning, axis=0) * STEP_S, sensors.noise("yaw_rate")
     for name, samples in sampled.items():
         runs = fault_detection.repeats(samples.value)
         if name not in travel:
             runs = fault_detection.improbable(runs, len(samples.time))
-        least = 3.0 * profile.sensors.noise(name) + samples.resolution
-        rows = fault_detection.held_on_grid(grid.times, samples.time, runs, travel.get(name), least)
+        gone, drift = travel.get(name, (None, 0.0))
+        least = 3.0 * sensors.noise(name) + samples.resolution
+        rows = fault_detection.held_on_grid(grid.times, samples.time, runs, gone, least, drift)
         fault_detection.mark(grid.marks, rows, Quality.HELD)
         intervals = [fault_detection.seconds(i) for i in rows]
         lasted = [end - start for start, end in intervals]
@@ -115,8 +118,7 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     heading, turning = columns["heading"], columns["yaw_rate"]
     known = np.isfinite(grid.columns["heading"])
     heading[known] = np.unwrap(heading[known])  # across a gap, not by way of its zeros
-    c, s = np.cos(heading), np.sin(heading)
-    over_ground = np.stack(frames.in_earth_axes(columns["surge"], columns["sway"], c, s), 1)
+    over_ground = np.nan_to_num(_over_ground(grid))
     position = np.stack((columns["x0"], columns["y0"]), 1)
 
     found = []
@@ -131,6 +133,13 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
         lost = _worth(step, turning[row])
         found.append(_jump("heading", row, math.degrees(step), "deg", lost))
     grid.findings += found
+
+
+def _over_ground(grid: VoyageGrid) -> np.ndarray:
+    """Velocity [m, 2] along x0 and y0; NaN where it or the heading is not known."""
+    heading = grid.columns["heading"]
+    surge, sway = grid.columns["surge"], grid.columns["sway"]
+    return np.stack(frames.in_earth_axes(surge, sway, np.cos(heading), np.sin(heading)), 1)
 
 
 def _jumps(

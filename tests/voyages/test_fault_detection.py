@@ -26,10 +26,27 @@ def test_a_held_position_is_found_only_while_the_ship_moves():
     position = np.stack((0.5 * TIME, np.zeros(600)), axis=1)
     position[300:310] = position[299]
     runs = fault_detection.repeats(position)
-    moving = fault_detection.held_on_grid(GRID, GRID, runs, 0.5 * TIME, least=0.06)
-    at_rest = fault_detection.held_on_grid(GRID, GRID, runs, np.zeros(600), least=0.06)
+    moving = fault_detection.held_on_grid(GRID, GRID, runs, 0.5 * TIME[:, None], least=0.06)
+    at_rest = fault_detection.held_on_grid(GRID, GRID, runs, np.zeros((600, 1)), least=0.06)
     assert moving == [(299, 309)]
     assert at_rest == []
+
+
+def test_a_steady_course_is_not_held_for_the_noise_and_the_bias_of_the_gyro():
+    heading = np.full((600, 1), 0.3)
+    heading[:300, 0] = 0.3 + 0.01 * (300 - np.arange(300))  # a turn, then 30 s of one heading
+    rate = np.where(np.arange(600) < 300, -0.1, 0.0)
+    runs = fault_detection.repeats(heading)
+    noisy = rate + RNG.normal(0.001, 0.002, 600)
+    turning = rate + np.where(np.arange(600) >= 300, 0.02, 0.0)  # 34 deg that it does not show
+    swinging = rate + np.where(np.arange(600) >= 300, 0.1 * np.sin(2 * np.pi * TIME / 15.0), 0.0)
+
+    def held(rate, drift=0.002):
+        travel = 0.1 * np.cumsum(rate)[:, None]
+        return fault_detection.held_on_grid(GRID, GRID, runs, travel, 0.02, drift)
+
+    assert held(noisy) == []
+    assert held(turning) == held(swinging) == [(300, 599)]
 
 
 def test_a_coarse_instrument_is_not_called_held():

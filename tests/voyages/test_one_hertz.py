@@ -77,6 +77,14 @@ def test_a_held_row_is_used_and_a_jump_starts_a_segment():
     assert result.filter(pl.col("segment") == 0).height == 10
 
 
+def test_a_jump_on_a_row_that_is_not_used_still_starts_a_segment():
+    quality = np.zeros(200, int)
+    quality[100] = int(Quality.JUMP | Quality.GAP)
+    result = seconds(rows(quality=quality))
+    assert result["segment"].n_unique() == 2
+    assert START + timedelta(seconds=10) not in result["time"].to_list()
+
+
 def test_voyages_are_apart_and_the_order_of_rows_does_not_matter():
     both = pl.concat([rows(voyage="b"), rows(voyage="a")])
     result = seconds(both.sample(fraction=1.0, shuffle=True, seed=3))
@@ -110,3 +118,16 @@ def test_the_same_data_under_two_names_is_found():
     assert one_hertz.shared_rows(all_rows).rows() == [("a", "b", 50)]
     again = copy.select(columns).with_columns(voyage=pl.lit("d"))
     assert one_hertz.twins(pl.concat([all_rows, again])) == {"b": "a", "d": "a"}
+
+
+def test_two_halves_and_the_whole_of_one_log_are_one_group():
+    noise = np.random.default_rng(0).normal(size=(4, 60))
+    whole = pl.DataFrame(dict(zip(one_hertz.COMPARED, noise, strict=True)))
+
+    def named(name, part):
+        return part.with_columns(voyage=pl.lit(name))
+
+    voyages = [named("c", whole[:30]), named("b", whole[30:]), named("a", whole)]
+    assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
+    voyages = [named("a", whole[:30]), named("b", whole[30:]), named("c", whole)]
+    assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}

@@ -1,7 +1,7 @@
 """What is certain is put right by what was hidden, reported, and undone by ingesting again."""
 
 import json
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import polars as pl
@@ -11,8 +11,8 @@ from test_sensor_consistency import BODY, DEGREE, VECTWIN, in_body_axes
 
 from pipelines.experiments.simulated_ship import Effects, Wind, cases, sail, write_voyage
 from shiplog.channels import UNUSABLE, Quality
-from shiplog.voyages import sensor_consistency
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages import one_hertz, sensor_consistency
+from shiplog.voyages.ingest import ingest, usable
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.sensor_correction import corrected, put_right
 from shiplog.voyages.store import Store
@@ -105,6 +105,23 @@ def test_no_data_stays_as_it_was_and_is_fetched_for_no_other_row():
     assert np.nanmax(np.delete(step, [300])) < 1.0  # nothing of the spike, nothing across the jump
 
 
+def test_a_jump_is_still_one_where_an_early_clock_has_nothing_to_fetch():
+    """The row after the step becomes a gap: the stretches are apart all the same."""
+    table = in_body_axes(3, seconds=100.0)
+    marks, x0 = table["quality"].to_numpy().copy(), table["x0"].to_numpy().copy()
+    marks[704], x0[704:] = int(Quality.JUMP), x0[704:] + 500.0
+    table = table.with_columns(quality=marks, x0=x0)
+    fixed, _ = put_right(table, BODY, [late("position", -0.15)])
+    assert fixed["quality"][704] & int(Quality.GAP)
+    start = datetime(2026, 5, 1, tzinfo=UTC)
+    stamps = [start + timedelta(milliseconds=100 * i) for i in range(table.height)]
+    named = fixed.with_columns(voyage=pl.lit("a"), time=pl.Series(stamps).cast(pl.Datetime("ns")))
+    seconds = one_hertz.resample([named.lazy()], ("x0",), ())
+    assert seconds["segment"].n_unique() == 2
+    steps = seconds.select(pl.col("x0").diff().abs().over("segment")).to_series()
+    assert (steps.drop_nulls() < 10.0).all()
+
+
 def test_only_the_beyond_doubt_is_certain():
     def estimate(half, rival=""):
         return Estimate("clock_offset", "velocity", 0.4, 0.4 - half, 0.4 + half, 0.0, 0.05, "s",
@@ -125,6 +142,7 @@ def test_what_a_case_hides_in_the_gyro_is_gone(tmp_path, seed):
     fixed = corrected(found)
     truth = {cause.name: cause.parameters["value"]["value"] for cause in case.causes}
     assert {e.kind for e in fixed.corrected or ()} == set(truth)
+    assert (fixed.report.usable_s, fixed.report.windows) == usable(fixed.table, VECTWIN)
     for e in fixed.corrected or ():
         assert abs(e.value - truth[e.kind]) < e.high - e.low  # twice the half of 90 %
     assert left(found.table, VECTWIN) >= {(kind, "yaw_rate") for kind in truth}
