@@ -15,6 +15,7 @@ from shiplog.logs.conversion import clock, heartbeat
 from shiplog.logs.conversion.columns import schema_of
 from shiplog.logs.conversion.delimited import read_table
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
+from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.voyages.ingest import ingest
 
 NOON = 1_617_969_600_000_000_000  # 2021-04-09 12:00:00 UTC, ns
@@ -207,6 +208,57 @@ def test_a_table_of_a_folder_that_cannot_be_read_is_lost(tmp_path):
     assert "b.parquet cannot be read" in done.lost[str(tmp_path / "dump")]
 
 
+def dumped(tmp_path, text):
+    (tmp_path / "dump").mkdir()
+    (tmp_path / "dump" / "a__b.csv").write_text(text)
+    (topic,), _ = folder_to_series(tmp_path / "dump", None)
+    return pl.DataFrame(topic.columns)
+
+
+def test_fields_of_one_plain_name_are_all_kept(tmp_path, caplog):
+    header = "stamp_ns,pose.x,pose_x,pose_x_2,速度,角度"
+    table = dumped(tmp_path, header + "\n1000000000,1,2,3,4,5\n2000000000,6,7,8,9,10\n")
+    assert table.rows() == [(1, 2, 3, 4, 5), (6, 7, 8, 9, 10)]
+    assert table.columns == ["pose_x", "pose_x_2", "pose_x_2_2", "__", "___2"]
+    assert "'pose_x' becomes the field pose_x_2" in caplog.text
+
+
+def test_a_word_in_a_column_of_a_folder_is_a_blank(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+    rows = "".join(f"{i}000000000,{v},ok\n" for i, v in enumerate((1.5, "n/a", 3.5, 4.5), 1))
+    table = dumped(tmp_path, "stamp_ns,angle,state\n" + rows)
+    assert table["angle"].fill_nan(None).to_list() == [1.5, None, 3.5, 4.5]
+    assert "1 values of angle are no numbers" in caplog.text
+    assert "'state' holds no numbers" in caplog.text and "state" not in table.columns
+
+
+def test_a_short_first_row_is_filled_with_blanks(tmp_path):
+    (tmp_path / "t.csv").write_text("time,a,b\n0,1\n" + "".join(f"{i},2,3\n" for i in range(1, 6)))
+    assert read_table(tmp_path / "t.csv").frame["b"].to_list() == [None, 3, 3, 3, 3, 3]
+
+
+def test_commas_that_group_thousands_are_no_decimal_commas(tmp_path):
+    def rpm(text):
+        (tmp_path / "t.csv").write_text(text)
+        return read_table(tmp_path / "t.csv").frame["rpm"].to_list()
+
+    assert rpm('time,rpm\n0,998\n1,"1,002"\n2,"1,234,567"\n') == [998, 1002, 1234567]
+    assert rpm('time,rpm\n0,998.5\n1,"1,002.25"\n') == [998.5, 1002.25]
+    assert rpm('time,rpm\n0,"1,5"\n1,"1,002"\n') == [1.5, 1.002]  # one of them is no group
+    assert rpm("time;rpm\n0;998\n1;1,002\n") == [998, 1.002]
+
+
+def test_two_columns_of_one_channel_are_refused(tmp_path):
+    text = PROFILE.replace("[table]", '[table]\n"u2" = { channel = "surge" }', 1)
+    assert text != PROFILE
+    (tmp_path / "t.csv").write_text("")
+    profile = profiles.parse(text, "m")
+    names = [*profile.table]
+    (tmp_path / "t.csv").write_text(",".join(names) + "\n" + ",".join("1" for _ in names) + "\n")
+    refused = str(convert([tmp_path / "t.csv"], profile, tmp_path).refused)
+    assert "are all 'surge' in [table]" in refused and "u2" in refused
+
+
 def test_a_table_without_rows_or_profile_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("t,x\n")
     assert "no row" in str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path))
@@ -242,6 +294,28 @@ def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
     assert {int(t) for s in series for t in s.time} == {1_744_366_210_000_000_000}
     done = convert([tmp_path / "a.nmea"], None, tmp_path)
     assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
+
+
+def nmea_topics(tmp_path, lines):
+    (tmp_path / "a.nmea").write_text("\n".join(lines))
+    return {s.topic: s for s in read_nmea(tmp_path / "a.nmea")[0]}
+
+
+def test_starboard_stays_starboard_where_port_alone_is_not_valid(tmp_path):
+    two = ["$AGRSA,5.0,A,3.0,A", "$AGRSA,6.0,A,3.0,V", "$AGRSA,7.0,V,4.0,A"]
+    topics = nmea_topics(tmp_path, [*BURST[:2], *two])
+    assert topics["/rudder/starboard"].columns["angle_deg"].tolist() == [5.0, 6.0]
+    assert topics["/rudder/port"].columns["angle_deg"].tolist() == [3.0, 4.0]
+    one = nmea_topics(tmp_path, [*BURST[:2], "$AGRSA,5.0,A,0.0,V", "$AGRSA,6.0,A,,"])
+    assert one["/rudder/main"].columns["angle_deg"].tolist() == [5.0, 6.0]
+    assert not [topic for topic in one if topic.startswith("/rudder/") and topic != "/rudder/main"]
+
+
+def test_the_clock_of_a_receiver_without_a_fix_is_not_believed(tmp_path):
+    cold = ["$GPRMC,000010,V,,,,,,,060180", "$HEHDT,1.0,T", "$HEHDT,2.0,T"]
+    topics = nmea_topics(tmp_path, [*cold, *BURST])
+    assert topics["/gyro/he"].columns["heading_deg"].tolist() == [345.0]
+    assert {int(t) for s in topics.values() for t in s.time} == {1_744_366_210_000_000_000}
 
 
 def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path):

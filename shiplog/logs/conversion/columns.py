@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -64,6 +65,7 @@ def voyages(
     # Two sources of one ship may name a column differently; what is not in this table is left out.
     present = {name: c for name, c in profile.table.items() if name in frame.columns}
     _require(present, profile, frame, path)
+    _refuse_two(present, profile, path)
     frame = _of_one_vessel(frame, present, profile, path)
     time = _time(frame, present)
     columns = [time.rename("time")]
@@ -215,6 +217,17 @@ def _require(present: dict[str, Column], profile: Profile, frame: pl.DataFrame, 
         f"Columns found: {listed(frame.columns, most=40)}.",
         hint=f"{hint}; or draft a profile with `shiplog profile {path}`.",
     )
+
+
+def _refuse_two(present: dict[str, Column], profile: Profile, path: Path) -> None:
+    """Raises ProfileError where two columns of this table are one channel."""
+    for channel, times in Counter(column.channel for column in present.values()).items():
+        if times > 1 and channel != "time":  # of clocks, the first that is named counts
+            names = _named(present, channel)
+            raise ProfileError(
+                f"{path.name}: the columns {listed(names)} are all {channel!r} in [table].",
+                hint=f"leave one of them in the [table] section of {profile.source}.",
+            )
 
 
 def _of_one_vessel(

@@ -23,6 +23,7 @@ TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab")
 SEPARATORS = (";", "\t", "|", ",", " ")
 SAMPLE_BYTES = 65_536  # bytes that tell the form of a text
 LOOK = 200  # lines of them
+GROUPED = r"^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 REGULAR = 0.8  # share of lines that a separator cuts alike
 
 
@@ -94,11 +95,14 @@ def _read_text(path: Path, known: Collection[str]) -> DelimitedTable:
         rows, separator = "\n".join(body), form.separator
     if not rows.strip():
         return DelimitedTable(pl.DataFrame({name: [] for name in form.names}))
-    frame = pl.read_csv(
-        io.BytesIO(rows.encode()), separator=separator, has_header=False, infer_schema=False,
-        truncate_ragged_lines=True, new_columns=form.names,
+    named = separator.join('"' + name.replace('"', '""') + '"' for name in form.names)
+    frame = pl.read_csv(  # a first row may be short: it is the header that says how many columns
+        io.BytesIO(f"{named}\n{rows}".encode()), separator=separator, infer_schema=False,
+        truncate_ragged_lines=True,
     )  # fmt: skip
-    frame = frame.select(_typed(column) for column in frame.get_columns()[: len(form.names)])
+    if separator == ",":
+        frame = frame.select(_ungrouped(column) for column in frame.get_columns())
+    frame = frame.select(_typed(column) for column in frame.get_columns())
     commas = " and decimal commas" if _has_commas(form, lines) else ""
     if form.separator != "," or commas:
         cut = {"\t": "tabs", " ": "spaces"}.get(form.separator, repr(form.separator))
@@ -152,7 +156,7 @@ def _headed(cut: list[list[str]], count: int, separator: str, known: Collection[
     words = [i for i in numbers if i < len(after) and not _number(after[i])]
     stated = bool(numbers) and len(words) == len(numbers)
     unit_row = [re.sub(r"^[\[(]|[\])]$", "", u.strip()) for u in after] if stated else []
-    return Form(separator, header, _unlike(names), unit_row, header + 1 + stated)
+    return Form(separator, header, unlike(names), unit_row, header + 1 + stated)
 
 
 def _cut(line: str, separator: str) -> list[str]:
@@ -165,15 +169,31 @@ def _number(text: str) -> bool:
     return bool(re.fullmatch(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\s*", text))
 
 
-def _unlike(names: list[str]) -> list[str]:
+def unlike(names: list[str]) -> list[str]:
     """Each name once: a second `angle` becomes `angle_2`, an empty one its place."""
     uses: Counter[str] = Counter()
-    unlike = []
+    different: list[str] = []
     for place, name in enumerate(names, 1):
         name = name or f"column_{place}"
         uses[name] += 1
-        unlike.append(name if uses[name] == 1 else f"{name}_{uses[name]}")
-    return unlike
+        other = name if uses[name] == 1 else f"{name}_{uses[name]}"
+        while other in different:  # a file that has both `a`, `a` and `a_2`
+            other += "_2"
+        different.append(other)
+    return different
+
+
+def _ungrouped(column: pl.Series) -> pl.Series:
+    """Numbers without the commas that group their thousands: "1,002.5" is 1002.5.
+
+    Only for a table that commas separate: elsewhere a comma is a decimal one.
+    """
+    texts = column.drop_nulls().str.strip_chars()
+    with_comma = texts.filter(texts.str.contains(",", literal=True))
+    if not len(with_comma) or not with_comma.str.contains(GROUPED).all():
+        return column
+    log.info("the commas in %r, such as %r, group thousands", column.name, with_comma[0])
+    return column.str.replace_all(",", "", literal=True)
 
 
 def _typed(column: pl.Series) -> pl.Series:

@@ -115,8 +115,8 @@ class _Reader:
             return
         try:
             message = pynmea2.parse(text, check="*" in text)
+            decoded = facts(message)  # first: a sentence that is not valid moves no clock
             own = self._own(message)
-            decoded = facts(message)
         except NotValid:
             self.invalid += 1
             return
@@ -211,6 +211,8 @@ class _Reader:
         """By topic: the best sentence for position and velocity; two talkers are two topics."""
         there = {kind for kind, _ in self.rows}
         wanted = {kind: kind for kind in there if kind.startswith("/")}
+        if "/rudder/port" not in there:  # RSA calls the only rudder the starboard one
+            wanted |= dict.fromkeys(there & {"/rudder/starboard"}, "/rudder/main")
         for topic, kinds in INSTEAD.items():
             best = [kind for kind in kinds if kind in there][:1]
             wanted |= dict.fromkeys(best, topic)

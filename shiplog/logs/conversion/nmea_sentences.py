@@ -109,13 +109,11 @@ def _mwv(m) -> Iterator[Fact]:
 
 def _rsa(m) -> Iterator[Fact]:
     """The starboard, or the only, rudder and then port; negative turns the bow to port."""
-    two = _at(m, 2) != "" and _at(m, 3) != "V"
-    first = "/rudder/starboard" if two else "/rudder/main"
-    _require(_at(m, 1) != "V" or two)
-    if _at(m, 0) and _at(m, 1) != "V":
-        yield first, (_number(_at(m, 0)),)
-    if two:
-        yield "/rudder/port", (_number(_at(m, 2)),)
+    starboard, port = ((_at(m, i), _at(m, i + 1) != "V") for i in (0, 2))
+    _require(starboard[1] or (port[1] and port[0] != ""))
+    for name, (angle, valid) in (("starboard", starboard), ("port", port)):
+        if angle and valid:
+            yield f"/rudder/{name}", (_number(angle),)
 
 
 def _rpm(m) -> Iterator[Fact]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ import polars as pl
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import plain, schema_of
-from shiplog.logs.conversion.delimited import is_table, read_table
+from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.write import Series
 from shiplog.profile import Profile
+
+log = logging.getLogger(__name__)
 
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
 # A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
@@ -85,23 +88,41 @@ def _one(path: Path, profile: Profile | None) -> list[Series]:
     text = next((n for n in frame.columns if n.lower() in ("sentence", "nmea")), None)
     if text is not None and frame[text].dtype == pl.String:
         return lines_to_series(frame[text].fill_null("").to_list(), path.name, logged.to_list())
-    fields = [
-        n for n, t in frame.schema.items()
-        if t.is_numeric() and n not in clocks and not n.endswith("_ns")
-    ]  # fmt: skip
-    if not fields:
+    columns = _numbers(frame.drop(*clocks), path)
+    if not columns:
         return []
-    return [
-        Series(
-            topic=topic,
-            schema=schema_of(topic, fields),
-            time=stamp.to_numpy(),
-            columns={
-                plain(n): frame[n].cast(pl.Float64).fill_null(np.nan).to_numpy() for n in fields
-            },
-            log_time=logged.to_numpy(),
-        )
-    ]
+    return [Series(topic, schema_of(topic, columns), stamp.to_numpy(), columns, logged.to_numpy())]
+
+
+def _numbers(frame: pl.DataFrame, path: Path) -> dict[str, np.ndarray]:
+    """Each column of numbers [n] under the name of its field; what is not one is reported.
+
+    Words in a column of numbers are values that were not measured.
+    """
+    numbers: dict[str, pl.Series] = {}
+    for column in frame.get_columns():
+        if column.dtype.is_numeric() and not column.name.endswith("_ns"):
+            numbers[column.name] = column.cast(pl.Float64)
+        elif column.dtype == pl.String:
+            number = clock.number_of(column)
+            filled = column.filter(column.str.strip_chars() != "")
+            words = len(filled) - number.count()
+            if number.count() <= words:
+                log.info("%s: %r holds no numbers and is left out", path.name, column.name)
+                continue
+            log.warning(
+                "%s: %d values of %s are no numbers; taken as not measured",
+                path.name, words, column.name,
+            )  # fmt: skip
+            numbers[column.name] = number
+    fields = unlike([plain(name) for name in numbers])
+    for name, field in zip(numbers, fields, strict=True):
+        if field != plain(name):
+            log.warning("%s: the column %r becomes the field %s", path.name, name, field)
+    return {
+        field: column.fill_null(np.nan).to_numpy()
+        for field, column in zip(fields, numbers.values(), strict=True)
+    }
 
 
 def _known(frame: pl.DataFrame, names: tuple[str, ...]) -> str | None:
