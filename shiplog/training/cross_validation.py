@@ -75,6 +75,15 @@ def cross_validate(
     return CrossValidated(np.array(list(groups)), states, own, loss)
 
 
+def finite_mean(loss: np.ndarray) -> str:
+    """Mean L of windows [N] for a sentence, without those that diverge, which are counted."""
+    ends = np.isfinite(loss)
+    if not ends.any():
+        return "without an end in any window"
+    lost = int((~ends).sum())
+    return f"{loss[ends].mean():.0f}" + (f" ({lost} more diverge)" if lost else "")
+
+
 def as_good(judged: dict[float, np.ndarray]) -> list[float]:
     """Which settings are not worse than the best by more than chance; none where fewer than two
     windows can be judged.

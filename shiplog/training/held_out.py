@@ -81,8 +81,18 @@ def unfitted_sentence(loss: np.ndarray) -> str:
 
 
 def _sentence(where: str, before: np.ndarray, after: np.ndarray) -> str:
-    share = after.mean() / before.mean()
-    return (
-        f"Mean L over {len(before)} {where}: {before.mean():.0f} at the start, "
-        f"{after.mean():.0f} identified ({share:.3f})."
+    """Of the windows that end with both: one that diverges says nothing of the others."""
+    ends = np.isfinite(before) & np.isfinite(after)
+    lost = [
+        f"{int((~np.isfinite(loss)).sum())} diverge {when}"
+        for when, loss in (("at the start", before), ("identified", after))
+        if not np.isfinite(loss).all()
+    ]
+    if not ends.any():
+        return f"Of {len(before)} {where}, {' and '.join(lost)}."
+    first, then = before[ends].mean(), after[ends].mean()
+    text = (
+        f"Mean L over {int(ends.sum())} {where}: {first:.0f} at the start, "
+        f"{then:.0f} identified ({then / first:.3f})."
     )
+    return f"{text} Of {len(before)}, {' and '.join(lost)}." if lost else text

@@ -10,7 +10,7 @@ import numpy as np
 
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, series
 from shiplog.training import hybrid_training, output_error, random_streams, regularisation
-from shiplog.training.cross_validation import CrossValidated, cross_validate
+from shiplog.training.cross_validation import CrossValidated, cross_validate, finite_mean
 from shiplog.training.output_error import Identified
 from shiplog.training.run_config import Physics
 from shiplog.training.setup import Prepared
@@ -26,7 +26,11 @@ class Chosen:
     judged: dict[float, np.ndarray]
 
     def as_json(self) -> dict:
-        mean = {f"{value:g}": float(loss.mean()) for value, loss in self.judged.items()}
+        """With null for a setting that lets a window diverge."""
+        mean = {
+            f"{value:g}": float(loss.mean()) if np.isfinite(loss).all() else None
+            for value, loss in self.judged.items()
+        }
         return {"value": self.value, "held_out_loss": mean}
 
 
@@ -55,25 +59,31 @@ def choose_ridge(ready: Prepared, settings: Physics) -> tuple[Chosen, Identified
     unseen = series(ready.unseen)
     judged = {f: losses(ready.model, one.values, unseen) for f, one in found.items()}
     for factor, loss in judged.items():
-        log.info("ridge of %g spreads: L %.0f on validation windows", factor, loss.mean())
+        log.info("ridge of %g spreads: L %s on validation windows", factor, finite_mean(loss))
     chosen = Chosen(regularisation.choose(judged), judged)
     return chosen, found[chosen.value], [_ridge_sentence(chosen)]
 
 
+def _worth(loss: np.ndarray) -> tuple[int, float]:
+    """What is less is better: windows [N] that diverge, and then L of the others."""
+    ends = np.isfinite(loss)
+    return int((~ends).sum()), float(loss[ends].mean()) if ends.any() else 0.0
+
+
 def _ridge_sentence(chosen: Chosen) -> str:
-    mean = {factor: float(loss.mean()) for factor, loss in chosen.judged.items()}
-    best = min(mean, key=lambda factor: mean[factor])
+    mean = {factor: finite_mean(loss) for factor, loss in chosen.judged.items()}
+    best = min(chosen.judged, key=lambda factor: _worth(chosen.judged[factor]))
     plain, value = mean[regularisation.PLAUSIBLE], chosen.value
     among = f"{len(chosen.judged[value])} validation windows"
     if value != regularisation.PLAUSIBLE:
         return (
             f"Ridge of {value:g} times the plausible spreads, chosen on {among}: L "
-            f"{mean[value]:.0f} there, {plain:.0f} with the plausible ones."
+            f"{mean[value]} there, {plain} with the plausible ones."
         )
     if best == regularisation.PLAUSIBLE:
-        return f"Ridge of the plausible spreads: L {plain:.0f} on {among}, the least."
+        return f"Ridge of the plausible spreads: L {plain} on {among}, the least."
     return (
-        f"Ridge of the plausible spreads: L {plain:.0f} on {among}; {mean[best]:.0f} with "
+        f"Ridge of the plausible spreads: L {plain} on {among}; {mean[best]} with "
         f"{best:g} times those is not better by more than chance."
     )
 
@@ -121,7 +131,7 @@ def choose_network(
     whole = {strength: np.concatenate(parts) for strength, parts in judged.items()}
     best = hybrid_training.choose(whole)
     for strength, loss in whole.items():
-        log.info("network of strength %g: L %.0f on held-out windows", strength, loss.mean())
+        log.info("network of strength %g: L %s on held-out windows", strength, finite_mean(loss))
     if best == 0.0:
         # A silent network: the physics as they are, in the hybrid's form.
         simulator, done = fitted(ready.data, found, 1e-9)
@@ -129,7 +139,7 @@ def choose_network(
     else:
         simulator, done = candidates.get(best) or fitted(ready.data, found, best)
         sentence = (
-            f"Network of strength {best:g}: L {whole[best].mean():.0f} on {len(whole[best])} "
-            f"held-out windows, physics alone {whole[0.0].mean():.0f}."
+            f"Network of strength {best:g}: L {finite_mean(whole[best])} on {len(whole[best])} "
+            f"held-out windows, physics alone {finite_mean(whole[0.0])}."
         )
     return Chosen(best, whole), simulator, done, f"Seed {seed}: {sentence}", validated.get(best)

@@ -16,6 +16,7 @@ from shiplog.exceptions import RunError, WindowError, listed, nearest
 from shiplog.models import MODELS
 from shiplog.models.coefficients import Parameters
 from shiplog.profile import Profile
+from shiplog.simulation.error_reduction import RUNAWAY
 from shiplog.simulation.sensitivities import WindowSeries, losses, series
 from shiplog.training.run_config import Config
 from shiplog.voyages import one_hertz, windows
@@ -117,7 +118,7 @@ def _stable(model: Any, values: np.ndarray, data: WindowSeries) -> Any:
     """With as many Euler steps a second as a small, quick ship needs to hold every window."""
     for substeps in (1, 2, 4, 8):
         finer = replace(model, substeps=max(substeps, model.substeps))
-        if np.isfinite(losses(finer, values, data)).all():
+        if (losses(finer, values, data) < RUNAWAY).all():  # not so of NaN either
             if finer.substeps > model.substeps:
                 log.info("%d Euler steps within each second keep the ship stable", finer.substeps)
             return finer

@@ -136,7 +136,8 @@ def twins(seconds: pl.DataFrame) -> dict[str, str]:
     Two that share nothing are one where both share rows with a third.
     """
     first: dict[str, str] = {}
-    for left, right, _ in shared_rows(seconds).iter_rows():
+    pairs: list[tuple[str, str]] = shared_rows(seconds).select("left", "right").rows()
+    for left, right in pairs:
         both = first.get(left, left), first.get(right, right)
         root = min(both)
         first = {name: root if of in both else of for name, of in first.items()}

@@ -71,9 +71,7 @@ def corrected(voyage: Voyage) -> Voyage:
         for f in voyage.report.findings
     ]
     usable_s, windows = usable(table, voyage.profile)
-    report = replace(
-        voyage.report, findings=(*applied, *gaps), usable_s=usable_s, windows=windows
-    )
+    report = replace(voyage.report, findings=(*applied, *gaps), usable_s=usable_s, windows=windows)
     return replace(voyage, table=table, report=report, corrected=done)
 
 

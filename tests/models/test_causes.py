@@ -194,6 +194,25 @@ def test_of_a_ferry_the_azimuths_are_late_and_nothing_else():
         assert output.startswith("The azimuths ")
 
 
+def test_without_its_rudders_a_ship_is_steered_by_its_azimuths():
+    both = FERRY.model_copy(update={"actuators": (
+        *FERRY.actuators, FERRY.actuators[0].model_copy(update={"name": "aft", "kind": "rudder"}),
+    )})  # fmt: skip
+    whole, without = setting(both), replace(setting(both), parts=("thruster",))
+    assert BY["rudder_lag"].on(whole).what == "rudders"
+    lagged = BY["rudder_lag"].on(without)
+    assert lagged.what == "azimuths"
+    rows = 50
+    read = Record(
+        profile=both, names=("one",), voyage=np.zeros(rows, int), time=0.1 * np.arange(rows),
+        share=np.zeros(rows), starts=np.arange(rows) == 0, measured=np.ones(rows, bool),
+        state=np.zeros((rows, 6)), actuator=np.cumsum(np.ones((rows, len(both.actuators))), 0),
+        wind=np.zeros((rows, 2)),
+    )  # fmt: skip
+    moved = (lagged.read(read, np.array([0.5])).actuator != read.actuator).any(0)
+    assert moved.tolist() == [a.kind == "azimuth" for a in both.actuators]
+
+
 def test_two_of_three_clocks_say_it_all():
     """`gnss` is position and velocity together; no cause goes together with itself."""
     by = {cause.label: cause for cause in CATALOGUE}

@@ -9,7 +9,7 @@ from shiplog import profile_file as profiles
 from shiplog.models.mmg import estimate, parameters
 from shiplog.models.mmg.estimate import Particulars
 from shiplog.models.mmg.geometry import geometry_of
-from shiplog.profile import Ship, Site
+from shiplog.profile import Actuator, Ship, Site
 
 ESSO = Particulars(
     length=3.0,
@@ -285,3 +285,24 @@ def test_a_rudder_of_known_span_has_the_common_chord():
     )
     (rudder,) = geometry_of(ship.model_copy(update={"actuators": lacking}))[0].rudders
     assert (rudder.area, rudder.span) == pytest.approx((0.15**2 / 1.5, 0.15))
+
+
+def test_the_bow_thruster_of_a_tanker_is_one_that_can_be_built():
+    """A twentieth of 312 000 t would be 150 MN; tunnel thrusters of ships have some 0.5 MN."""
+    tanker = profiles.load("kvlcc2-full-scale")
+    bow = Actuator(
+        name="bow",
+        kind="thruster",
+        topic="/bow",
+        field="share",
+        unit="1",
+        position_m=(150.0, 0.0),
+        diameter_m=None,
+    )
+    ship = tanker.model_copy(update={"actuators": (*tanker.actuators, bow)})
+    main = Particulars(
+        320.0, 58.0, 20.8, 312.4e6, 0.81, 11.2, 1025.0, frontal_area=1161.0, lateral_area=4259.0
+    )
+    found = parameters.estimated(geometry_of(ship)[0], main)
+    force = found.values[found.names.index("thruster.bow_ahead")]
+    assert 1e5 < force <= 2e6

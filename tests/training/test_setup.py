@@ -1,9 +1,13 @@
-"""What an identification begins with, in a sentence."""
+"""What an identification begins with, in a sentence; how finely it steps; how it ends."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
+from shiplog.training import setup
+from shiplog.training.cross_validation import finite_mean
+from shiplog.training.held_out import _sentence
 from shiplog.training.setup import Prepared
 
 
@@ -14,3 +18,30 @@ def test_the_sentence_counts_what_may_move():
     rest = "of 3 parameters free, 4 windows, starting values from a file"
     assert ready.sentence(fit=True) == f"2 {rest}"
     assert ready.sentence(fit=False) == f"0 {rest}"
+
+
+def test_a_loss_that_is_huge_but_finite_is_no_stable_start(monkeypatch):
+    @dataclass(frozen=True)
+    class Stiff:
+        substeps: int = 1
+
+    by_substeps = {1: 1e200, 2: np.nan, 4: 3.0, 8: 3.0}
+    monkeypatch.setattr(
+        setup, "losses", lambda model, values, data: np.array([1.0, by_substeps[model.substeps]])
+    )
+    assert setup._stable(Stiff(), None, None).substeps == 4  # type: ignore[arg-type]
+
+
+def test_means_are_of_the_windows_that_end_and_the_others_are_counted():
+    before, after = np.array([4.0, 6.0, np.inf]), np.array([1.0, 3.0, 2.0])
+    assert _sentence("training windows", before[:2], after[:2]) == (
+        "Mean L over 2 training windows: 5 at the start, 2 identified (0.400)."
+    )
+    assert _sentence("training windows", before, after) == (
+        "Mean L over 2 training windows: 5 at the start, 2 identified (0.400). "
+        "Of 3, 1 diverge at the start."
+    )
+    none = np.full(2, np.inf)
+    assert _sentence("windows", after[:2], none) == "Of 2 windows, 2 diverge identified."
+    assert finite_mean(before) == "5 (1 more diverge)" and finite_mean(after) == "2"
+    assert finite_mean(none) == "without an end in any window"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numba
 import numpy as np
@@ -241,31 +241,28 @@ class Payload(Cause):
         )
 
 
-def _steering(profile: Profile) -> list[int]:
-    """Columns of the rudders; of a ship without, of what turns its thrusters."""
-    return _columns(profile, "rudder") or _columns(profile, "azimuth")
-
-
 @dataclass(frozen=True)
 class _OnRudders(Cause):
-    """Of rudders, or of azimuths where the ship has no rudder."""
+    """Of rudders, or of azimuths where the model has no rudder."""
 
     what: str = field(default="rudders", kw_only=True)
 
     kind = "ship"
     needs = ("steering",)
 
-    def on(self, setting: Setting) -> Cause:
-        rudders = _columns(setting.profile, "rudder")
-        return replace(self, what="rudders" if rudders else "azimuths")
+    def on(self, setting: Setting) -> Self:
+        return replace(self, what="rudders" if setting.columns("rudder") else "azimuths")
+
+    def _steering(self, profile: Profile) -> list[int]:
+        return _columns(profile, "rudder" if self.what == "rudders" else "azimuth")
 
     def _with(self, record: Record, acting: np.ndarray) -> Record:
         actuator = record.actuator.copy()
-        actuator[:, _steering(record.profile)] = acting
+        actuator[:, self._steering(record.profile)] = acting
         return replace(record, actuator=actuator)
 
     def _recorded(self, record: Record) -> np.ndarray:
-        return record.actuator[:, _steering(record.profile)]
+        return record.actuator[:, self._steering(record.profile)]
 
 
 @dataclass(frozen=True)
@@ -293,12 +290,13 @@ class RudderOffset(_OnRudders):
     def count(self) -> int:
         return len(self.groups)
 
-    def on(self, setting: Setting) -> Cause:
-        columns = _steering(setting.profile)
+    def on(self, setting: Setting) -> Self:
+        made = super().on(setting)
+        columns = made._steering(setting.profile)
         aside = [setting.profile.actuators[i].position_m[1] for i in columns]
         paired = min(aside, default=0.0) < 0.0 < max(aside, default=0.0)
         groups = ("port", "starboard") if paired else ("angle",)
-        return replace(super().on(setting), groups=groups)
+        return replace(made, groups=groups)
 
     def sizes(self, setting: Setting) -> np.ndarray:
         return np.full(self.count, np.radians(4.0))
@@ -307,7 +305,7 @@ class RudderOffset(_OnRudders):
         return np.full(self.count, -np.radians(40.0)), np.full(self.count, np.radians(40.0))
 
     def read(self, record: Record, p: np.ndarray) -> Record:
-        columns = _steering(record.profile)
+        columns = self._steering(record.profile)
         if self.count == 1:
             each = np.full(len(columns), p[0])
         else:

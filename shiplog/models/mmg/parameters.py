@@ -111,6 +111,8 @@ TABLE: dict[str, dict[str, ParameterEntry]] = {
 }  # fmt: skip
 
 
+STRONGEST_THRUSTER = 1e6  # N: some 5 MW, as the largest offshore vessels have
+
 _NEEDS = {
     "wind": "[sensors.wind]",
     "propeller": "actuator of kind propeller",
@@ -147,7 +149,7 @@ def estimated(geometry: Geometry, main: Particulars) -> Parameters:
             guess["rudder"]["f_t"] = guess["rudder"]["f_alpha"]
     if geometry.thrusters:
         # A twentieth of the ship's weight, shared out: between a ferry's bollard pull and a tug's.
-        share = 0.05 * 9.81 * main.mass / len(geometry.thrusters)
+        share = min(0.05 * 9.81 * main.mass / len(geometry.thrusters), STRONGEST_THRUSTER)
         guess["thruster"] = {
             f"{t.name}_{k}": share for t in geometry.thrusters for k in ("ahead", "astern")
         }
