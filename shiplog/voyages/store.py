@@ -200,6 +200,12 @@ class Store:
                     f"{profile.ship.name!r} with {listed(profile.actuator_names)}.",
                     hint="choose voyages of one ship with --voyages.",
                 )
+            elif _mounted(profile) != _mounted(chosen):
+                log.warning(
+                    "%s and %s were ingested with different lever arms or kinds of sensors; what "
+                    "is said of an antenna's place holds for %s. If nothing was moved, ingest them "
+                    "again with one profile", first, name, first,
+                )  # fmt: skip
         if chosen is None:
             raise StoreError("No voyage was chosen.", hint="name some with --voyages.")
         return chosen
@@ -289,6 +295,11 @@ def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _mounted(profile: Profile) -> list[tuple]:
+    """Where each sensor is and what it measures, which ingest has made good."""
+    return [(name, one.kind, one.lever_arm_m) for name, one in profile.sensors.items()]
 
 
 def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:

@@ -348,3 +348,15 @@ def test_a_store_that_is_a_file(tmp_path, voyage):
     for call in (Store(tmp_path / "file").entries, lambda: Store(tmp_path / "file").add(voyage())):
         with pytest.raises(StoreError):
             call()
+
+
+def test_voyages_of_two_lever_arms_are_one_ship_and_are_said_to_be_two(tmp_path, voyage, caplog):
+    store = Store(tmp_path / "store")
+    store.add(voyage(name="one"))
+    moved = sailing.PROFILE.replace("lever_arm_m = [0.7, -0.2]", "lever_arm_m = [0.0, 0.0]")
+    store.add(voyage(name="two", text=moved))
+    assert store.profile(["one", "two"]).sensors.position.lever_arm_m == (0.7, -0.2)
+    assert "one and two were ingested with different lever arms" in caplog.text
+    caplog.clear()
+    store.profile(["two", "two"])
+    assert not caplog.text
