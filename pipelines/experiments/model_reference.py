@@ -1,0 +1,184 @@
+"""The pages docs/catalogue.md and docs/coefficients.md, from the code that they describe.
+
+python -m pipelines.experiments.model_reference --docs docs
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from shiplog.models.causes import CATALOGUE
+from shiplog.models.causes.base import Cause, Parameter
+from shiplog.models.coefficients import ParameterEntry
+from shiplog.models.mmg.parameters import TABLE
+from shiplog.report import tables
+
+CATALOGUE_HEAD = """# The catalogue of causes
+
+What `shiplog diagnose` tests and can name. Each cause is a term of the model that is zero where the
+cause is absent. [diagnosis.md](diagnosis.md) describes how one is chosen, and how to add one.
+
+The *realistic size* is the standard deviation of a change between two campaigns, from the
+literature that the cause's docstring names. Below the *practical size* a cause counts as no change.
+A cause that needs what the ship, its profile or the place lacks is listed as not testable, with
+that reason."""
+
+PARAMETERS = {  # as the report prints them
+    "current": "`speed` (m/s), `direction` (deg, towards, clockwise from north)",
+    "wind_force": "`surge_factor`, `sway_factor`, `yaw_factor` (of the model's force)",
+    "shallow_water": "`strength` (at the shallowest place: 0.3 at twice the draught)",
+    "bank": "`strength` (1 is a bank as published formulas have it)",
+    "fouling": "`factor` (of the resistance)",
+    "payload": "`mass` (kg), `position` (m ahead of midship)",
+    "cross_flow_drag": "`factor`",
+    "thrust_loss": "`factor` (0.7: 30 % of the thrust is lost), `actuator` if it is one of several",
+    "thrust_drift": "`slope` (change of the thrust over the campaign, as a share)",
+    "rudder_force": "`factor`",
+    "rudder_offset": "`port`, `starboard` or `angle` (deg, acting minus recorded)",
+    "rudder_lag": "`time` (s, of the first order)",
+    "rudder_delay": "`time` (s)",
+    "heading_offset": "`angle` (deg, measured minus true)",
+    "yaw_rate_bias": "`value` (deg/s, measured minus true)",
+    "yaw_rate_scale": "`value` (measured over true)",
+    "clock_offset": "`time` (s, positive where the channel is late against the heading), `channel` "
+    "(`position`, `velocity`, `gnss` for both, `yaw_rate`, `wind`)",
+    "antenna_offset": "`x` ahead, `y` to starboard (m from where the profile has it)",
+    "wind_direction_offset": "`angle` (deg, measured minus true)",
+    "wind_speed_scale": "`value` (measured over true)",
+}
+WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and practical size
+    "shallow_water": ("0.3", "0.05"),
+    "rudder_offset": ("4 deg", "0.3 deg"),
+}
+NEEDED = {
+    "yaw rate": "a yaw rate sensor",
+    "body velocity": "a velocity in body axes",
+    "wind": "a wind sensor",
+    "wind force": "a wind force in the model",
+    "rudder": "a rudder",
+    "steering": "a rudder, or azimuths",
+    "thrust": "a propeller or thruster",
+    "bank": "`banks` in the profile's `[site]`",
+}
+OF = {"speed": "of the usual speed", "length": "of the ship's length", "mass": "of the ship's mass",
+      "moment": "of mass times length"}  # fmt: skip
+KINDS = {"environment": "Surroundings", "ship": "Ship", "sensor": "Instruments"}
+
+CATALOGUE_TAIL = """
+`side_thrust` is an unrecorded thruster: a lateral force at one place that is on or off. It is
+found among the remainders rather than tested as a cause. Its parameters are `force` (N) or
+`acceleration` (m/s²), and the times at which it is on.
+
+## Causes that resemble each other
+
+A report proposes the test that separates a named cause from another one that these data cannot
+exclude.
+"""
+
+COEFFICIENTS_HEAD = """# The coefficients of the physics
+
+The keys of `<profile>.mmg.toml` (or `--parameters FILE`), of `coefficients.toml` in a run, and the
+names that `--free` takes: `--free 'wind.*'` lets the wind's coefficients alone move.
+[physics.md](physics.md) describes the forces.
+
+    source = "model tests of 2024"
+
+    [hull]
+    y_v = -0.3728
+    n_v = -0.1458
+
+    [wind]
+    y1 = 1.058
+
+A file has a section for each force that the ship has. A force that it lacks is left out with
+`--without`, which takes hull, propeller, rudder, thruster and wind. A value that is missing is
+named; one outside its range is refused. Where a neutral value is given, a file may leave the key
+out. Without a file, all coefficients are estimated from the particulars.
+
+Hull forces are non-dimensional by ½ρL_pp d U² (moments by ½ρL_pp² d U²), added masses by ½ρL_pp² d,
+inertia by ½ρL_pp⁴ d about the centre of gravity, and wind forces by the areas above water. The
+*plausible spread* is the share of a coefficient's own value by which it may differ from a published
+one, or the least amount if that is more; for estimated coefficients it is twice as large.
+Identification penalises differences from the starting value by it, and stays inside the range."""
+
+
+def catalogue() -> str:
+    """The page of causes."""
+    parts = [CATALOGUE_HEAD.strip(), ""]
+    for kind, title in KINDS.items():
+        rows = {c.name: _cause(c) for c in reversed(CATALOGUE) if c.kind == kind}
+        head = ("cause", "meaning", "parameters", "realistic size", "practical size", "needs")
+        parts += [f"## {title}\n", tables.table(head, [*reversed(rows.values())]), ""]
+    pairs = {
+        (c.name, other): (f"`{c.name}`", f"`{other}`", test)
+        for c in CATALOGUE
+        for other, test in c.separated_by.items()
+    }
+    parts += [CATALOGUE_TAIL.strip(), ""]
+    parts += [
+        tables.table(("cause", "resembles", "test that separates them"), [*pairs.values()]),
+        "",
+    ]
+    return "\n".join(parts)
+
+
+def _cause(cause: Cause) -> tuple[str, ...]:
+    realistic, practical = WITHOUT_PARAMETERS.get(cause.name) or (
+        _sizes(cause.parameters, "prior"),
+        _sizes(cause.parameters, "least"),
+    )
+    needs = " and ".join(NEEDED[need] for need in cause.needs) or "-"
+    return (f"`{cause.name}`", cause.story, PARAMETERS[cause.name], realistic, practical, needs)
+
+
+def _sizes(parameters: tuple[Parameter, ...], which: str) -> str:
+    """Each size once, in the unit of the report."""
+    sizes = []
+    for one in parameters:
+        value = getattr(one, which)
+        if one.unit.startswith("deg"):
+            value = np.degrees(value)
+        unit = OF.get(one.of, "" if one.unit == "1" else one.unit)
+        sizes.append(f"{value:.3g} {unit}".strip())
+    return ", ".join(dict.fromkeys(sizes))
+
+
+def coefficients() -> str:
+    """The page of coefficients."""
+    parts = [COEFFICIENTS_HEAD.strip(), ""]
+    for part, entries in TABLE.items():
+        parts.append(f"## [{part}]\n")
+        if part == "thruster":
+            parts.append("Keys begin with the thruster's name in the profile: `bow_ahead`.\n")
+        head = ("key", "symbol", "what it is", "unit", "spread", "range", "neutral")
+        parts += [tables.table(head, [_coefficient(part, *one) for one in entries.items()]), ""]
+    return "\n".join(parts)
+
+
+def _coefficient(part: str, key: str, entry: ParameterEntry) -> tuple[str, ...]:
+    spread = f"{100 * entry.share:.3g} %" if entry.share else ""
+    if entry.least:
+        spread += f"{', at least ' if spread else ''}{entry.least:g}"
+    neutral = "-" if entry.neutral is None else f"{entry.neutral:g}"
+    name = f"NAME_{key}" if part == "thruster" else key
+    return (
+        f"`{name}`", entry.symbol, entry.meaning, entry.unit, spread,
+        f"{entry.low:g} to {entry.high:g}", neutral,
+    )  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--docs", type=Path, default=Path("docs"), help="the folder of the pages")
+    folder = parser.parse_args().docs
+    (folder / "catalogue.md").write_text(catalogue(), encoding="utf-8")
+    (folder / "coefficients.md").write_text(coefficients(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
