@@ -22,7 +22,7 @@ from shiplog.training import load_model
 from shiplog.training.load_model import Run
 from shiplog.training.run_checks import refuse_other_columns, refuse_other_window
 from shiplog.training.voyages_to_test import held_back, say_twins
-from shiplog.voyages import one_hertz, windows
+from shiplog.voyages import windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
@@ -49,7 +49,7 @@ def evaluate_runs(
     names = held_back(opened, store, voyages)
     profile = store.profile(names)
     refuse_other_columns(first, profile.columns, "the chosen voyages")
-    rows = one_hertz.with_elapsed(store.seconds(names, profile))
+    rows = store.seconds(names, profile)
     for run in opened:
         say_twins(run, rows)
     size = first.config.window

@@ -36,8 +36,8 @@ def do(tasks: Sequence[Task], device: Device) -> dict[str, str]:
                 failures |= dict.fromkeys(run.names.values(), str(error))
         for seeds, over in advance(list(runs)):
             run = runs[seeds]
-            for seed, progress in seeds.progress.items():
-                share = share_done(progress.epoch, seeds.settings)
+            for seed in (*seeds.running, *over):
+                share = share_done(seeds.progress[seed].epoch, seeds.settings)
                 bars.show(run.names[seed], share, ended=seed in over)
             for seed in over:
                 name, progress = run.names[seed], seeds.progress[seed]

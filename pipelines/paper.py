@@ -141,7 +141,7 @@ def _first_half(store: Store, names: Sequence[str]) -> tuple[str, ...]:
     begins = dict(rows.group_by("voyage").agg(pl.col("time").min()).iter_rows())
     order = sorted(names, key=lambda n: (begins[n], n))
     if len(order) == 1:
-        return (_halved(order[0], lengths[order[0]]),)
+        return (_halved(order[0], rows["elapsed"]),)
     taken: list[str] = []
     for name in order[:-1]:
         if taken and sum(lengths[n] for n in [*taken, name]) > HALF * sum(lengths.values()):
@@ -150,10 +150,11 @@ def _first_half(store: Store, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(taken)
 
 
-def _halved(name: str, length: int) -> str:
-    """The first half of a voyage, or of a part of one, of `length` seconds."""
-    part = parts.parse(name) or parts.Part(name, 0, length)
-    return str(parts.Part(part.whole, part.begin, (part.begin + part.end) // 2))
+def _halved(name: str, elapsed: pl.Series) -> str:
+    """The first half of the usable seconds, each `elapsed` since the voyage's or part's begin."""
+    part = parts.parse(name) or parts.Part(name, 0, 0)
+    middle = int(elapsed[len(elapsed) // 2])
+    return str(parts.Part(part.whole, part.begin, part.begin + middle))
 
 
 def train_sets(

@@ -31,7 +31,6 @@ from shiplog.simulation import error_breakdown
 from shiplog.simulation.extended_simulator import campaign
 from shiplog.simulation.sensitivities import series
 from shiplog.training.load_model import Run
-from shiplog.voyages import one_hertz
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
@@ -107,7 +106,7 @@ def uncovered(
     run: Run, store: Store, names: Sequence[str], profile: Profile, cut: Windows
 ) -> list[Interval]:
     """Windows outside the training data."""
-    rows = one_hertz.with_elapsed(store.seconds(names, profile))
+    rows = store.seconds(names, profile)
     trained = covering.of(run.training(), profile.actuator_names, profile.has_wind)
     numbered = cut.plan.select(
         "voyage", pl.int_range(pl.len()).over("voyage").alias("window"), "segment", "start",

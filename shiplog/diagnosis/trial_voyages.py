@@ -17,7 +17,7 @@ from shiplog.models.starting_values import Start
 from shiplog.profile import Profile
 from shiplog.simulation.extended_simulator import ExtendedSimulator, campaign
 from shiplog.training.load_model import Run
-from shiplog.voyages import one_hertz, parts, recording, timescale, windows
+from shiplog.voyages import parts, recording, timescale, windows
 from shiplog.voyages.recording import Record
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -65,7 +65,7 @@ def in_ship_time(
 
 def windows_of(run: Run, store: Store, names: Sequence[str], profile: Profile) -> Windows | None:
     """As `evaluate` cuts them; None where no stretch is long enough for one."""
-    rows = one_hertz.with_elapsed(store.seconds(names, profile))
+    rows = store.seconds(names, profile)
     planned = plan(rows, "ref", run.config.window)
     if planned.height == 0:
         return None

@@ -161,7 +161,7 @@ def create(
     refuse_taken(path)
     if partial.exists():
         try:
-            _refuse_other(partial, config, training, validation)
+            _refuse_other(partial, config, profile, training, validation)
             for folder in (partial, *partial.glob("seed*")):
                 files.sweep(folder)
             return RunFolder(partial, config, profile)
@@ -184,17 +184,26 @@ def create(
 
 
 def _refuse_other(
-    partial: Path, config: Config, training: pl.DataFrame, validation: pl.DataFrame
+    partial: Path,
+    config: Config,
+    profile: Profile,
+    training: pl.DataFrame,
+    validation: pl.DataFrame,
 ) -> None:
-    """Raises RunError where a begun run has other settings or data; UnreadableError where these
-    cannot be read."""
-    same = configuration.load(partial / "config.toml") == config and all(
-        run_files.table(partial / f"{name}.parquet").equals(rows)
-        for name, rows in (("training", training), ("validation", validation))
+    """Raises RunError where a begun run has other settings, another profile or other data;
+    UnreadableError where these cannot be read."""
+    same = (
+        configuration.load(partial / "config.toml") == config
+        and run_files.json_of(partial / "profile.json") == profile.model_dump(mode="json")
+        and all(
+            run_files.table(partial / f"{name}.parquet").equals(rows)
+            for name, rows in (("training", training), ("validation", validation))
+        )
     )
     if not same:
         raise RunError(
-            f"{partial} was begun with other settings or data and is not finished.",
+            f"{partial} was begun with other settings, another profile or other data and is not "
+            "finished.",
             hint=f"finish it with its own settings, choose another --out, or remove {partial}.",
         )
 

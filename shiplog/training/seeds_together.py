@@ -129,7 +129,10 @@ def advance(
     runs: Sequence[SeedsTogether],
 ) -> Iterator[tuple[SeedsTogether, tuple[int, ...]]]:
     """Train all runs to their end, each on its own stream; after each epoch of a run, the run and
-    the seeds that ended with it."""
+    the seeds that ended with it. First those that had ended before, with a checkpoint there."""
+    for run in runs:
+        if before := tuple(seed for seed in run.progress if seed not in run.running):
+            yield run, before
     waiting = [run for run in runs if run.running]
     for run in waiting:
         run.launch()

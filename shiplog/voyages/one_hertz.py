@@ -71,14 +71,14 @@ def resample(
     circular: Iterable[str],
     least: int = LEAST_SAMPLES,
 ) -> pl.DataFrame:
-    """The 1 Hz table of some voyages: voyage, time, `columns`, samples, segment; sorted.
+    """The 1 Hz table of some voyages: voyage, time, `columns`, samples, elapsed, segment; sorted.
 
     tables: 10 Hz rows, one lazy table a voyage. `segment` counts from 0 in each voyage; within
-    one, the stamps are exactly 1 s apart.
+    one, the stamps are exactly 1 s apart. `elapsed` [s] counts from the voyage's first row, usable
+    or not, as the findings of its log and its parts do.
     """
     circular = frozenset(circular)
-    parts = [averages(day, columns, circular, least) for table in tables for day in days(table)]
-    return segments(pl.concat(parts))
+    return segments(pl.concat(_by_day(tables, columns, circular, least)))
 
 
 def sink_averages(
@@ -86,10 +86,19 @@ def sink_averages(
 ) -> None:
     """The same averages to Parquet, a file a day and voyage, for tables larger than memory."""
     folder.mkdir(parents=True, exist_ok=True)
-    circular = frozenset(circular)
-    parts = (part for table in tables for part in days(table))
-    for number, part in enumerate(parts):
-        averages(part, columns, circular).write_parquet(folder / f"{number:06d}.parquet")
+    for number, day in enumerate(_by_day(tables, columns, frozenset(circular), LEAST_SAMPLES)):
+        day.write_parquet(folder / f"{number:06d}.parquet")
+
+
+def _by_day(
+    tables: Iterable[pl.LazyFrame], columns: Sequence[str], circular: Iterable[str], least: int
+) -> Iterator[pl.DataFrame]:
+    """The averages of each voyage, a table a day, with `elapsed`."""
+    for table in tables:
+        begin = table.select(pl.col("time").min()).collect()["time"].to_physical().item()
+        elapsed = ((pl.col("time").cast(pl.Int64) - begin) * 1e-9).cast(pl.Float64)
+        for day in days(table):
+            yield averages(day, columns, circular, least).with_columns(elapsed=elapsed)
 
 
 def days(table: pl.LazyFrame) -> Iterator[pl.LazyFrame]:
@@ -122,12 +131,6 @@ def usable(seconds: pl.DataFrame) -> tuple[int, int]:
     """Of a 1 Hz table, how many seconds it has and how many windows of `WINDOW` fit into them."""
     lengths = seconds.group_by("voyage", "segment").len()["len"]
     return seconds.height, int((lengths // WINDOW).sum())
-
-
-def with_elapsed(seconds: pl.DataFrame) -> pl.DataFrame:
-    """Add `elapsed`: seconds from the voyage's first row, for axes and reports."""
-    first = pl.col("time").min().over("voyage")
-    return seconds.with_columns(elapsed=(pl.col("time") - first).dt.total_nanoseconds() * 1e-9)
 
 
 def twins(seconds: pl.DataFrame) -> dict[str, str]:

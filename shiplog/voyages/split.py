@@ -94,7 +94,7 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
         groups.setdefault(twin.get(name, name), []).append(name)
     _say_what_is_left_out(rows, names, usable, size)
     if len(groups) == 1:
-        return _in_time(store, rows, usable[0], size)
+        return _in_time(rows, usable[0], size)
     if not groups:
         raise StoreError(
             f"No voyage has a window of {size} s without a gap.",
@@ -121,13 +121,11 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     )
 
 
-def _in_time(store: Store, rows: pl.DataFrame, name: str, size: int) -> Split:
+def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
     """One voyage by time: its first part trains, then validates, its last part tests. Windows are
     cut in each part by itself, so that none crosses."""
-    own = rows.filter(pl.col("voyage") == name).with_columns(
-        # parts count from the voyage's first row, which may be long before its first usable one
-        elapsed=(pl.col("time") - store.begins(name)).dt.total_nanoseconds().clip(0) * 1e-9
-    )
+    own = rows.filter(pl.col("voyage") == name)
+    # parts count from the first row, which may be long before the first usable one
     elapsed = own["elapsed"].to_numpy()
     used = np.arange(1, len(elapsed) + 1) / len(elapsed)  # share of the usable seconds
     ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]

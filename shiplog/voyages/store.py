@@ -24,7 +24,6 @@ import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -238,10 +237,6 @@ class Store:
                 hint="ingest its log again: shiplog ingest LOG --store DIR.",
             )
         return pl.scan_parquet(folder / "table.parquet", hive_partitioning=False)
-
-    def begins(self, name: str) -> datetime:
-        """The time of a voyage's first row, usable or not: its parts count from there."""
-        return self._table(name).select(pl.col("time").min()).collect().item()
 
     def _part(self, name: str) -> parts.Part | None:
         """None where the name is that of a whole voyage, whatever it looks like."""

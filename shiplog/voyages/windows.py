@@ -92,14 +92,17 @@ def cut(
     first = (
         seconds.with_row_index("row")
         .group_by("voyage", "segment", maintain_order=True)
-        .agg(first=pl.col("row").first(), begin=pl.col("time").first())
-        .join(seconds.group_by("voyage").agg(departure=pl.col("time").min()), on="voyage")
+        .agg(first=pl.col("row").first())
     )
     plan = planned.join(first, on=["voyage", "segment"], how="left", maintain_order="left")
     begin = (plan["first"].cast(pl.Int64) + plan["start"]).to_numpy()
     rows = begin[:, None] + np.arange(size)
     times = seconds["time"].to_physical().to_numpy()[rows]
-    elapsed = (times[:, 0] - plan["departure"].to_physical().to_numpy()) * 1e-9
+    if "elapsed" in seconds.columns:
+        elapsed = seconds["elapsed"].to_numpy()[rows[:, 0]]
+    else:  # the rows of a run that has not kept it: from their first one
+        departure = seconds.select(pl.col("time").min().over("voyage"))["time"].to_physical()
+        elapsed = (times[:, 0] - departure.to_numpy()[rows[:, 0]]) * 1e-9
 
     def gather(names: tuple[str, ...]) -> np.ndarray:
         if not names:

@@ -107,7 +107,6 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
 
 def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
     """L of one window from errors.parquet, integrated again from rollouts and the 1 Hz rows."""
-    from shiplog.voyages.one_hertz import with_elapsed
     from shiplog.voyages.store import Store
 
     call("evaluate", run, "--store", store)
@@ -119,7 +118,7 @@ def test_evaluate_agrees_with_a_rollout_done_by_hand(run, store):
         (pl.col("window") == 1) & (pl.col("seed") == 0)
     )
     whole = Store(store)
-    rows = with_elapsed(whole.seconds([voyage], whole.profile([voyage])))
+    rows = whole.seconds([voyage], whole.profile([voyage]))
     second = pl.col("elapsed").round().cast(pl.Int64).alias("second")
     both = rollout.with_columns(pl.col("time").round().cast(pl.Int64).alias("second")).join(
         rows.with_columns(second), on="second", suffix="_measured"

@@ -17,7 +17,6 @@ from short_voyages import BOTH, HULL, STATES, WINDOW, scored, train
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
 from shiplog.training import extension_file, load_model
-from shiplog.voyages import one_hertz
 
 # ---------------------------------------------------------------- as published
 
@@ -105,7 +104,7 @@ def test_an_extension_was_fitted_to_its_own_voyages_and_shows_no_forces(publishe
     kept = load_model.load(extension_file.extend(run, tmp_path / "extended", after, []))
     assert run.fitted_to == run.trained_on == kept.trained_on
     assert kept.fitted_to == (*run.trained_on, "later")
-    rows = one_hertz.with_elapsed(run.training())
+    rows = run.training()
     assert run.forces(rows) is not None and kept.forces(rows) is None
 
 

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import polars as pl
 import pytest
 import sailing
@@ -9,7 +10,7 @@ import torch
 from commands import call
 
 from pipelines import gpu as on_gpu
-from pipelines.paper import choose_voyages
+from pipelines.paper import _halved, choose_voyages
 from shiplog.exceptions import StoreError
 from shiplog.report.paper import figures, sets
 from shiplog.training import gpu, network_files
@@ -183,6 +184,13 @@ def test_one_long_voyage_is_halved_for_the_reference_set(tmp_path):
     (whole,), (half,) = chosen.d_ref, chosen.reference
     assert whole == "a[0:209]"
     assert half == "a[0:104]"
+
+
+def test_the_first_half_is_half_of_what_can_be_used():
+    """Alongside without a fix for 2000 s, then 1000 s under way."""
+    elapsed = pl.Series(np.arange(2000.0, 3000.0))
+    assert _halved("a", elapsed) == "a[0:2500]"
+    assert _halved("a[600:3600]", elapsed) == "a[600:3100]"
 
 
 def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path):

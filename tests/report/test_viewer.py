@@ -170,3 +170,18 @@ def test_gaps_and_a_voyage_no_model_saw_are_drawn_as_they_are(compared, tmp_path
     viewer.save(partly, tmp_path / "partly.rrd")
     surge = scalars(tmp_path / "partly.rrd", "/state/harbour/surge/measured")
     assert len(surge) == SECONDS - 31 + 1 and np.isnan(surge).sum() == 2
+
+
+def test_a_track_between_two_grid_lines_has_a_chart(compared, tmp_path):
+    """Due north at 5 m/s, 100 m to the east: its narrow side holds no round number of metres."""
+    straight = compared.measured.filter(pl.col("voyage") == "harbour").with_columns(
+        x0=5.0 * pl.col("time"), y0=pl.lit(100.0), heading=pl.lit(0.0)
+    )
+    none = compared.simulated.clear()
+    path = tmp_path / "straight.rrd"
+    viewer.save(replace(compared, measured=straight, simulated=none, banks=()), path)
+    labels = rows(path, "/track/harbour/grid/labels", "Points2D:labels")["Points2D:labels"][0]
+    lines = rows(path, "/track/harbour/grid", "LineStrips2D:strips")["LineStrips2D:strips"][0]
+    assert [text for text in labels if text.startswith("x₀")]
+    across = [strip for strip in lines if strip[0][0] == strip[1][0]]
+    assert len(across) >= 4 and any(min(x[0] for x in strip) < 100.0 for strip in across)

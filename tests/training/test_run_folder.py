@@ -77,9 +77,15 @@ def test_the_same_command_goes_on_and_another_is_refused(begun):
     other = CONFIG.model_copy(update={"window": 50})
     with pytest.raises(RunError, match="other settings"):
         run_folder.create(out, other, PROFILE, model.scaling, ROWS, ROWS, ROWS)
+    longer = PROFILE.ship.model_copy(update={"length_m": 2.0 * PROFILE.ship.length_m})
+    with pytest.raises(RunError, match="another profile"):
+        run_folder.create(
+            out, CONFIG, PROFILE.model_copy(update={"ship": longer}), model.scaling,
+            ROWS, ROWS, ROWS,
+        )  # fmt: skip
     moved = ROWS.with_columns(surge=pl.col("surge") + 1e-15)
     for rows in ((ROWS, moved, ROWS), (ROWS, ROWS, moved)):
-        with pytest.raises(RunError, match="other settings or data"):
+        with pytest.raises(RunError, match="other data"):
             run_folder.create(out, CONFIG, PROFILE, model.scaling, *rows)
 
 

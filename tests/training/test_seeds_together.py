@@ -101,6 +101,16 @@ def test_several_runs_take_turns():
     assert order == [0, 1, 0, 1, 1, 1]
 
 
+def test_a_checkpoint_at_the_end_of_a_training_is_its_end():
+    """As it is left by a kill between the last checkpoint and the finished file."""
+    settings = Paper(most_epochs=2)
+    trainings = [training(seed, settings) for seed in (0, 1)]
+    ended, _ = together(trainings[:1])
+    run = SeedsTogether(trainings, CPU, ended)
+    assert run.running == (1,)
+    assert [seed for _, over in advance([run]) for seed in over] == [0, 1]
+
+
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU that torch can use")
 def test_a_gpu_trains_as_the_processor_does():
     settings = Paper(learning_rate=1e-3, regularisation=0.5, most_epochs=9)

@@ -131,3 +131,12 @@ def test_two_halves_and_the_whole_of_one_log_are_one_group():
     assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
     voyages = [named("a", whole[:30]), named("b", whole[30:]), named("c", whole)]
     assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
+
+
+def test_seconds_count_from_the_first_row_even_where_it_cannot_be_used():
+    quality = np.zeros(200, int)
+    quality[:50] = int(Quality.GAP)
+    result = seconds(rows(quality=quality, start=START + timedelta(milliseconds=300)))
+    since = (result["time"] - START).dt.total_milliseconds() - 300
+    assert result["elapsed"].to_list() == pytest.approx((since / 1000).to_list())
+    assert result["elapsed"][0] == pytest.approx(5.7)

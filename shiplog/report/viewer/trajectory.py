@@ -229,27 +229,27 @@ def _send_moving_hull(
     )
 
 
+def _round(span: tuple[float, float], step: float, beyond: float = 0.0) -> np.ndarray:
+    """The multiples of `step` in a span [m], and so far beyond it."""
+    first, last = math.ceil((span[0] - beyond) / step), math.floor((span[1] + beyond) / step)
+    return np.arange(first, last + 1) * step
+
+
 def _send_chart(recording: rr.RecordingStream, drawn: Drawn, voyage: str, room: float) -> None:
     """Grid lines at round metres, and what the site has."""
     east, north = extent(drawn, voyage, room)
     step = grid_step(max(east[1] - east[0], north[1] - north[0]))
-    meridians = np.arange(math.ceil(east[0] / step), math.floor(east[1] / step) + 1) * step
-    parallels = np.arange(math.ceil(north[0] / step), math.floor(north[1] / step) + 1) * step
     beyond = 3 * step  # lines go on where the view is wider than the track
-    grid = [
-        [(x, -north[1] - beyond), (x, beyond - north[0])]
-        for x in np.arange(meridians[0] - beyond, meridians[-1] + beyond + step / 2, step)
-    ]
-    grid += [
-        [(east[0] - beyond, -y), (east[1] + beyond, -y)]
-        for y in np.arange(parallels[0] - beyond, parallels[-1] + beyond + step / 2, step)
-    ]
+    meridians, parallels = _round(east, step, beyond), _round(north, step, beyond)
+    grid = [[(x, -north[1] - beyond), (x, beyond - north[0])] for x in meridians]
+    grid += [[(east[0] - beyond, -y), (east[1] + beyond, -y)] for y in parallels]
     recording.log(
         entity("track", voyage, "grid"),
         rr.LineStrips2D(grid, colors=style.GRID, radii=rr.Radius.ui_points(0.5), draw_order=1.0),
         static=True,
     )
     inside = 0.04 * (north[1] - north[0])
+    meridians, parallels = _round(east, step), _round(north, step)  # none in a narrow chart
     places = [(x, -north[0] - inside) for x in meridians]
     places += [(east[0], -y) for y in parallels]
     names = [f"y₀ {x:g}" for x in meridians] + [f"x₀ {y:g}" for y in parallels]
