@@ -13,6 +13,7 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.channels import UNUSABLE, WINDOW, Quality
+from shiplog.units import SECOND_NS
 
 ONE_SECOND = pl.duration(seconds=1)
 ONE_DAY = timedelta(days=1)
@@ -74,8 +75,8 @@ def resample(
     """The 1 Hz table of some voyages: voyage, time, `columns`, samples, elapsed, segment; sorted.
 
     tables: 10 Hz rows, one lazy table a voyage. `segment` counts from 0 in each voyage; within
-    one, the stamps are exactly 1 s apart. `elapsed` [s] counts from the voyage's first row, usable
-    or not, as the findings of its log and its parts do.
+    one, the stamps are exactly 1 s apart. `elapsed` counts whole seconds from the voyage's first
+    row, usable or not, as the findings of its log and its parts do.
     """
     circular = frozenset(circular)
     return segments(pl.concat(_by_day(tables, columns, circular, least)))
@@ -96,7 +97,7 @@ def _by_day(
     """The averages of each voyage, a table a day, with `elapsed`."""
     for table in tables:
         begin = table.select(pl.col("time").min()).collect()["time"].to_physical().item()
-        elapsed = ((pl.col("time").cast(pl.Int64) - begin) * 1e-9).cast(pl.Float64)
+        elapsed = ((pl.col("time").cast(pl.Int64) - begin) // SECOND_NS).cast(pl.Float64)
         for day in days(table):
             yield averages(day, columns, circular, least).with_columns(elapsed=elapsed)
 

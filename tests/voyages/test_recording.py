@@ -12,7 +12,7 @@ import pytest
 from shiplog import frames
 from shiplog import profile_file as profiles
 from shiplog.channels import Quality
-from shiplog.voyages import recording
+from shiplog.voyages import one_hertz, recording, windows
 
 PROFILE = profiles.load("esso-vectwin")
 BODY = profiles.load("esso-osaka")
@@ -226,3 +226,15 @@ def test_an_antenna_elsewhere_takes_its_velocity_along():
     assert back[:, 2] == pytest.approx(-(0.4 * s - 0.1 * c), abs=1e-12)
     assert back[:, 1] == pytest.approx(-0.1 * r, abs=1e-12)
     assert back[:, 3] == pytest.approx(-0.4 * r, abs=1e-12)
+
+
+def test_windows_and_the_record_count_time_from_one_row():
+    """A fix that comes after 100 s: x₀ says when each was measured."""
+    made = table(3000, quality=faulty(3000, (0, 1000))).with_columns(voyage=pl.lit("v0"))
+    seconds = one_hertz.resample([made.lazy()], PROFILE.columns, PROFILE.circular)
+    plan = windows.plan(seconds.lazy(), 50, 50).collect()
+    cut = windows.cut(seconds, plan, 50, PROFILE.actuator_names, PROFILE.wind_names)
+    record = read(made)
+    assert cut.plan["elapsed"][0] == 100.0
+    by_record = np.interp(cut.state[:, 0, 0], record.state[:, 0], record.time)
+    assert cut.plan["elapsed"].to_numpy() == pytest.approx(by_record, abs=1.0)
