@@ -68,7 +68,7 @@ class Quality(IntFlag):
     LIMITS = 4  # an actuator beyond the limits in the profile
     SPIKE = 8  # one sample far off both neighbours, which agree with each other
     HELD = 16  # the instrument repeats itself although the ship moves
-    FROZEN = 32  # held for longer than a second: a stale value, not data
+    FROZEN = 32  # held for longer than 3 s: a stale value, not data
     JUMP = 64  # the first row after a step in time or state without the other
 
 

@@ -245,8 +245,7 @@ class Actuator(Source):
         pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", description="of its column; letters, digits and _"
     )
     kind: Literal["rudder", "propeller", "azimuth", "thruster"] = Field(
-        description="an azimuth is the angle of a unit that turns all the way round, its thruster "
-        "next to it at the same place"
+        description="see the kinds below"
     )
     limits: tuple[Number, Number] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked. `mmg` "
@@ -261,9 +260,15 @@ class Actuator(Source):
         le=360.0,
         description="direction of the force of a fixed thruster, from ahead towards starboard, deg",
     )
-    diameter_m: Length | None = Field(None, description="of a propeller, m; for `mmg`, `hybrid`")
-    area_m2: Area | None = Field(default=None, description="of a rudder, m²; estimated")
-    span_m: Length | None = Field(default=None, description="of a rudder, m; estimated")
+    diameter_m: Length | None = Field(
+        default=None, description="of a propeller, m; needed for `mmg` and `hybrid`"
+    )
+    area_m2: Area | None = Field(
+        default=None, description="of a rudder, m²; estimated where left out"
+    )
+    span_m: Length | None = Field(
+        default=None, description="of a rudder, m; estimated where left out"
+    )
 
     @model_validator(mode="after")
     def _limited(self) -> Actuator:

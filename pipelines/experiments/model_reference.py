@@ -63,8 +63,10 @@ NEEDED = {
     "thrust": "a propeller or thruster",
     "bank": "`banks` in the profile's `[site]`",
 }
-OF = {"speed": "of the usual speed", "length": "of the ship's length", "mass": "of the ship's mass",
-      "moment": "of mass times length"}  # fmt: skip
+OF = {
+    "speed": "of the ship's rms speed", "length": "of the ship's length",
+    "mass": "of the ship's mass", "moment": "of mass times length",
+}  # fmt: skip
 KINDS = {"environment": "Surroundings", "ship": "Ship", "sensor": "Instruments"}
 
 CATALOGUE_TAIL = """
@@ -80,8 +82,8 @@ exclude.
 
 COEFFICIENTS_HEAD = """# The coefficients of the physics
 
-The keys of `<profile>.mmg.toml` (or `--parameters FILE`), of `coefficients.toml` in a run, and the
-names that `--free` takes: `--free 'wind.*'` lets the wind's coefficients alone move.
+The keys of `<profile>.mmg.toml` (or `--parameters FILE`), of `seed0/parameters.toml` in a run, and
+the names that `--free` takes: `--free 'wind.*'` lets the wind's coefficients alone move.
 [physics.md](physics.md) describes the forces.
 
     source = "model tests of 2024"

@@ -59,6 +59,9 @@ Position, velocity and heading are needed; yaw rate and wind are not. Without ac
 be ingested and its sensors checked, and no model can be trained. Axes: x0 to the north, y0 to the
 east, x ahead, y to starboard, angles clockwise; a positive rudder turns the bow to starboard; the
 wind's angle is where it blows from, clockwise from the bow.
+
+[catalogue.md](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
+[coefficients.md](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.
 """
 
 MEANT = {  # each kind of a sensor in words
@@ -70,6 +73,26 @@ MEANT = {  # each kind of a sensor in words
     "quaternion_ned": "z and w of a quaternion whose yaw counts from north towards east",
     "rate": "positive where the bow turns to starboard",
     "from_bow": "apparent wind: speed, and where it blows from, clockwise from the bow",
+}  # fmt: skip
+
+ACTUATORS = {  # kind → what its value is, in which units, and what `mmg` and `hybrid` make of it
+    "rudder": (
+        "angle, positive where it turns the bow to starboard", "deg, rad",
+        "it stands in the slipstream of the nearest propeller, if that is within one propeller "
+        "diameter athwart",
+    ),
+    "propeller": (
+        "revolutions of a fixed shaft, positive ahead", "rpm, rev/s", "its `diameter_m` is needed",
+    ),
+    "azimuth": (
+        "angle of a unit that turns all the way round, from ahead towards starboard", "deg, rad",
+        "it turns the thruster whose `position_m` is the same; that is a section of its own",
+    ),
+    "thruster": (
+        "command of a fixed thruster, or of an azimuth's: -1 to 1, positive ahead or along "
+        "`direction_deg`", "1, %, pwm; rpm, rev/s with `limits`",
+        "full thrust is at the larger of its limits, else at 1",
+    ),
 }  # fmt: skip
 
 
@@ -94,6 +117,8 @@ def text() -> str:
             "\n### Only of actuators\n",
             "One section each, in the order in which a model takes them.\n",
             _keys(profile.Actuator, actuator),
+            "\n### Kinds of actuators\n",
+            _actuators(),
             "\n## [site]\n",
             "What a chart shows; all optional.\n",
             _keys(profile.Site),
@@ -161,6 +186,14 @@ def _kinds() -> str:
         for kind in kinds
     ]
     return tables.table(("sensor", "kind", "fields", "what they are"), rows)
+
+
+def _actuators() -> str:
+    rows = [
+        (f"`{_toml(kind)}`", *ACTUATORS[kind])
+        for kind in typing.get_args(profile.Actuator.model_fields["kind"].annotation)
+    ]
+    return tables.table(("kind", "what its value is", "units", "in `mmg` and `hybrid`"), rows)
 
 
 def _channels() -> str:

@@ -94,7 +94,7 @@ class Balance:
 
     @property
     def excess(self) -> np.ndarray:
-        """[K, 3] N, N and N m by which the force surely exceeds the ship's own."""
+        """[K, 3] N, N and N m by which the force significantly exceeds the ship's own."""
         return np.abs(self.force) - self.own - thresholds.EXTERNAL_SPREADS * self.sd
 
 

@@ -11,8 +11,8 @@ are then named only if the interval of their joint gain lies above zero. A remai
 it can be an error of the causes' own equations puts none in doubt.
 
 Nor is a log Bayes factor a proof of causes that take the place of a refuted one, which was more
-probable. Their joint gain has to be sure, too. Next to other named causes, so has the own gain of
-each of them.
+probable. Their joint gain has to be significant, too. Next to other named causes, so has the own
+gain of each of them.
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ def _why_in_doubt(
 
 
 def _refuted(asked: Sequence[tuple[Named, Gain]]) -> tuple[frozenset[str], str] | None:
-    """Of causes whose whole interval is a loss the one that surely loses most, and why; together
-    with another one from which it is hard to separate."""
+    """Of causes whose whole interval is a loss the one whose loss is most certain, and why;
+    together with another one from which it is hard to separate."""
     worse = [pair for pair in asked if pair[1].high < 0.0]
     if not worse:
         return None
@@ -90,15 +90,15 @@ def _refuted(asked: Sequence[tuple[Named, Gain]]) -> tuple[frozenset[str], str] 
 def _unproved(
     asked: Sequence[tuple[Named, Gain]], first: Collection[str]
 ) -> tuple[frozenset[str], str] | None:
-    """Of causes that take a refuted one's place, next to others, the one that surely gains least,
-    and why; none where each surely gains something."""
+    """Of causes that take a refuted one's place, next to others, the one that gains least,
+    and why; none where the gain of each is significant."""
     unsure = [pair for pair in asked if pair[0].cause.name not in first and not pair[1].real]
     if not unsure or len(asked) == 1:
         return None
     one, worth = min(unsure, key=lambda pair: pair[1].low)
     return frozenset((one.cause.name,)), (
-        f"{TAKES_A_PLACE}, so this one is named only if it surely reduces the held-out error: "
-        f"here by {worth.low:.1%} to {worth.high:.1%}"
+        f"{TAKES_A_PLACE}, so this one is named only if it significantly reduces the "
+        f"held-out error: here by {worth.low:.1%} to {worth.high:.1%}"
     )
 
 
@@ -138,7 +138,7 @@ def judged(
         why = "" if gain.real else _why_in_doubt(search, found, decision, first)
         if why:
             why += (
-                ", so a cause is named only if it surely reduces the held-out error: "
+                ", so a cause is named only if it significantly reduces the held-out error: "
                 f"here by {gain.low:.1%} to {gain.high:.1%}"
             )
             doubted = dict.fromkeys(sorted(named), why)

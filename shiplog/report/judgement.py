@@ -33,7 +33,7 @@ class Against:
     @property
     def word(self) -> str:
         if self.low is None or self.high is None or self.low <= 1.0 <= self.high:
-            return "not surely better or worse"
+            return "not significantly better or worse"
         return "better" if self.high < 1.0 else "worse"
 
     @property

@@ -44,15 +44,17 @@ def sentence(
         assert structure is not None
         return _either(either or (SIDE_THRUST,), structure, ranking, why)
     if verdict == "undecided":
-        sure = [one for one in ranking if one["probability"] >= thresholds.STATED]
-        text = [f"{_answer(one['name'])} ({one['probability']:.0%})" for one in sure or ranking[:3]]
-        if sure:
+        stated = [one for one in ranking if one["probability"] >= thresholds.STATED]
+        text = [
+            f"{_answer(one['name'])} ({one['probability']:.0%})" for one in stated or ranking[:3]
+        ]
+        if stated:
             return (
                 f"Undecided: the log Bayes factor favours {' and '.join(text)}, which held-out "
                 "voyages do not confirm."
             )
-        stated = f"{thresholds.STATED:.0%}"
-        return f"Undecided: {' or '.join(text)}. No answer has a probability of {stated}."
+        least = f"{thresholds.STATED:.0%}"
+        return f"Undecided: {' or '.join(text)}. No answer has a probability of {least}."
     if verdict == "unknown":
         assert structure is not None
         return _unknown(structure, noise_factor)
@@ -84,8 +86,8 @@ def _named(
         )
     else:
         share = (
-            f"No part of the error on {gain.windows} held-out windows is surely explained: it "
-            f"is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
+            f"No significant part of the error on {gain.windows} held-out windows is explained: "
+            f"it is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
         )
     text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
     if alone is None:
@@ -170,7 +172,7 @@ def _likely(cause: dict) -> str:
     if cause["probability"] >= thresholds.STATED:
         return _or(cause)
     how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
-    return f"{how}, and not surely ({cause['probability']:.0%}): {_or(cause)}"
+    return f"{how} ({cause['probability']:.0%}): {_or(cause)}"
 
 
 def _or(cause: dict) -> str:

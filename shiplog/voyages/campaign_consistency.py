@@ -28,7 +28,7 @@ CAMPAIGN_ROWS = 72_000  # of a campaign at 10 Hz: every voyage gives its share o
 
 @dataclass(frozen=True)
 class Deviating:
-    """A voyage whose own estimate is surely another than the campaign's, by a practical size."""
+    """A voyage whose own estimate differs significantly, and by a practical size."""
 
     voyage: str
     estimate: Estimate
@@ -89,7 +89,7 @@ def campaign(tables: Mapping[str, pl.DataFrame], profile: Profile) -> SensorCamp
 
 
 def deviates(one: Estimate, other: Estimate) -> bool:
-    """Whether two estimates are surely apart, and by enough to matter."""
+    """Whether two estimates are significantly apart, and by enough to matter."""
     half = 0.5 * math.hypot(one.high - one.low, other.high - other.low)
     apart = abs(one.value - other.value)
     return apart > SURE_HALF_INTERVALS * half and apart > one.least

@@ -1,4 +1,4 @@
-"""Of held-out voyages: what makes the error surely greater is dropped, and nothing else."""
+"""Of held-out voyages: what makes the error significantly greater is dropped, and nothing else."""
 
 import math
 
@@ -57,7 +57,7 @@ def test_nothing_named_is_not_held_out(trial):
 
 
 @pytest.mark.parametrize("interval", (BETTER, UNSURE, HARDLY))
-def test_what_is_not_surely_worse_stays(trial, interval):
+def test_what_is_not_significantly_worse_stays(trial, interval):
     held = HeldOut({DRAG: interval})
     decision, _, gained, refuted = judged(weighed.search(trial, {(DRAG, NOMINAL): 1.0}), held)
     assert [one.cause.label for one in decision.named] == ["drag"]
@@ -107,7 +107,7 @@ def test_with_a_remainder_a_sure_gain_names_the_cause(trial):
     assert [one.cause.label for one in decision.named] == ["drag"]
 
 
-def test_what_is_surely_worse_is_dropped_and_the_next_is_judged(trial):
+def test_what_is_significantly_worse_is_dropped_and_the_next_is_judged(trial):
     """The likeliest is refuted; of the rest another is sure, and holds."""
     made = weighed.search(
         trial, {(DRAG, NOMINAL): 0.96, (LOAD, NOMINAL): 0.039, ((), NOMINAL): 1e-4}
@@ -158,8 +158,8 @@ def test_next_to_other_names_it_must_prove_itself_by_its_own_gain(trial, own, na
 
 @pytest.mark.parametrize(("which", "alike"), [("drag", "load"), ("load", "drag"), ("two", "drag")])
 def test_of_two_aliases_only_both_together_are_refuted(trial, monkeypatch, which, alike):
-    """Drag and load together are surely worse than the load alone, which says nothing of drag alone
-    where one can do the other's work. The relation holds whichever of them states it."""
+    """Drag and load together are significantly worse than the load alone, which says nothing of
+    drag alone where one can do the other's work. The relation holds whichever of them states it."""
     by = {cause.name: cause for cause in weighed.search(trial, {}).table.catalogue}
     monkeypatch.setattr(type(by[which]), "separated_by", {alike: "a test"}, raising=False)
     made = weighed.search(
@@ -263,7 +263,7 @@ def test_everything_refuted_ends_with_nothing(trial):
 
 
 def test_of_two_the_one_that_is_worth_least_goes_first(trial):
-    """Both are surely worse; the set without the worse one is judged again, and holds."""
+    """Both are significantly worse; the set without the worse one is judged again, and holds."""
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03})
     held = HeldOut(
         {("drag", "load"): BETTER, LOAD: BETTER}, {"drag": (-0.5, -0.2), "load": (-0.3, -0.1)}
@@ -276,7 +276,7 @@ def test_of_two_the_one_that_is_worth_least_goes_first(trial):
 
 
 def test_of_two_each_is_judged_over_the_other_alone(trial):
-    """Together they are better than nothing; one is surely worse than not having it."""
+    """Together they are better than nothing; one is significantly worse than not having it."""
     made = weighed.search(trial, {(("drag", "load"), NOMINAL): 0.97, (DRAG, NOMINAL): 0.03})
     held = HeldOut({("drag", "load"): BETTER, DRAG: BETTER}, {"drag": UNSURE, "load": WORSE})
     decision, _, _, refuted = judged(made, held)

@@ -90,7 +90,7 @@ def test_the_goals_table_counts_by_hand():
         "nothing hidden: a cause named": ("0/5", ""),
         "nothing hidden: any alarm": ("2/5", "no"),  # what failed did not say `none`
         "named but wrong, any size": ("1/31", "no"),
-        "outside, size 1: unknown or undecided, right family": ("1/1", "yes"),
+        "outside, size 1: unknown or undecided, right remainder": ("1/1", "yes"),
         "two at once, size 1: both, no third": ("1/2", "no"),
     }
     assert {what: (rows[what][1], rows[what][-1]) for what in counts} == counts
@@ -118,8 +118,8 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
     assert not learned(CURRENT, NONE | {"ranking": sure}).right
     assert not answer(lost, NONE).right and not learned(lost, named("current")).right
     of = "network on affected data: "
-    assert rows[f"{of}what it cannot take in"][1] == "1/2"
-    assert rows[f"{of}what it has taken in, named"][1] == "1/3"
+    assert rows[f"{of}what it cannot absorb"][1] == "1/2"
+    assert rows[f"{of}what it has absorbed, named"][1] == "1/3"
     assert rows[f"{of}named but wrong"][1] == "1/5"
     assert "one cause, size 1, 7000 s: named right" not in rows
     assert "named but wrong, any size" not in rows

@@ -26,5 +26,5 @@ def test_every_cause_and_every_coefficient_has_a_row():
     for entries in TABLE.values():
         for entry in entries.values():
             assert f"| {entry.symbol} " in numbers and f"| {entry.meaning} " in numbers
-    assert "| 4 deg " in causes and "| 0.25 of the usual speed " in causes
+    assert "| 4 deg " in causes and "| 0.25 of the ship's rms speed " in causes
     assert "| 2.5 deg " in causes  # an angle in degrees, not in radians

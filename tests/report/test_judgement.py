@@ -50,7 +50,7 @@ def test_what_differs_from_window_to_window_is_not_sure():
     loss = np.array([1.0, 1.0, 8.0, 8.0, 1.0, 1.0, 8.0, 8.0])
     found = judge("ref", errors(loss), {"hold": np.full(8, 4.0)}, 3.0, 100)
     (one,) = found.against
-    assert one.low < 1.0 < one.high and one.word == "not surely better or worse"
+    assert one.low < 1.0 < one.high and one.word == "not significantly better or worse"
 
 
 def test_windows_that_ran_away_are_counted_and_left_out():
@@ -72,7 +72,7 @@ def test_of_too_few_windows_there_is_no_interval(count):
     assert ("Too few windows for an interval." in found.sentence) == few
     assert (found.against[0].low is None) == few
     assert ("0.5 of the L of holding the velocity" in found.sentence) == few
-    assert found.against[0].word == ("not surely better or worse" if few else "better")
+    assert found.against[0].word == ("not significantly better or worse" if few else "better")
 
 
 def test_forces_of_a_voyage_in_a_line():

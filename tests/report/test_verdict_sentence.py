@@ -13,15 +13,15 @@ def test_what_it_may_be_instead_is_in_the_sentence():
     }  # fmt: skip
     output = sentence("named", [lag], None, Gain(500.0, 510.0, -0.05, 0.01, 18, {}), 1.0)
     assert output == (
-        "No part of the error on 18 held-out windows is surely explained: it is 2.0% more (5.0% "
-        "more to 1.0% less). The rudders lag; or it is rudder_delay: these data cannot tell."
+        "No significant part of the error on 18 held-out windows is explained: it is 2.0% more "
+        "(5.0% more to 1.0% less). The rudders lag; or it is rudder_delay: these data cannot tell."
     )
     sure = lag | {"indistinguishable_from": []}
     gained = Gain(500.0, 400.0, 0.1, 0.3, 18, {})
     assert sentence("named", [sure], None, gained, 1.0) == (
         "20% of the error on 18 held-out windows is explained (10% to 30%). The rudders lag."
     )
-    for probability, begins in ((0.53, "Likely, and not surely (53%): "), (0.4, "Perhaps, and ")):
+    for probability, begins in ((0.53, "Likely (53%): "), (0.4, "Perhaps (40%): ")):
         output = sentence("named", [sure | {"probability": probability}], None, gained, 1.0)
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 

@@ -1,5 +1,5 @@
-"""The goals' table: shares of cases with their intervals, and what is asked of each, at home and on
-ships of other families."""
+"""The goals' table: shares of cases with their intervals, and what is asked of each, on ships of
+the model's own family of equations ("home" in the code) and of other families ("abroad")."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ Test = Callable[[Answer], bool]
 Limits = tuple[float | None, float | None]  # at least, at most
 FREE: Limits = (None, None)
 FULL, SMALL = 1.0, 0.3
-SURE = 0.9
+STATED = 0.9
 NOT_MEASURED = "not measured"
+SAME, OTHER = "same family", "other families"  # of the ships' equations
 
 
 def full(answer: Answer) -> bool:
@@ -86,18 +87,18 @@ ONE = among("one", full)
 RATES = (
     Rate("named but wrong, any size", physics, lambda answer: answer.misnamed,
          (None, 0.015), (None, 0.03)),
-    Rate("named but wrong, and the truth not in the group it says", physics, outside_its_group),
+    Rate("named but wrong, and the truth not among its alternatives", physics, outside_its_group),
     Rate("nothing hidden: any alarm", among("none", seconds=None), alarmed,
          (None, 0.03), (None, 0.05)),
     Rate("nothing hidden: a cause named", among("none", seconds=None),
          lambda answer: bool(answer.named)),
     Rate("one cause, size 1, 7000 s: named right", ONE, right, (0.96, None), (0.75, None)),
-    Rate("the same: right in the group it says, or undecided and among the first two", ONE,
+    Rate("the same: right among its alternatives, or undecided and among the first two", ONE,
          lambda answer: answer.found, (0.98, None), (0.90, None)),
     Rate("one cause, size 0.3 to 1, 7000 s", among("one", small), right, (0.90, None)),
     Rate("one cause, size below 0.3, 7000 s", among("one", tiny), right),
     Rate("one cause, size 1, 500 s", among("one", full, 500), right, (0.88, None)),
-    Rate("outside, size 1: unknown or undecided, right family", among("outside", full),
+    Rate("outside, size 1: unknown or undecided, right remainder", among("outside", full),
          outside_found, (0.95, None), (0.80, None)),
     Rate("outside, size below 1", among("outside", lambda answer: not full(answer)),
          outside_found),
@@ -107,16 +108,16 @@ RATES = (
          (None, 0.0), (None, 0.0)),
 )  # fmt: skip
 NETWORK = (
-    Rate("network on affected data: what it cannot take in", _network(SURVIVE), right,
+    Rate("network on affected data: what it cannot absorb", _network(SURVIVE), right,
          (0.90, None)),
-    Rate("network on affected data: what it has taken in, named", _network(ABSORBED),
+    Rate("network on affected data: what it has absorbed, named", _network(ABSORBED),
          lambda answer: not answer.misnamed and bool(answer.named), (None, 0.0)),
     Rate("network on affected data: named but wrong", lambda answer: not physics(answer),
          lambda answer: answer.misnamed, (None, 0.02)),
 )  # fmt: skip
 INTERVALS = "90 % intervals that hold the truth"
 CALIBRATION = "expected calibration error, 10 bins"
-CERTAIN = f"said with {SURE} and more: right"
+CERTAIN = f"reported with {STATED} or more: right"
 LIMITS: dict[str, tuple[Limits, Limits]] = {  # what is not a share of cases: home, abroad
     INTERVALS: ((0.85, 0.95), (0.80, 0.95)),
     CALIBRATION: ((None, 0.04), (None, 0.06)),
@@ -136,7 +137,7 @@ def beliefs(answers: Iterable[Answer]) -> list[tuple[float, bool]]:
 
 
 def certain(answers: Iterable[Answer]) -> list[bool]:
-    return [hit for probability, hit in beliefs(answers) if probability >= SURE]
+    return [hit for probability, hit in beliefs(answers) if probability >= STATED]
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -192,7 +193,7 @@ ROWS: dict[str, tuple[Limits, Limits]] = {
 
 
 def table(home: Sequence[Answer], abroad: Sequence[Answer]) -> str:
-    """The goals' table of one program: measured, asked and met, at home and abroad."""
+    """The goals' table of one program: measured, asked and met, of both families."""
     measured = (figures(home), figures(abroad))
     rows = []
     for what, limits in ROWS.items():
@@ -203,7 +204,7 @@ def table(home: Sequence[Answer], abroad: Sequence[Answer]) -> str:
             share, text = found.get(what, (None, NOT_MEASURED if asked(limit) else ""))
             cells += [text, asked(limit), "" if share is None else met(share, limit)]
         rows.append((what, *cells))
-    return tables.table(("", "home", "goal", "met", "abroad", "goal", "met"), rows)
+    return tables.table(("", SAME, "goal", "met", OTHER, "goal", "met"), rows)
 
 
 def by_method(answers: Mapping[str, Sequence[Answer]], abroad: bool) -> str:

@@ -11,7 +11,7 @@ from pipelines.experiments.hidden_effects.score import FAILED, Answer
 
 PROGRAM = "this program"
 RIVALS = {"regression": "regression + BIC", "glr": "likelihood ratio"}
-NULL, RANDOM = "Null", "Random"
+NULL, RANDOM = "always none", "random answer"
 METHODS = (PROGRAM, *RIVALS.values(), NULL, RANDOM)
 
 

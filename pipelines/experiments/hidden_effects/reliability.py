@@ -48,7 +48,7 @@ def table(places: Mapping[str, Sequence[Belief]]) -> str:
         for place, beliefs in places.items()
         for one in bins(beliefs)
     ]
-    return tables.table(("", "said with", "mean", "right"), rows)
+    return tables.table(("", "reported with", "mean", "right"), rows)
 
 
 def svg(places: Mapping[str, Sequence[Belief]]) -> str:

@@ -258,7 +258,7 @@ def mistakes(answers: Sequence[Answer]) -> str:
     simulator = (
         "pipelines.experiments.other_families" if away else "pipelines.experiments.simulated_ship"
     )
-    head = ("case", "hidden", "said", "margin", f"python -m {simulator} case")
+    head = ("case", "hidden", "reported", "margin", f"python -m {simulator} case")
     return tables.table(head, rows)
 
 

@@ -158,17 +158,17 @@ def prevalence(answers: Sequence[Answer]) -> str:
 def table(answers: Mapping[str, Sequence[Answer]]) -> str:
     """A row a score, a column a method."""
     rows = {
-        "alarms on effects": alarms_on_effects,
-        "alarms on clean campaigns": alarms_on_clean,
+        "alarms where something is hidden": alarms_on_effects,
+        "alarms where nothing is hidden": alarms_on_clean,
         "right among alarms": right_among_alarms,
     }
     lines = [(what, *(cell(of(given)) for given in answers.values())) for what, of in rows.items()]
     means = {
-        "FIA, mean probability of the true cause among those detected": isolation,
-        "m_utl, cases with an effect": lambda given: _mean(
+        "isolation: mean probability of the truth among cases with an alarm": isolation,
+        "repair utility, cases with something hidden": lambda given: _mean(
             [group_utility(a) for a in given if a.kind != "none"]
         ),
-        "m_utl, all cases": lambda given: _mean([group_utility(a) for a in given]),
+        "repair utility, all cases": lambda given: _mean([group_utility(a) for a in given]),
         f"log score, nats, at least ln {FLOOR}": lambda given: _mean([log_score(a) for a in given]),
     }
     for what, of in means.items():

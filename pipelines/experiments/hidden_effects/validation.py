@@ -24,7 +24,8 @@ from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Sc
 from shiplog.exceptions import ShiplogError
 from shiplog.report import tables
 
-PLACES = ("home", "abroad")
+PLACES = (goals.SAME, goals.OTHER)
+SUITES = {"goals": goals.SAME, "abroad": goals.OTHER}  # which ships a suite is of
 
 
 class Mixed(ShiplogError):
@@ -55,8 +56,8 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     of = one_program(answers)
     _once(answers)
     by_place = {
-        "home": [answer for answer in answers if not answer.abroad],
-        "abroad": [answer for answer in answers if answer.abroad],
+        goals.SAME: [answer for answer in answers if not answer.abroad],
+        goals.OTHER: [answer for answer in answers if answer.abroad],
     }
     there = {place: by_place[place] for place in PLACES if by_place[place]}
     beliefs = {place: goals.beliefs(given) for place, given in there.items()}
@@ -65,18 +66,17 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     parts = [
         "# Validation on hidden effects",
         _head(found, answers, of),
-        LEGEND,
+        _legend(answers),
         "## What went wrong",
-        *(part for place, given in there.items() for part in (f"### {place.capitalize()}",
-                                                              misses(given))),
+        *(part for place, given in there.items() for part in (f"### {_of(place)}", misses(given))),
         "## Goals, this program",
         INTERVAL,
-        goals.table(by_place["home"], by_place["abroad"]),
+        goals.table(by_place[goals.SAME], by_place[goals.OTHER]),
         *(part for place, given in there.items() for part in _methods(place, given)),
         "## Reliability",
-        *([f"![Share right over the probability said]({picture})"] if picture else []),
+        *([f"![Share right over the reported probability]({picture})"] if picture else []),
         reliability.table(beliefs),
-        "## Parameters: coverage and ranks",
+        "## Parameters: intervals and ranks",
         PARAMETERS,
         ranks.coverage_table(standing),
         ranks.rank_table(standing),
@@ -85,24 +85,76 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
     return Page("\n\n".join(parts), reliability.svg(beliefs))
 
 
+COMMAND = """\
+    python -m pipelines.experiments.hidden_effects scores docs/validation-answers.tar.xz \\
+        --markdown docs/validation.md"""
+INTRODUCTION = """\
+How often a verdict of `shiplog diagnose` is right, measured on simulated ships. In each case a ship
+makes a nominal campaign, from which a model is identified (`train --model mmg`). In a later trial
+of 7000 or 500 s (longer for a large ship) nothing is hidden, or one cause of the
+[catalogue](catalogue.md), or two causes, or an effect outside the catalogue. Each verdict was
+stored with its hash before the hidden answer was read. The [glossary](glossary.md) defines the
+terms of a verdict.
+
+*Same family of equations*: a ship of MMG form, as the model is. The simulator shares no code with
+shiplog, its propeller and rudder formulas differ, and all coefficients have to be identified.
+*Other families of equations*: a merchant ship with Abkowitz's polynomials (`abkowitz`), a supply
+vessel with linear damping (`linear_dp`), a catamaran with two fixed thrusters (`catamaran`), a
+ferry with azimuth thrusters (`azimuth_ferry`), and the KVLCC2 of the package shipmmg (`shipmmg`).
+
+Cases that were run:"""
 LEGEND = """\
-- **Home** is the simulator's MMG ship; **abroad** are ships of other equations, by family.
-- **Cases of one seed** at home share ship, weather and noise: intervals over them are too narrow.
-- **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it.
-- **Named but wrong**: the verdict names a cause that is not hidden in the case.
-- **Null** is a method that always answers `none`.
-- **Random** is a method that draws `none` or a cause of the catalogue, all equally likely.
-- **FIA** is the mean probability that a method gives to the true cause in cases that it detects.
-- **m_utl** is 1 less the share of all components that a repair by the answer tests in vain."""
+Words of the tables:
+
+- **x1** is a realistic size of what is hidden; **x0.3** is three tenths of it. *Size 1* and *size
+  0.3* are the same.
+- **Right**: the verdict names all that is hidden and nothing else; where nothing is hidden, it is
+  `none`; outside the catalogue it is `unknown` with the right remainder (position, heading, time,
+  motion, controls, wind, stochastic or intermittent).
+- **Named but wrong**: the verdict names a cause that is not hidden in the case. Its *alternatives*
+  are the causes that the verdict lists after "or it is".
+- **An alarm** is any verdict other than `none`.
+- **Probability** is the one that the verdict gives to its answer: the first cause named, the
+  remainder of `unknown`, or the first answer of its ranking. `undecided` often has two with 0.5.
+- **Always none** always answers `none`. **Random answer** draws `none` or a cause of the catalogue,
+  all equally likely.
+- **Isolation** (FIA) is the mean probability that a method gives to the truth, in the cases in
+  which something is hidden and that it answers with an alarm.
+- **Repair utility** (m_utl, Feldman et al. 2010) is 1 less the share of all components that a
+  repair tests in vain if it follows the answer. Each cause is a component; what is outside the
+  catalogue is one more.
+- **Log score** is the mean logarithm of the probability that is given to the truth; 0 is perfect.
+- **Expected calibration error** is the mean difference between reported probability and share
+  right.
+- Cases with the same number before the hyphen have the same ship, weather and noise: intervals
+  over them are too narrow."""
+RIVALS = {
+    "regression": "- **Regression + BIC** regresses the accelerations on each cause's term and "
+    "chooses by Schwarz's criterion.",
+    "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
+    "as white noise.",
+}
+COST = "Processor time, elapsed time and memory of `shiplog diagnose` on one core, a case."
 INTERVAL = (
     "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
-    f"at {100 * LEVEL:.0f} %."
+    f"at {100 * LEVEL:.0f} %.\nA goal is what is asked of the program."
 )
-PARAMETERS = (
-    "Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; "
-    "those of one case are not independent. Coverage at other levels than 90 % is implied by them. "
-    "A rank is the truth's quantile (simulation-based calibration)."
-)
+PARAMETERS = """\
+Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; those
+of one case are not independent. The first table has the share of them that contain the truth;
+levels other than 90 % are implied. A rank is the quantile of the truth in its interval
+(simulation-based calibration, Talts et al. 2018)."""
+
+
+def _of(place: str) -> str:
+    """As a heading: "Same family of equations". Suites that have no such name keep their own."""
+    return f"{place.capitalize()} of equations" if place in PLACES else place
+
+
+def _legend(answers: Sequence[Answer]) -> str:
+    """The words of the tables; of simpler methods those that were asked."""
+    asked = {rival for answer in answers for rival in answer.rivals}
+    return "\n".join((LEGEND, *(words for rival, words in RIVALS.items() if rival in asked)))
 
 
 def one_program(answers: Sequence[Answer]) -> str:
@@ -128,24 +180,25 @@ def _once(answers: Sequence[Answer]) -> None:
 
 def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
     lines = [
-        f"Program: `{of}`. Output of `python -m pipelines.experiments.hidden_effects scores DIR "
-        "[DIR ...] --markdown docs/validation.md`; every verdict was sealed before its key was "
-        "opened.",
+        COMMAND,
+        "",
+        INTRODUCTION,
         "",
     ]
-    for score in found:
+    for score in sorted(found, key=lambda one: SUITES.get(one.suite) != goals.SAME):
         done = len(score.answers)
-        line = f"- {score.suite}: {done} of {done + len(score.pending) + len(score.unmade)} cases"
+        place = _of(SUITES.get(score.suite, score.suite))
+        line = f"- {place}: {done} of {done + len(score.pending) + len(score.unmade)} cases"
         line += f"; {len(score.pending)} not run" if score.pending else ""
         line += f"; {len(score.unmade)} whose logs could not be written" if score.unmade else ""
         lines.append(line)
     trained = program.names((s for a in answers for s in a.steps), ("train",))
     if trained and trained != (of,):
-        lines.append(f"- models identified by {', '.join(f'`{one}`' for one in trained)}")
+        lines.append("- models identified by another version than that which diagnosed")
     if of == program.UNRECORDED:
-        lines.append("- which program it was is not recorded: these figures stand for no commit")
+        lines.append("- which version of the program it was is not recorded")
     elif of.endswith("+changes"):
-        lines.append("- the source held changes that this commit does not")
+        lines.append("- the program held changes that no version has")
     return "\n".join(lines)
 
 
@@ -154,24 +207,26 @@ def _methods(place: str, given: Sequence[Answer]) -> list[str]:
     asked = [f"{method} {len(of)}" for method, of in by.items() if len(of) < len(given)]
     fewer = f" Asked of fewer cases: {', '.join(asked)}." if asked else ""
     return [
-        f"## All methods, {place}",
+        f"## All methods: {place} of equations",
         f"{len(given)} cases; prevalence: {scores.prevalence(given)}.{fewer}",
-        goals.by_method(by, place == "abroad"),
+        goals.by_method(by, place == goals.OTHER),
         scores.table(by),
     ]
 
 
 def _cost(place: str, given: Sequence[Answer]) -> list[str]:
     rows = score_tables.times(given)
-    return [f"## Cost, {place}", tables.table(score_tables.HEAD, rows)] if rows else []
+    if not rows:
+        return []
+    return [f"## Cost: {place} of equations", COST, tables.table(score_tables.HEAD, rows)]
 
 
 # --- misses ---------------------------------------------------------------------------------------
 
 WORST = (
-    "wrong name", "wrong name, the truth in its group", "false alarm", "no verdict",
-    "wrong family", "not all of it", "missed", "undecided", "undecided, the truth among the first",
-    "other",
+    "wrong name", "wrong name, the truth among its alternatives", "false alarm", "no verdict",
+    "wrong remainder", "not all of it", "missed", "undecided",
+    "undecided, the truth among the first", "other",
 )  # fmt: skip
 
 
@@ -186,9 +241,9 @@ def misses(answers: Sequence[Answer]) -> str:
          score_tables.hidden(a), score_tables.reported(a), _probability(a), how(a))
         for a in wrong
     ]  # fmt: skip
-    family = ["family"] if wrong[0].abroad else []
+    family = ["type of ship"] if wrong[0].abroad else []
     return tables.table(
-        ("case", *family, "trial", "hidden", "said", "probability", "what went wrong"), rows
+        ("case", *family, "trial", "hidden", "reported", "probability", "what went wrong"), rows
     )
 
 
@@ -197,7 +252,7 @@ def how(answer: Answer) -> str:
     if answer.word == FAILED:
         return "no verdict"
     if answer.misnamed:
-        return "wrong name, the truth in its group" if answer.found else "wrong name"
+        return "wrong name, the truth among its alternatives" if answer.found else "wrong name"
     if answer.kind == "none":
         return "false alarm"
     if answer.word == "undecided":
@@ -206,7 +261,7 @@ def how(answer: Answer) -> str:
         return "not all of it"
     if answer.word == "none":
         return "missed"
-    return "wrong family" if answer.kind == "outside" and answer.word == "unknown" else "other"
+    return "wrong remainder" if answer.kind == "outside" and answer.word == "unknown" else "other"
 
 
 def _probability(answer: Answer) -> str:

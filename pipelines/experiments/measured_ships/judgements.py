@@ -7,8 +7,8 @@ JUDGEMENTS: dict[str, str] = {
         "Believable. The tests are of one ship, from July to November 2020, and no change of the "
         "ship is known. In the berthings of 12 November the yaw rate is about 0.9 s late ([Esso "
         "Osaka](results/esso_osaka.md)); such berthings are among the nominal voyages, too, so "
-        "that this is no change between the two campaigns. Eight tests do not make it sure. On "
-        "tests that were held out, the physics have half of the regression's L."
+        "that this is no change between the two campaigns. Eight tests are too few to confirm it. "
+        "On tests that were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
         "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
@@ -23,7 +23,8 @@ JUDGEMENTS: dict[str, str] = {
         "predicts zigzags better than the physics, and `evaluate` says so."
     ),
     "kvlcc2, full scale": (
-        "Believable. All six tests are of one series: no change comes first, and is not sure."
+        "Believable. All six tests are of one series: no change is the most probable answer, and "
+        "has less than 90 %."
     ),
     "blueboat": (
         "Not believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "

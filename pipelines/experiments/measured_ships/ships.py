@@ -43,7 +43,7 @@ DATA_SETS: dict[str, DataSet] = {
         profile="esso-osaka",
     ),
     "esso-osaka, published": DataSet(
-        "the same, published coefficients",
+        "Esso Osaka, published coefficients",
         "frt-ds-esso",
         tables=("random/*", "turning/*", "zigzag/*", "berthing/*"),
         profile="esso-osaka",

@@ -189,6 +189,6 @@ is when it measured; messages reach the recorder (`log_time`) 5 to 40 ms later.
 
 Seasons 2, 3 and 4 are the same ship and the same instruments half a year later each. In some of
 them something is hidden, and a model of voyages 1 to 6 will not follow them; one season may hide
-more than one thing, or nothing, or what no catalogue has. `shiplog diagnose` is to say which. No
-code reads `answers/`; look there afterwards.
+more than one thing, or nothing, or what no catalogue has. `shiplog diagnose` is to say which.
+shiplog never reads `answers/`; look there afterwards.
 """
