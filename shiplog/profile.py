@@ -122,9 +122,9 @@ class Source(Section):
             raise ValueError("both `field` and `fields` are given; keep one")
         for sign in self._each(self.sign):
             _require_factor(sign)
-        for name in ("units", "sign", "offset"):
+        for name in ("sign", "offset", *(["units"] if self.units else [])):
             value = getattr(self, name)
-            if isinstance(value, tuple) and value and len(value) != len(self.paths):
+            if isinstance(value, tuple) and len(value) != len(self.paths):
                 raise ValueError(f"`{name}` has {len(value)} entries for {len(self.paths)} fields")
         return self
 

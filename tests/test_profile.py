@@ -37,6 +37,8 @@ def test_every_shipped_profile_is_taken(name):
         ("sign = -1.0", "sign = 0", "`sign` is 0, and every value would be"),
         ("sign = -1.0", "sign = -1e308", "`sign` is -1e+308; it is 1, -1 or another factor"),
         ("sign = -1.0", "sign = 1e-300", "`sign` is 1e-300; it is 1, -1 or another factor"),
+        ("sign = -1.0", "sign = []", "`sign` has 0 entries for 1 fields"),
+        (ARM, "offset = []", "`offset` has 0 entries for 2 fields"),
         (SIGMA, "sigma = 1e-200", "`sigma` is 1e-200; it is 0 or at least 1e-09"),
         ("[-35.0, 35.0]", "[35.0, -35.0]", "the lower one stands first"),
         ("[-35.0, 35.0]", "[-inf, inf]", f"actuators.0.limits.0 {FINITE}"),
