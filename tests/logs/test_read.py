@@ -21,6 +21,8 @@ from made_logs import (
     protobuf_log,
     sample,
 )
+from mcap.reader import make_reader
+from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, IndexType, Writer
 from polars.testing import assert_frame_equal
 
@@ -258,6 +260,14 @@ def on_the_walk(monkeypatch):
     return given
 
 
+def chunk_indexes(path: Path) -> list[ChunkIndex]:
+    """In the order of the file."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary
+    return sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
+
+
 NUMBERS = ("value", "small", "signed", "point.x", "maybe", "timestamp.nanos")
 
 
@@ -312,6 +322,17 @@ def test_chunks_too_large_to_be_unpacked_at_once_are_decoded_on_the_walk(
     monkeypatch.setattr(preflight.Waiting, "take_alone", missing)
     assert_same(path, {}, others=True)
     assert on_the_walk == [] and missed
+
+
+def test_what_large_chunks_began_a_small_one_ends(tmp_path, on_the_walk, monkeypatch):
+    """Texts and bytes in messages of 100 bytes: none of them twice, whoever decodes the last."""
+    wanted = {t: ("value", "names") for t in ("/a", "/b", "/c")}
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    *large, last = (chunk.uncompressed_size for chunk in chunk_indexes(path))
+    assert last < min(large)
+    monkeypatch.setattr(chunks_module, "AT_ONCE", last)
+    assert {frame.height for frame in assert_same(path, wanted).frames.values()} == {300}
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
 
 
 def test_a_topic_of_two_channels_is_not_decoded_on_the_walk(tmp_path, on_the_walk):
