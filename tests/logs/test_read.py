@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import polars as pl
@@ -17,6 +16,7 @@ from made_logs import (
     by_hand,
     by_the_package,
     chunks,
+    json_log,
     known_colours,
     protobuf_log,
     sample,
@@ -188,39 +188,6 @@ def test_undecodable_topics_are_named_and_the_rest_is_kept(tmp_path):
     assert found.health.messages_read == 5
     with pytest.raises(LogUnreadable, match="wrong_format"):
         read(path, {"/odd": ("value",)})
-
-
-def json_log(path: Path, messages) -> Path:
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        channel = writer.register_channel("/j", "json", 0)
-        for when, published, message in messages:
-            writer.add_message(channel, when, json.dumps(message).encode(), published)
-        writer.finish()
-    return path
-
-
-@pytest.mark.parametrize(
-    "stamp",
-    [
-        {"timestamp": {"sec": 1_700_000_000, "nsec": 5}},
-        {"stamp": {"sec": 1_700_000_000, "nanosec": 5}},
-        {"header": {"stamp": {"seconds": 1_700_000_000, "nanos": 5}}},
-        {"timestamp": "2023-11-14T22:13:20.000000005Z"},
-        {"timestamp": "2023-11-14T23:13:20.000000005+01:00"},
-        {"timestamp": "2023-11-14T22:13:20.000000005"},
-        {"timestamp": 1_700_000_000_000_000_005},
-    ],
-)
-def test_every_way_to_say_when_gives_one_stamp(tmp_path, stamp):
-    path = json_log(tmp_path / "t.mcap", [(START, START, stamp | {"x": 1})] * 2)
-    assert read(path).frames["/j"]["stamp"].to_list() == [START + 5] * 2
-
-
-def test_counters_are_no_clocks(tmp_path):
-    path = json_log(tmp_path / "t.mcap", [(START, START, {"timestamp": 12.5})])
-    assert read(path).frames["/j"]["stamp"].to_list() == [None]
 
 
 def test_repeats_and_clocks_are_found(tmp_path):
