@@ -316,8 +316,8 @@ class Column(Section):
     channel: str = Field(description="what it holds; see the channels below")
     unit: str | None = Field(
         default=None, description='of numbers, such as "deg" or "kn", SI where left out. Of a time '
-        '"s", "ms", "us" or "ns"; without one it is Unix time by its size, or else seconds from '
-        "any start"
+        '"s", "ms", "us" or "ns"; without one it is Unix time by its size, a time of day where it '
+        "counts as hhmmss, or else seconds from any start"
     )  # fmt: skip
     sign: float = Field(default=1.0, description="-1 turns the column round")
     offset: Number = Field(
@@ -325,7 +325,7 @@ class Column(Section):
     )
     format: str | None = Field(
         default=None, description="of a time or date that is no ISO text, in strptime's letters: "
-        '"%d.%m.%Y %H:%M:%S"'
+        '"%d.%m.%Y %H:%M:%S"; of a number, too: "%H%M%S"'
     )  # fmt: skip
     only: str | int | None = Field(
         default=None, description="of a `vessel` column: the one value whose rows are this ship's"
