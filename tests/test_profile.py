@@ -58,6 +58,21 @@ def test_what_cannot_be_is_refused_with_its_key(old, new, words):
     assert "constrained" not in found.value.message and "tuple[" not in found.value.message
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"local"', '"geodetic"', "sensors.position of kind 'geodetic' needs a unit"),
+        ("[ship]", "[table]\nLat = 'latitude'\n[ship]", "[table] 'Lat' needs a unit"),
+    ],
+)
+def test_a_place_on_earth_has_its_unit(old, new, words):
+    text = sailing.PROFILE.replace('unit = "m"', "")
+    sailing.profile(text)
+    with pytest.raises(ProfileError) as found:
+        sailing.profile(text.replace(old, new))
+    assert words in found.value.message and '"deg"' in found.value.message
+
+
 def numbers(content, place=()):
     """The place of every number in a TOML's content."""
     if isinstance(content, dict):
