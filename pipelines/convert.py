@@ -82,8 +82,8 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
     if is_bag(path):
         refuse_existing(target)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if left_out := bag_to_log(path, target, ship):
-            done.lost[str(path)] = "; ".join(f"{t}: {why}" for t, why in left_out.items())
+        if lost := bag_to_log(path, target, ship):
+            done.lost[str(path)] = "; ".join(lost)
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():

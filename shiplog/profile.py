@@ -29,6 +29,7 @@ Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]  # of a ship's part
 Area = Annotated[float, Field(ge=1e-6, le=LONGEST_M * 100.0)]  # nothing on a ship is 100 m high
 Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=360.0)]
+NO_ANGLE = 'needs a unit: nearly every instrument gives "deg", and without one it would be "rad"'
 Chart = Annotated[float, Field(ge=-1e7, le=1e7)]  # m, a quarter of the Earth's girth
 
 
@@ -79,7 +80,9 @@ class Source(Section):
         "a dot goes into a part of it"
     )  # fmt: skip
     field: str | None = Field(default=None, description="the same where there is one value")
-    unit: str | None = Field(default=None, description="of all values; SI where left out")
+    unit: str | None = Field(
+        default=None, description="of all values; SI where left out; a geodetic position needs it"
+    )  # fmt: skip
     units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
     sign: float | tuple[float, ...] = Field(
         default=1.0, description="-1 turns the values round; one number, or one for each field"
@@ -122,9 +125,9 @@ class Source(Section):
             raise ValueError("both `field` and `fields` are given; keep one")
         for sign in self._each(self.sign):
             _require_factor(sign)
-        for name in ("units", "sign", "offset"):
+        for name in ("sign", "offset", *(["units"] if self.units else [])):
             value = getattr(self, name)
-            if isinstance(value, tuple) and value and len(value) != len(self.paths):
+            if isinstance(value, tuple) and len(value) != len(self.paths):
                 raise ValueError(f"`{name}` has {len(value)} entries for {len(self.paths)} fields")
         return self
 
@@ -219,6 +222,8 @@ class Sensors(Section):
                     f"sensors.{name} of kind {kind!r} needs {FIELD_COUNT[kind]} field(s), "
                     f"not {len(sensor.paths)}"
                 )
+            if kind == "geodetic" and not (sensor.unit or sensor.units):
+                raise ValueError(f"sensors.{name} of kind {kind!r} {NO_ANGLE}")
         return self
 
     def kind(self, name: str) -> str:
@@ -320,9 +325,10 @@ class Column(Section):
 
     channel: str = Field(description="what it holds; see the channels below")
     unit: str | None = Field(
-        default=None, description='of numbers, such as "deg" or "kn", SI where left out. Of a time '
-        '"s", "ms", "us" or "ns"; without one it is Unix time by its size, or else seconds from '
-        "any start"
+        default=None, description='of numbers, such as "deg" or "kn"; SI where left out; a '
+        'latitude or longitude needs it. Of a time "s", "ms", "us" or "ns"; without one it is Unix '
+        "time by its size, a time of day where it "
+        "counts as hhmmss, or else seconds from any start"
     )  # fmt: skip
     sign: float = Field(default=1.0, description="-1 turns the column round")
     offset: Number = Field(
@@ -330,7 +336,7 @@ class Column(Section):
     )
     format: str | None = Field(
         default=None, description="of a time or date that is no ISO text, in strptime's letters: "
-        '"%d.%m.%Y %H:%M:%S"'
+        '"%d.%m.%Y %H:%M:%S"; of a number, too: "%H%M%S"'
     )  # fmt: skip
     only: str | int | None = Field(
         default=None, description="of a `vessel` column: the one value whose rows are this ship's"
@@ -372,6 +378,8 @@ class Profile(Section):
                     f"ship does not have{nearest(entry.channel, known)}. "
                     f"Its channels: {listed(known, most=len(known))}"
                 )
+            if entry.channel in ("latitude", "longitude") and entry.unit is None:
+                raise ValueError(f"[table] {column!r} {NO_ANGLE}")
         return self
 
     @property

@@ -37,6 +37,8 @@ def test_every_shipped_profile_is_taken(name):
         ("sign = -1.0", "sign = 0", "`sign` is 0, and every value would be"),
         ("sign = -1.0", "sign = -1e308", "`sign` is -1e+308; it is 1, -1 or another factor"),
         ("sign = -1.0", "sign = 1e-300", "`sign` is 1e-300; it is 1, -1 or another factor"),
+        ("sign = -1.0", "sign = []", "`sign` has 0 entries for 1 fields"),
+        (ARM, "offset = []", "`offset` has 0 entries for 2 fields"),
         (SIGMA, "sigma = 1e-200", "`sigma` is 1e-200; it is 0 or at least 1e-09"),
         ("[-35.0, 35.0]", "[35.0, -35.0]", "the lower one stands first"),
         ("[-35.0, 35.0]", "[-inf, inf]", f"actuators.0.limits.0 {FINITE}"),
@@ -54,6 +56,21 @@ def test_what_cannot_be_is_refused_with_its_key(old, new, words):
         sailing.profile(sailing.PROFILE.replace(old, new))
     assert words in found.value.message and found.value.hint
     assert "constrained" not in found.value.message and "tuple[" not in found.value.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"local"', '"geodetic"', "sensors.position of kind 'geodetic' needs a unit"),
+        ("[ship]", "[table]\nLat = 'latitude'\n[ship]", "[table] 'Lat' needs a unit"),
+    ],
+)
+def test_a_place_on_earth_has_its_unit(old, new, words):
+    text = sailing.PROFILE.replace('unit = "m"', "")
+    sailing.profile(text)
+    with pytest.raises(ProfileError) as found:
+        sailing.profile(text.replace(old, new))
+    assert words in found.value.message and '"deg"' in found.value.message
 
 
 def numbers(content, place=()):

@@ -14,8 +14,15 @@ STAMP_FIELDS = (
     "transforms[0].timestamp", "transforms[0].header.stamp",
 )  # fmt: skip
 STAMP_PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
-# A number's unit, by its size: from 1e17 on it counts ns.
-EPOCHS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000), (1e8, SECOND_NS))
+# A single number is Unix time in the one of these units in which it lies between 2000 and 2100.
+UNITS_NS = (SECOND_NS, 1_000_000, 1_000, 1)  # ns: s, ms, µs and ns
+YEAR_2000_NS, YEAR_2100_NS = 946_684_800 * SECOND_NS, 4_102_444_800 * SECOND_NS
+# Numbers that are not: they gain as much as the recorder's clock does in another unit, to a factor
+# of two for a log that is played faster or slower, and would be of messages further apart than any
+# instrument's. The latter keeps a log whose recorder wrote all at once, a thousand times as fast.
+SAME_PACE, LONGEST_PERIOD_NS = 2.0, 5.0 * SECOND_NS
+LOW, HIGH = 0.05, 0.95  # quantiles: a few stray times do not make a pace
+MOST_NS = 9.2e18  # what 64 bits hold
 
 Steps = tuple[str | int, ...]
 
@@ -115,10 +122,9 @@ def stamp_leaves(layout: Mapping[str, pl.DataType]) -> tuple[str, ...]:
 
 
 def stamps(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series:
-    """Measurement times in ns [Int64], null where a message has none."""
+    """Measurement times in ns [Int64], null where a message has none, or has it as one number:
+    see `counted`."""
     nothing = pl.Series("stamp", [None] * frame.height, pl.Int64)
-    if not paths:
-        return nothing
     columns = []
     for path in paths:
         at = locate(path, frame.schema)
@@ -129,24 +135,51 @@ def stamps(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series:
         seconds, nanos = (c.cast(pl.Int64, strict=False) for c in columns)
         beyond = seconds.abs() > 9_000_000_000  # would overflow; no clock says so
         return (seconds.set(beyond, None) * SECOND_NS + nanos).rename("stamp")
-    return _single(columns[0]) if columns[0].dtype != pl.Null else nothing
+    return _written(columns[0]) if columns and columns[0].dtype == pl.String else nothing
 
 
-def _single(column: pl.Series) -> pl.Series:
-    if column.dtype == pl.String:
-        when = column.str.to_datetime(
-            "%+", strict=False, time_unit="ns", time_zone="UTC"
-        ).to_physical()
-        local = column.str.to_datetime(
-            "%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="ns"
-        ).to_physical()  # without a zone: taken as UTC
-        return when.fill_null(local)
-    size = float(column.cast(pl.Float64).abs().fill_nan(None).max() or 0.0)  # type: ignore[arg-type]
-    factor = next((factor for least, factor in EPOCHS if size >= least), None)
-    if factor is None:  # a counter or a time since start-up: no clock to compare with
-        return pl.Series("stamp", [None] * len(column), pl.Int64)
-    if column.dtype.is_integer():
-        return column.cast(pl.Int64, strict=False) * factor
-    whole = column.floor()
-    rest = ((column - whole) * factor).round().cast(pl.Int64, strict=False)
-    return whole.cast(pl.Int64, strict=False) * factor + rest
+def _written(column: pl.Series) -> pl.Series:
+    when = column.str.to_datetime("%+", strict=False, time_unit="ns", time_zone="UTC").to_physical()
+    local = column.str.to_datetime(
+        "%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="ns"
+    ).to_physical()  # without a zone: taken as UTC
+    return when.fill_null(local)
+
+
+def counted(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series | None:
+    """Measurement times that are single numbers; all messages of a topic say in which unit."""
+    column = frame[paths[0]] if len(paths) == 1 and paths[0] in frame.columns else None
+    return column.alias("stamp") if column is not None and column.dtype.is_numeric() else None
+
+
+def unix_unit(counts: pl.Series, logged: pl.Series) -> int | None:
+    """The unit [ns] in which numbers [Float64] are Unix time; None where they are not.
+
+    A counter, or a time since start-up, is no clock to compare with others. It may look like one:
+    30 minutes in µs are seconds of 2027. What it gains shows that, by the recorder's clock [ns].
+    """
+    known, logged = counts.drop_nulls(), logged.filter(counts.is_not_null())
+    middle = known.quantile(0.5, "nearest") or 0.0
+    unit = next((n for n in UNITS_NS if YEAR_2000_NS <= middle * n < YEAR_2100_NS), None)
+    gained, passed = _span(known), _span(logged)
+    if unit is None or gained * unit <= LONGEST_PERIOD_NS * (HIGH - LOW) * len(known):
+        return unit
+    others = (n for n in UNITS_NS if n != unit)
+    counting = any(passed / SAME_PACE <= gained * n <= passed * SAME_PACE for n in others)
+    return None if counting else unit
+
+
+def _span(values: pl.Series) -> float:
+    low, high = (values.quantile(share, "nearest") for share in (LOW, HIGH))
+    return 0.0 if low is None or high is None else float(high - low)
+
+
+def instants(counts: pl.Series, unit: int) -> pl.Series:
+    """Numbers that count units of so many ns as ns [Int64]; null where 64 bits do not hold them."""
+    beyond = ~(counts.cast(pl.Float64).abs() * unit <= MOST_NS)
+    if counts.dtype.is_integer():
+        return counts.set(beyond, None).cast(pl.Int64, strict=False) * unit
+    exact = counts.cast(pl.Float64).set(beyond, None)
+    whole = exact.floor()
+    rest = ((exact - whole) * unit).round().cast(pl.Int64, strict=False)
+    return whole.cast(pl.Int64, strict=False) * unit + rest

@@ -113,9 +113,11 @@ class Waiting:
         self._payloads: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}  # by their size
 
     def suits(self, sizes: np.ndarray) -> bool:
-        """Whether messages like the first ones are decoded here."""
+        """Whether messages like the first ones are decoded here. What was begun with a chunk that
+        is unpacked piece by piece is gone on with: its rows stand in the tables already."""
         if self._large is None:
-            self._large = bool(sizes.mean() >= LARGE_BYTES)
+            begun = self.count > 0 and self._flat is None
+            self._large = begun or bool(sizes.mean() >= LARGE_BYTES)
         return self._large or self._flat is not None
 
     def take(

@@ -191,6 +191,7 @@ def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFr
     reasons = sorted(set(tables.undecodable.values()))
     reasons += ["their bytes do not fit their schema"] * bool(tables.failed)
     reasons += ["they are too large"] * bool(tables.too_large)
+    reasons += ["they are more than a log of its size can hold"] * bool(tables.too_many)
     if reasons and not frames:
         raise LogUnreadable(
             f"{found.path} has {count} messages, but none can be decoded: {', '.join(reasons)}.",

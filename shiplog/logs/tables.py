@@ -10,9 +10,10 @@ import numpy as np
 import polars as pl
 from mcap.records import Channel
 
+from . import fields
 from .container import Survey
 from .decoders import decoder
-from .fields import is_text, locate, parsed, stamp_leaves, stamps, value
+from .fields import is_text, locate, parsed, stamp_leaves, value
 from .messages import Decoder, Undecodable
 
 # Rows go with the file's size, not with its messages: three million empty messages fit into
@@ -36,8 +37,10 @@ class Table:
 
     parts: list[pl.DataFrame] = field(default_factory=list)
     texts: set[str] = field(default_factory=set)  # columns taken out of JSON, typed at the end
+    counts: dict[int, pl.Series] = field(default_factory=dict)  # stamps as numbers, by part
 
     def finish(self) -> pl.DataFrame:
+        self._date()
         parts, self.parts = self.parts, []
         frame = parts[0] if len(parts) == 1 else _joined(parts)
         parts.clear()
@@ -45,6 +48,19 @@ class Table:
             frame = frame.with_columns(parsed(frame[name]))
         times = frame["log_time"]
         return frame if times.is_sorted() else frame.sort("log_time", maintain_order=True)
+
+    def _date(self) -> None:
+        """Stamps that are numbers, in the unit of all of them; a batch may be of a few strays."""
+        if not self.counts:
+            return
+        logged = pl.concat([self.parts[number]["log_time"] for number in self.counts])
+        every = pl.concat([c.cast(pl.Float64).fill_nan(None) for c in self.counts.values()])
+        unit = fields.unix_unit(every, logged)
+        if unit is not None:
+            for number, counts in self.counts.items():
+                stamp = fields.instants(counts, unit)
+                self.parts[number] = self.parts[number].with_columns(stamp=stamp)
+        self.counts.clear()
 
 
 @dataclass(slots=True)
@@ -151,8 +167,12 @@ class Tables:
         table = self._tables.setdefault(topic, Table())
         if not len(logged):
             return
-        nothing = pl.Series("stamp", [None] * len(logged), pl.Int64)
-        stamp = stamps(frame, stamp_leaves(frame.schema)) if frame.width else nothing
+        stamp = pl.Series("stamp", [None] * len(logged), pl.Int64)
+        if frame.width:  # messages without a field have none
+            leaves = stamp_leaves(frame.schema)
+            stamp = fields.stamps(frame, leaves)
+            if (counts := fields.counted(frame, leaves)) is not None:
+                table.counts[len(table.parts)] = counts
         columns = [
             s.rename(n) for n, s in zip(TIME_COLUMNS, (logged, published, stamp), strict=True)
         ]

@@ -32,6 +32,8 @@ RESOLVED = {  # of a sensor: the channel whose unit its resolution has
 # Memory goes with the rows of the grid: stamps so scattered that a sample stands for a thousand
 # rows (100 s) are no voyage. A million rows, 28 hours, take 100 MB, whatever they hold.
 LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
+FARTHEST_DEG = (90.0, 360.0)  # latitude and longitude, whichever way the latter is counted
+NO_FIX_DEG = (91.0, 181.0)  # what AIS sends of a position that it does not know
 NEAR_DEG = 1.0  # from the median position: (0, 0) before the first fix is further away than that
 
 log = logging.getLogger(__name__)
@@ -219,6 +221,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     times, value = _raw(reading, sensor)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
+        value = _on_earth(reading, sensor, value)
     elif kind in ("sog_cog", "from_bow"):
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
@@ -237,6 +240,26 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     metric = _metric(samples.value, kind)
     spike = fault_detection.spikes(metric, profile.sensors.noise(name))
     return replace(samples, spike=spike, resolution=fault_detection.resolution(metric))
+
+
+def _on_earth(reading: Reading, sensor: Sensor, value: np.ndarray) -> np.ndarray:
+    """Latitudes and longitudes [n, 2], deg; blank where they are of no place, as a receiver's are
+    that has no fix. Raises LogUnreadable where most are: they are then something else."""
+    known = np.isfinite(value).all(axis=1) & ~np.isclose(value, NO_FIX_DEG).all(axis=1)
+    nowhere = known & (np.abs(value) > FARTHEST_DEG).any(axis=1)
+    if 2 * nowhere.sum() > known.sum():
+        latitude, longitude = value[np.flatnonzero(nowhere)[0]]
+        raise LogUnreadable(
+            f"{reading.contents.path.name} holds {nowhere.sum()} positions of {known.sum()} on "
+            f"{sensor.topic} that are nowhere on Earth, such as latitude {latitude:.10g} and "
+            f"longitude {longitude:.10g} deg.",
+            hint="look at [sensors.position]: whether `fields` are latitude and longitude in this "
+            'order, and at their unit: whole numbers of 1e-7 deg need unit = "deg" and sign = '
+            "1e-7; degrees and minutes in one number, such as 4807.038, have to be converted.",
+        )
+    value = value.copy()
+    value[nowhere | ~known] = np.nan
+    return value
 
 
 def _metric(value: np.ndarray, kind: str) -> np.ndarray:

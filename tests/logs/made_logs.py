@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -116,6 +117,18 @@ def protobuf_log(
             when = stamp if times is None else times(k)
             data = replaced.get(k, make(k).SerializeToString())
             writer.add_message(channels[k % len(channels)], when, data, stamp, k)
+        writer.finish()
+    return path
+
+
+def json_log(path: Path, messages) -> Path:
+    """One topic; each message with its log time and its publish time."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/j", "json", 0)
+        for when, published, message in messages:
+            writer.add_message(channel, when, json.dumps(message).encode(), published)
         writer.finish()
     return path
 

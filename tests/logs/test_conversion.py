@@ -2,7 +2,6 @@
 
 import logging
 import time
-from datetime import datetime
 
 import numpy as np
 import polars as pl
@@ -17,54 +16,6 @@ from shiplog.logs.conversion.delimited import read_table
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.voyages.ingest import ingest
-
-NOON = 1_617_969_600_000_000_000  # 2021-04-09 12:00:00 UTC, ns
-
-
-@pytest.mark.parametrize(
-    ("values", "unit"),
-    [
-        (["2021-04-09T12:00:00Z", "2021-04-09T12:00:00.500Z"], None),
-        (["2021-04-09T14:00:00+02:00", "2021-04-09T14:00:00.5+02:00"], None),
-        (["2021-04-09 12:00:00", "2021-04-09 12:00:00.5"], None),
-        (["2021/04/09 12:00:00", "2021/04/09 12:00:00.5"], None),
-        (["09.04.2021 12:00:00", "09.04.2021 12:00:00.5"], None),
-        ([1617969600, 1617969600.5], None),
-        ([1617969600000, 1617969600500], None),
-        ([1617969600000000, 1617969600500000], None),
-        ([NOON, NOON + 500_000_000], None),
-        (["1617969600,0", "1617969600,5"], None),
-        ([1617969600 / 60, 1617969600.5 / 60], "min"),
-    ],
-)
-def test_a_time_is_itself_in_every_form(values, unit):
-    found = clock.instants(pl.Series("t", values, strict=False), unit)
-    # A float of seconds or minutes holds this century to a fraction of a microsecond.
-    assert (found - pl.Series([NOON, NOON + 500_000_000])).abs().max() <= 5_000
-
-
-def test_datetimes_keep_their_instant_and_count_from_start_keep_theirs():
-    noon = datetime(2021, 4, 9, 12)
-    assert clock.instants(pl.Series([noon])).to_list() == [NOON]
-    zoned = pl.Series([noon]).dt.replace_time_zone("Europe/Oslo")
-    assert clock.instants(zoned).to_list() == [NOON - 2 * 3600 * 10**9]
-    assert clock.instants(pl.Series([0.0, 0.1, 0.25])).to_list() == [0, 10**8, 25 * 10**7]
-
-
-def test_a_time_of_day_goes_on_past_midnight():
-    found = clock.instants(pl.Series("t", ["23:59:59.5", "00:00:00.5"]))
-    assert found.diff().to_list()[1] == 10**9
-
-
-def test_times_that_can_be_read_in_two_ways_are_asked_for():
-    with pytest.raises(ProfileError, match="day or with the month first"):
-        clock.instants(pl.Series("t", ["03/04/2024 10:00:00", "03/04/2024 10:00:01"]))
-    (estimated,) = clock.instants(pl.Series("t", ["25/04/2024 10:00:00"]))
-    assert datetime.fromtimestamp(estimated / 1e9).month == 4
-    with pytest.raises(ProfileError, match="step by 100000"):
-        clock.instants(pl.Series("timestamp", [1_000_000, 1_100_000, 1_200_000]))
-    with pytest.raises(ProfileError, match="no known form"):
-        clock.instants(pl.Series("t", ["yesterday", "today"]))
 
 
 @pytest.mark.parametrize(

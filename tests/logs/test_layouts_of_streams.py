@@ -1,6 +1,7 @@
 """NMEA sentences and ROS bags, each written by hand, converted and equal to the same voyage."""
 
 import errno
+import re
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -177,18 +178,19 @@ def ros_known(folder: Path, v: Voyage) -> pl.DataFrame:
     return direct(folder, merged, v)
 
 
-@pytest.mark.parametrize("generation", [1, 2])
-def test_5_and_6_ros_bags_of_a_usv(tmp_path, generation):
-    """ROS 1 .bag and ROS 2 .db3 of unmanned boats (Heron, WAM-V, Otter): a topic an instrument."""
+def ros1_bag(source: Path, v: Voyage) -> Path:
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
+    ros_bag(v, Writer(source), get_typestore(Stores.ROS1_NOETIC))
+    return source
+
+
+@pytest.mark.parametrize("generation", [1, 2])
+def test_5_and_6_ros_bags_of_a_usv(tmp_path, generation):
+    """ROS 1 .bag and ROS 2 .db3 of unmanned boats (Heron, WAM-V, Otter): a topic an instrument."""
     v = Voyage()
-    if generation == 1:
-        source = tmp_path / "usv.bag"
-        ros_bag(v, Writer(source), get_typestore(Stores.ROS1_NOETIC))
-    else:
-        source = ros2_bag(tmp_path / "usv", v)
+    source = ros1_bag(tmp_path / "usv.bag", v) if generation == 1 else ros2_bag(tmp_path / "u", v)
     (path,) = converted(tmp_path, source, None)
     assert read(path).frames["/imu/data"]["log_time"].to_list() == v.ns.tolist()
     profile = profiles.parse(ROS_PROFILE + DATUM, "usv")
@@ -212,3 +214,65 @@ def test_a_full_disk_is_no_fault_of_the_bag(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "flush", refuse)
     (why,) = convert([source], None, tmp_path).refused.values()
     assert "usv.mcap: No space left on device" in why and "ROS bag" not in why
+
+
+def found_in(data: bytes, text: bytes) -> list[int]:
+    return [match.start() for match in re.finditer(re.escape(text), data)]
+
+
+def damaged(path: Path, at: int, put: bytes) -> None:
+    data = bytearray(path.read_bytes())
+    data[at : at + len(put)] = put
+    path.write_bytes(data)
+
+
+def lost_of(folder: Path, source: Path) -> tuple[Path, str]:
+    """The log of a damaged bag, and what is missing in it."""
+    done = convert([source], None, folder)
+    assert not done.refused
+    (path,), (lost,) = done.logs, done.lost.values()
+    return path, lost
+
+
+@pytest.mark.parametrize("generation", [1, 2])
+def test_a_damaged_bag_keeps_what_was_read_before_the_damage(tmp_path, generation):
+    v = Voyage()
+    if generation == 1:
+        file = source = ros1_bag(tmp_path / "usv.bag", v)
+        begins = found_in(file.read_bytes(), b"op=\x02")  # of messages
+        place = begins[len(begins) * 2 // 3]
+    else:
+        source = ros2_bag(tmp_path / "usv", v)
+        (file,) = source.glob("*.db3")
+        begins = found_in(file.read_bytes(), b"\0\1\0\0")  # of messages in CDR
+        place = begins[len(begins) * 2 // 3] - 24  # where the row says what it holds
+    damaged(file, place, bytes(64))
+    path, lost = lost_of(tmp_path, source)
+    assert "the bag is damaged there (" in lost and "copy the original again" in lost
+    frames = read(path).frames
+    count = sum(frame.height for frame in frames.values())
+    assert f"what comes after {count} messages" in lost and count > 100
+    for frame in frames.values():
+        times = frame["log_time"].to_list()
+        assert times == v.ns.tolist()[: len(times)]
+
+
+def test_a_bag_that_is_damaged_at_its_beginning_is_refused_as_one(tmp_path):
+    source = ros2_bag(tmp_path / "usv", Voyage())
+    (file,) = source.glob("*.db3")
+    damaged(file, 4096, bytes(file.stat().st_size - 4096))
+    (why,) = convert([source], None, tmp_path).refused.values()
+    assert "usv cannot be read as a ROS bag" in why and "fault of the program" not in why
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_a_message_that_does_not_fit_its_definition_costs_no_other(tmp_path):
+    v = Voyage()
+    source = ros1_bag(tmp_path / "usv.bag", v)
+    text = b"\4\0\0\0gnss"  # of a header, with its length
+    places = found_in(source.read_bytes(), text)
+    for place in places[300:303]:
+        damaged(source, place, b"\xff\xff\xff\x7f")
+    path, lost = lost_of(tmp_path, source)
+    assert lost.count("1 of its messages do not fit their definition") == 3
+    assert {frame.height for frame in read(path).frames.values()} == {len(v.ns) - 1}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import polars as pl
@@ -17,10 +16,13 @@ from made_logs import (
     by_hand,
     by_the_package,
     chunks,
+    json_log,
     known_colours,
     protobuf_log,
     sample,
 )
+from mcap.reader import make_reader
+from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, IndexType, Writer
 from polars.testing import assert_frame_equal
 
@@ -188,39 +190,6 @@ def test_undecodable_topics_are_named_and_the_rest_is_kept(tmp_path):
         read(path, {"/odd": ("value",)})
 
 
-def json_log(path: Path, messages) -> Path:
-    with path.open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        channel = writer.register_channel("/j", "json", 0)
-        for when, published, message in messages:
-            writer.add_message(channel, when, json.dumps(message).encode(), published)
-        writer.finish()
-    return path
-
-
-@pytest.mark.parametrize(
-    "stamp",
-    [
-        {"timestamp": {"sec": 1_700_000_000, "nsec": 5}},
-        {"stamp": {"sec": 1_700_000_000, "nanosec": 5}},
-        {"header": {"stamp": {"seconds": 1_700_000_000, "nanos": 5}}},
-        {"timestamp": "2023-11-14T22:13:20.000000005Z"},
-        {"timestamp": "2023-11-14T23:13:20.000000005+01:00"},
-        {"timestamp": "2023-11-14T22:13:20.000000005"},
-        {"timestamp": 1_700_000_000_000_000_005},
-    ],
-)
-def test_every_way_to_say_when_gives_one_stamp(tmp_path, stamp):
-    path = json_log(tmp_path / "t.mcap", [(START, START, stamp | {"x": 1})] * 2)
-    assert read(path).frames["/j"]["stamp"].to_list() == [START + 5] * 2
-
-
-def test_counters_are_no_clocks(tmp_path):
-    path = json_log(tmp_path / "t.mcap", [(START, START, {"timestamp": 12.5})])
-    assert read(path).frames["/j"]["stamp"].to_list() == [None]
-
-
 def test_repeats_and_clocks_are_found(tmp_path):
     """The recorder runs 0.94 s ahead; message 7 was sent twice, and 20 to 30 is missing."""
     order = [k for k in range(200) if k not in range(20, 30)]
@@ -256,6 +225,14 @@ def on_the_walk(monkeypatch):
     monkeypatch.setattr(rerun_route, "LEAST_WARM", 0)
     monkeypatch.setattr(preflight, "checked", watched)
     return given
+
+
+def chunk_indexes(path: Path) -> list[ChunkIndex]:
+    """In the order of the file."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary
+    return sorted(summary.chunk_indexes, key=lambda chunk: chunk.chunk_start_offset)
 
 
 NUMBERS = ("value", "small", "signed", "point.x", "maybe", "timestamp.nanos")
@@ -312,6 +289,17 @@ def test_chunks_too_large_to_be_unpacked_at_once_are_decoded_on_the_walk(
     monkeypatch.setattr(preflight.Waiting, "take_alone", missing)
     assert_same(path, {}, others=True)
     assert on_the_walk == [] and missed
+
+
+def test_what_large_chunks_began_a_small_one_ends(tmp_path, on_the_walk, monkeypatch):
+    """Texts and bytes in messages of 100 bytes: none of them twice, whoever decodes the last."""
+    wanted = {t: ("value", "names") for t in ("/a", "/b", "/c")}
+    path = known_colours(tmp_path / "log.mcap", count=900)
+    *large, last = (chunk.uncompressed_size for chunk in chunk_indexes(path))
+    assert last < min(large)
+    monkeypatch.setattr(chunks_module, "AT_ONCE", last)
+    assert {frame.height for frame in assert_same(path, wanted).frames.values()} == {300}
+    assert set(on_the_walk) == {"/a", "/b", "/c"}
 
 
 def test_a_topic_of_two_channels_is_not_decoded_on_the_walk(tmp_path, on_the_walk):

@@ -10,6 +10,7 @@ import pytest
 import zstandard
 from salvaged_logs import CHUNKS, EACH, GOOD, START, file, numbers, packed, parts, without
 
+from shiplog.exceptions import LogUnreadable
 from shiplog.logs import chunks, records, scan
 
 
@@ -58,6 +59,13 @@ def test_more_messages_than_a_file_of_its_size_holds_are_counted_and_left_out(re
     assert found.health.messages_read == CHUNKS * EACH
     assert sum(frame.height for frame in found.frames.values()) <= 60
     assert {f.kind for f in found.health.findings} == {"crc"}
+
+
+def test_a_log_of_nothing_but_too_many_messages_is_refused_with_the_reason(reading, monkeypatch):
+    monkeypatch.setattr("shiplog.logs.tables.LEAST_ROWS", 0)
+    monkeypatch.setattr("shiplog.logs.tables.ROWS_PER_BYTE", 0.0)
+    with pytest.raises(LogUnreadable, match="more than a log of its size can hold"):
+        reading(GOOD)
 
 
 def test_a_chunk_of_more_messages_than_a_log_can_hold_is_counted_and_none_is_made(

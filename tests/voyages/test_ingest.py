@@ -346,39 +346,3 @@ def test_stamps_scattered_over_years_are_refused_and_not_laid_on_a_grid(voyage):
     time = sailing.START + np.arange(len(gyro.time)) * 12 * 3600 * 10**9
     with pytest.raises(LogUnreadable, match="days apart"):
         voyage({**parts, "/gyro": replace(gyro, time=time)})
-
-
-def geodetic(latitude, longitude):
-    """The circle about a point on the ellipsoid's equator or near it, and the profile for it."""
-    parts = sailing.series()
-    x, y = parts["/position"].columns.values()
-    north, east = 6_335_439.0, 6_378_137.0  # m, radii of curvature on the equator
-    fix = {
-        "lat": latitude + np.degrees(x / north),
-        "lon": (longitude + np.degrees(y / east) + 180.0) % 360.0 - 180.0,
-    }
-    text = sailing.PROFILE.replace('"local"', '"geodetic"').replace('"x_m", "y_m"', '"lat", "lon"')
-    parts["/position"] = replace(parts["/position"], columns=fix)
-    return parts, text.replace('unit = "m"', 'unit = "deg"', 1)
-
-
-def test_a_circle_across_the_180_degree_meridian_is_a_circle(voyage):
-    parts, text = geodetic(0.0, 180.0)
-    third = np.arange(len(parts["/position"].time)) % 3 == 0  # the rest is interpolated
-    table = voyage(kept(parts, "/position", third), text).table
-    t = (table["time"].to_physical().to_numpy() - sailing.START) * 1e-9
-    for name, truth in (("x0", np.sin(3.0 + 0.04 * t)), ("y0", -np.cos(3.0 + 0.04 * t))):
-        found = table[name].to_numpy()
-        assert found - found.mean() == pytest.approx(20.0 * (truth - truth.mean()), abs=1e-3)
-    assert (table["quality"] == 0).all()
-
-
-def test_the_datum_is_no_position_before_the_first_fix(voyage, caplog):
-    parts, text = geodetic(0.0, 135.0)
-    fix = parts["/position"].columns
-    fourth = fix["lat"][3], fix["lon"][3]
-    fix["lat"][:3], fix["lon"][:3] = 0.0, 0.0
-    done = voyage(parts, text)
-    assert done.datum == pytest.approx(fourth, abs=1e-12)
-    assert done.table["x0"].to_numpy()[10:] == pytest.approx(0.0, abs=50.0)
-    assert "the datum is position 4" in caplog.text and "135 degrees" in caplog.text

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import polars as pl
 
@@ -19,14 +21,18 @@ LONGEST_STEP_S = 60.0  # no ship's motion is recorded more slowly: the numbers a
 DATE_FORMATS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
 SLASHED = ("%d/%m/%Y", "%m/%d/%Y")
 CLOCK_FORMATS = ("%H:%M:%S%.f", "%H:%M")
+HHMMSS = "%H%M%S"  # of a time of day that is written as one number: 93005 is 09:30:05
+SAME_STEP = 1.5  # times the median: a row after the next minute's beginning is no later than that
+WIDTHS = {"%Y": 4, "%j": 3}  # digits of a form's parts; all others have two
 
 
 def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
     """Times [Int64, ns], null where there is none.
 
     values  datetimes, ISO or other texts, or numbers
-    unit    of numbers; without one, Unix seconds, ms, µs or ns by their size, else seconds
-    form    how a text is written, in strptime's letters, where it is not ISO
+    unit    of numbers; without one, Unix seconds, ms, µs or ns by their size, times of day where
+            they count as hhmmss, else seconds
+    form    how a text or a number is written, in strptime's letters, where it is not ISO
 
     A time without a zone is taken as UTC. A time of day without a date counts from 1970-01-01
     and goes on past midnight. Raises ProfileError where a text can be read in two ways or in none.
@@ -45,6 +51,8 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
         if form is None and number.null_count() == _blank(values):
             return _counted(number, unit)
         return _written(values, form)
+    if dtype.is_numeric() and form is not None:
+        return _written(*_digits(values, form))
     if not dtype.is_numeric():
         raise ProfileError(
             f"The column {values.name!r} holds {dtype}, which is no time.",
@@ -91,18 +99,52 @@ def _blank(texts: pl.Series) -> int:
     return int((texts.is_null() | (texts.str.strip_chars() == "")).sum())
 
 
+def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
+    """Times as `instants` has them, beside which a date stands: their whole days do not count.
+
+    Raises ProfileError also where numbers are no seconds of a day, or can be two times of it.
+    """
+    number = number_of(values) if values.dtype == pl.String else values
+    words = number is not values and number.null_count() > _blank(values)
+    stated = unit is not None or form is not None or not number.dtype.is_numeric()
+    if stated or words or _unix(number) or counts_minutes(number):
+        return instants(values, unit, form)
+    most = typical(number.cast(pl.Float64))
+    digits = can_be_hhmmss(number)
+    if digits and most * SECOND_NS >= DAY_NS:
+        return _of_digits(number)
+    if (digits and most >= 60) or most * SECOND_NS >= 2 * DAY_NS:
+        can_be = "can be seconds of it or hhmmss" if digits else "are no seconds of it"
+        raise ProfileError(
+            f"The times of column {values.name!r}, such as {most:.10g}, stand beside a date and "
+            f"{can_be}.",
+            hint=f'say which in [table]: {values.name} = {{ channel = "time", unit = "s" }}, or '
+            f'"ms", or format = "{HHMMSS}".',
+        )
+    return instants(values, unit, form)
+
+
+def _unix(values: pl.Series) -> list[str]:
+    """The unit in which numbers are Unix time; none where they are not."""
+    most = typical(values.cast(pl.Float64))
+    return [name for name, per in UNIX if YEAR_2000 <= most / per < YEAR_2100]
+
+
 def _counted(values: pl.Series, unit: str | None) -> pl.Series:
     """Numbers to ns; whole ones exactly: a float of seconds holds this century to 0.2 µs."""
     if unit is None:
-        most = typical(values.cast(pl.Float64))
-        fitting = [n for n, per in UNIX if YEAR_2000 <= most / per < YEAR_2100]
-        step = typical(values.cast(pl.Float64).diff())
-        if not fitting and step > LONGEST_STEP_S:
+        fitting = _unix(values)
+        exact = values.cast(pl.Float64)
+        most, step = typical(exact), typical(exact.diff())
+        if not fitting and (step > LONGEST_STEP_S or most > YEAR_2100):
             raise ProfileError(
-                f"The times of column {values.name!r} step by {step:g}, and are no Unix time.",
+                f"The times of column {values.name!r}, such as {most:.15g}, step by {step:g}, and "
+                "are no Unix time.",
                 hint=f'say their unit in [table]: {values.name} = {{ channel = "time", '
-                'unit = "us" }, or "ms", or "ns".',
+                'unit = "us" }, or "ms", or "ns"; or their form, as format = "%Y%m%d%H%M%S".',
             )
+        if not fitting and counts_minutes(values):
+            return past_midnight(_of_digits(values))
         unit = fitting[0] if fitting else "s"
     nanos = units.factor(unit) * 1e9
     if values.dtype.is_integer() and nanos >= 1.0:
@@ -113,6 +155,50 @@ def _counted(values: pl.Series, unit: str | None) -> pl.Series:
     if nanos >= 1.0:
         return whole.cast(pl.Int64, strict=False) * round(nanos) + rest
     return (exact * nanos).round().cast(pl.Int64, strict=False)
+
+
+def can_be_hhmmss(values: pl.Series) -> bool:
+    """Whether numbers have the digits of times of day: hours below 24, minutes and seconds below
+    60."""
+    number = values.cast(pl.Float64).fill_nan(None).drop_nulls()
+    sound = (number >= 0) & (number < 240_000) & (number % 100 < 60) & (number % 10_000 < 6_000)
+    return len(number) > 0 and bool(sound.all())
+
+
+def counts_minutes(values: pl.Series) -> bool:
+    """Whether numbers count as hhmmss: after 59 comes 100. Seconds from a start of their own have
+    the same digits for 60 s at most, or where rows are missing, and step by as much anywhere."""
+    if not can_be_hhmmss(values):
+        return False
+    number = values.cast(pl.Float64).fill_nan(None).drop_nulls()
+    step = past_midnight(_of_digits(number)).diff().drop_nulls()
+    begins = ((number // 100).diff().drop_nulls() != 0) & (step > 0)
+    inside = step.filter(~begins & (step > 0))
+    if len(inside) == 0 or not begins.any():
+        return False
+    on_time = step.filter(begins) <= SAME_STEP * typical(inside.cast(pl.Float64))
+    return bool(on_time.mean() > 0.5)  # type: ignore[operator]
+
+
+def _of_digits(values: pl.Series) -> pl.Series:
+    """Times of day [Int64, ns] that are written as hhmmss."""
+    number = values.cast(pl.Float64).fill_nan(None)
+    whole = number.floor().cast(pl.Int64, strict=False)
+    seconds = whole // 10_000 * 3600 + whole // 100 % 100 * 60 + whole % 100
+    rest = ((number - number.floor()) * SECOND_NS).round().cast(pl.Int64, strict=False)
+    return (seconds * SECOND_NS + rest).rename(values.name)
+
+
+def _digits(values: pl.Series, form: str) -> tuple[pl.Series, str]:
+    """Numbers as the texts that they were, with the zeros at their beginning, and their form."""
+    width = sum(WIDTHS.get(part, 2) for part in re.findall(r"%[A-Za-z]", form))
+    exact = values.cast(pl.Float64).fill_nan(None)
+    text = exact.floor().cast(pl.Int64, strict=False).cast(pl.String).str.zfill(width)
+    micros = ((exact - exact.floor()) * 1e6).round().clip(0, 999_999).cast(pl.Int64, strict=False)
+    if (micros > 0).any():
+        text = text + "." + micros.cast(pl.String).str.zfill(6)
+        form = form if form.endswith("%.f") else form + "%.f"
+    return text.rename(values.name), form
 
 
 def _written(values: pl.Series, form: str | None) -> pl.Series:

@@ -266,9 +266,9 @@ def busiest(vessels: pl.Series) -> str:
 def _time(frame: pl.DataFrame, present: dict[str, Column]) -> pl.Series:
     (name, *_), day = _named(present, "time"), _named(present, "date")
     column = present[name]
-    time = clock.instants(frame[name], column.unit, column.format)
     if not day:
-        return time
+        return clock.instants(frame[name], column.unit, column.format)
+    time = clock.of_day(frame[name], column.unit, column.format)
     midnight = clock.dates(frame[day[0]], present[day[0]].format)
     return midnight + time % clock.DAY_NS
 
