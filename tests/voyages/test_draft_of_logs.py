@@ -145,6 +145,11 @@ def test_an_order_is_drafted_where_what_measures_holds_nothing(tmp_path):
     assert [a.topic for a in drafted.actuators] == ["/rudder/command"]
 
 
+def test_an_instrument_that_is_not_needed_is_left_out_where_it_is_blank(tmp_path):
+    path = log_of(tmp_path / "b.mcap", PX4 | {"/gyro": ("own", lambda t: {"rot": None})})
+    assert profiles.parse(draft(path), "draft").sensors.yaw_rate is None
+
+
 def test_true_wind_is_not_apparent(tmp_path):
     blows = ("own/Wind", lambda t: {"speed_mps": 5.0, "direction_deg": 200.0})
     assert "No wind was recognised" in draft(

@@ -36,8 +36,8 @@ def of_coordinates(latitude: pl.Series, longitude: pl.Series) -> list[str]:
     """A line of a draft on the factor of coordinates that are no degrees; none where they are."""
     factor, check = scale_of_coordinates(latitude, longitude)
     if factor != 1.0:
-        return [f"sign = {factor:g}  # {check}"]
-    return [f"# {check}"] if check else []
+        return [f"sign = {factor:g}  # CHECK: {check}"]
+    return [f"# CHECK: {check}"] if check else []
 
 
 def scale_of_coordinates(latitude: pl.Series, longitude: pl.Series) -> tuple[float, str]:
@@ -51,13 +51,13 @@ def scale_of_coordinates(latitude: pl.Series, longitude: pl.Series) -> tuple[flo
     if most_north <= POLE and most_east <= ROUND:
         return 1.0, ""
     if most_north == NO_POSITION and most_east <= ROUND:
-        return 1.0, 'CHECK: 91 and 181 are AIS\'s "not available"; blank them'
+        return 1.0, '91 and 181 are AIS\'s "not available"; blank them'
     if most_north <= MOST_DDMM and most_east <= 2.0 * MOST_DDMM:
-        return 1.0, "CHECK: beyond 90; degrees and minutes in one number (ddmm.mm)? write degrees"
+        return 1.0, "beyond 90; degrees and minutes in one number (ddmm.mm)? write degrees"
     whole = bool((north % 1 == 0).all()) and bool((east % 1 == 0).all())
     if whole and most_north <= MOST_E7 and most_east <= 4.0 * MOST_E7:
-        return E7, "CHECK: taken as 1e-7 deg, for the size of its whole numbers"
-    return 1.0, "CHECK: beyond 90, these are no degrees"
+        return E7, "taken as 1e-7 deg, for the size of its whole numbers"
+    return 1.0, "beyond 90, these are no degrees"
 
 
 def unavailable(channel: str, values: pl.Series) -> str:
@@ -67,7 +67,7 @@ def unavailable(channel: str, values: pl.Series) -> str:
     mark, numbers = NOT_AVAILABLE[channel], values.cast(pl.Float64).fill_nan(None).drop_nulls()
     if numbers.is_empty() or float(numbers.max()) != mark:  # type: ignore[arg-type]
         return ""
-    return f'CHECK: {mark:g} is AIS\'s "not available"; blank it'
+    return f'{mark:g} is AIS\'s "not available"; blank it'
 
 
 def holds(channel: str, values: pl.Series) -> bool:

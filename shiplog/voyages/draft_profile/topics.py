@@ -17,6 +17,7 @@ from shiplog.voyages.draft_profile.guesses import ACTUATOR_TOPICS, GUESSES, Gues
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
 LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted
+OPTIONAL = ("yaw_rate", "wind")  # left out where no topic holds a value
 SEARCHED = 200  # topics whose data are read at most, for the comments of the lines
 
 
@@ -99,7 +100,8 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
         choices["heading"] = _choices("heading", log.leaves, near)
     log.look(_fields_of(choice for found in choices.values() for choice in found[:LOOKED_AT]))
     choices = {
-        name: [c for c in found[:LOOKED_AT] if log.holds(c)] or found[:1]
+        name: [c for c in found[:LOOKED_AT] if log.holds(c)]
+        or [c for c in found[:1] if name not in OPTIONAL]
         for name, found in choices.items()
     }
     best = [found[0] for found in choices.values() if found]
@@ -196,8 +198,8 @@ def _receiver(positions: list[Choice]) -> str:
 
 def _sensor(name: str, choices: list[Choice], log: Log) -> str:
     if not choices:
-        optional = name in ("yaw_rate", "wind")
-        return f"# No {name} was recognised{'; shiplog does without it' if optional else ''}.\n"
+        does = "; shiplog does without it" if name in OPTIONAL else ""
+        return f"# No {name} was recognised{does}.\n"
     text = _section(name, choices[0], log)
     for second in choices[1:2]:
         kind, _ = guesses.kind_of(second.guess, second.topic)
@@ -229,8 +231,8 @@ def _section(name: str, choice: Choice, log: Log) -> str:
     named = f"fields = [{quoted}]" if len(paths) > 1 else f"field = {quoted}"
     lines.append(named + (f"  # {seen.check}" if seen.check and not seen.sign else ""))
     lines += [f"#   {path}: {log.values(topic, path)}" for path in paths]
-    if name == "heading" and (blank := facts.unavailable(name, log.column(topic, paths[0]))):
-        lines.append(f"# {blank}")
+    if name == "heading" and (blank := facts.unavailable(name, log.column(topic, choice.paths[0]))):
+        lines.append(f"# CHECK: {blank}")
     check = "" if sure else "  # CHECK: the log does not say"
     if len(set(units)) == 1:
         lines.append(f'unit = "{units[0]}"{check}')
@@ -250,13 +252,15 @@ def _axes(choice: Choice, log: Log) -> guesses.Axes:
     return guesses.axes(choice.guess, choice.paths, choice.topic, schema)
 
 
-def _doubt(name: str, topic: str, paths: tuple[str, ...]) -> str:
+def _doubt(name: str, topic: str, paths: Sequence[str]) -> str:
     """What the names of a sensor leave open, to stand before its other facts."""
     called = " ".join((topic, *paths))
     if name == "wind" and not words.is_apparent(called):
         return "CHECK: apparent wind, or true? "
     if name == "heading" and words.is_magnetic(called):
         return "CHECK: magnetic, off by the variation; "
+    if name == "position" and re.search(r"(^|[._])x(_m)?$", paths[0], re.IGNORECASE):
+        return "CHECK: x to the north, y to the east? "
     return ""
 
 

@@ -20,7 +20,7 @@ SPELLED = {  # a unit as people write it, and as it is called here
     "1/min": "rpm", "u/min": "rpm", "sec": "s", "msec": "ms", "usec": "us", "µs": "us",
     "percent": "%", "-": "1",
 }  # fmt: skip
-CASED = frozenset({"kN", "M"})  # a thousand newtons are no knots, and a magnetic course no metres
+CASED = frozenset({"kN", "M", "S"})  # kilonewtons, magnetic, south: no knots, metres, seconds
 TWO_MEANINGS = {  # (a unit, what is measured): the unit that is meant then
     ("ms", "speed"): "m/s", ("m/s", "time"): "ms",
     ("us", "servo pulse"): "pwm", ("pwm", "time"): "us",
@@ -73,7 +73,7 @@ def is_true_wind(name: str) -> bool:
 
 
 def is_apparent(name: str) -> bool:
-    """Whether it says itself that its wind is the one that the ship feels."""
+    """Whether its wind is the one that the ship feels, by its name."""
     return bool(_APPARENT.search(parted(name)))
 
 
@@ -117,6 +117,18 @@ def fitting(unit: str | None, takes: Collection[str]) -> str | None:
     return next((TWO_MEANINGS[unit, one] for one in takes if (unit, one) in TWO_MEANINGS), None)
 
 
+def stated(name: str, row: str, takes: Collection[str]) -> tuple[bool, str | None]:
+    """(whether a column may measure `takes`, the unit that its name or the row of units states).
+
+    A last `_m` is no metre where none is measured: it may be short for measured or magnetic.
+    """
+    if is_foreign(name) or _FOREIGN.fullmatch(row.strip().strip("[]()")):
+        return False, None
+    unit = unit_of(name) or spelled(row)
+    fits = fitting(unit, takes)
+    return fits is not None or unit is None or unit == "m", fits
+
+
 def is_foreign(name: str) -> bool:
     """Whether a name states a unit that no channel has, such as `thrust [kN]`."""
     bracket = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$", name)
@@ -134,14 +146,13 @@ def spelled(text: str) -> str | None:
 
 def bare(name: str) -> str:
     """A column's name without unit, case or signs: `SOG [kn]` and `sog_kn` are both `sog`."""
-    plain = words_of(name)
+    plain = re.sub(r"[^0-9a-zµ]+", "_", without_unit(name).lower()).strip("_")
     for suffix in sorted(SUFFIX, key=len, reverse=True):
         if plain.endswith(f"_{suffix}"):
             return plain.removesuffix(f"_{suffix}")
     return plain
 
 
-def words_of(name: str) -> str:
-    """A column's name without what stands in brackets, case or signs; its unit's letters stay."""
-    name = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name).strip().lower()
-    return re.sub(r"[^0-9a-zµ]+", "_", name).strip("_")
+def without_unit(name: str) -> str:
+    """A column's name without what stands last in brackets."""
+    return re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name).strip()
