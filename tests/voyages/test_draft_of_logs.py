@@ -80,7 +80,7 @@ def test_a_ros_log_is_not_mirrored(tmp_path):
     assert along[0] == pytest.approx(
         SPEED * math.cos(heading(5.05)) - LEEWAY * math.sin(heading(5.05)), abs=0.01
     )
-    assert "CHECK: ROS has z upwards" in section(text, "sensors.yaw_rate")
+    assert "sign = -1.0  # CHECK: ROS has z upwards" in section(text, "sensors.yaw_rate")
     assert "CHECK: ROS has y to port" in section(text, "sensors.velocity")
     assert "CHECK: north, east" in section(text, "sensors.position")
 

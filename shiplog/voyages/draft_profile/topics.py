@@ -205,7 +205,7 @@ def _sensor(name: str, choices: list[Choice], log: Log) -> str:
         kind, _ = guesses.kind_of(second.guess, second.topic)
         seen = _axes(second, log)
         quoted = ", ".join(f'"{p}"' for p in seen.paths)
-        sign = f", sign = {list(seen.sign)}" if seen.sign else ""
+        sign = f", sign = {_toml(seen.sign)}" if seen.sign else ""
         text += (
             f'# Second choice: kind = "{kind}", topic = "{second.topic}", '
             f"fields = [{quoted}]{sign}  # {log.rate(second.topic)}\n"
@@ -239,12 +239,16 @@ def _section(name: str, choice: Choice, log: Log) -> str:
     else:
         lines.append("units = [" + ", ".join(f'"{u}"' for u in units) + f"]{check}")
     if seen.sign:
-        lines.append(f"sign = {list(seen.sign)}  # {seen.check}")
+        lines.append(f"sign = {_toml(seen.sign)}  # {seen.check}")
     if kind == "geodetic":
         lines += facts.of_coordinates(*(log.column(topic, path) for path in paths))
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
     return "\n".join(lines) + "\n"
+
+
+def _toml(signs: tuple[float, ...]) -> str:
+    return str(signs[0] if len(signs) == 1 else list(signs))
 
 
 def _axes(choice: Choice, log: Log) -> guesses.Axes:
