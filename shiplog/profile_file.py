@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from shiplog import units
+from shiplog import profile_units, units
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.profile import NEEDED, Actuator, Column, Profile, Sensor, Sensors, Ship, Site
 
@@ -81,6 +81,7 @@ def parse(text: str, source: str) -> Profile:
             item.scale()  # an unknown unit is reported now, not in the middle of a log
         for column in profile.table.values():
             units.factor(column.unit or "1")
+        profile_units.require_fitting(profile)
         return profile
     except ValidationError as error:
         if lacking := _sensors_lacking(error):

@@ -18,6 +18,22 @@ TO_SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
 }  # fmt: skip
 
+MEASURES = {  # what each unit measures
+    "ratio": ("1", "%", "permille"),
+    "length": ("m", "cm", "mm", "km", "ft"),
+    "speed": ("m/s", "cm/s", "mm/s", "km/h", "mph", "kn", "knots"),
+    "angle": ("rad", "deg"),
+    "rate of turn": ("rad/s", "deg/s", "deg/min"),
+    "shaft speed": ("rps", "rev/s", "rpm"),
+    "servo pulse": ("pwm",),
+    "time": ("s", "ms", "us", "ns", "min", "h"),
+}
+
+
+def measure(unit: str) -> str | None:
+    """What `unit` measures; None for a unit not in the table."""
+    return next((name for name, units in MEASURES.items() if unit in units), None)
+
 
 def factor(unit: str) -> float:
     """What a value in `unit` is multiplied by. Raises ProfileError for a unit not in the table."""

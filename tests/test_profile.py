@@ -46,6 +46,19 @@ def test_every_shipped_profile_is_taken(name):
         ("[ship]", "[site]\ndatum = [nan, 0.0]\n[ship]", f"site.datum.0 {FINITE}"),
         ("[ship]", "[table]\n'v [m/s]' = {channel='sway', sign=nan}\n[ship]",
          f"table.v [m/s].sign {FINITE}"),
+        ('field = "heading_deg"\nunit = "deg"', 'field = "heading_deg"\nunit = "m"',
+         "the field 'heading_deg' of sensors.heading in 'm', a unit of length; it takes angle: "
+         "rad, deg."),
+        ('["m/s", "deg"]', '["deg", "m/s"]', "the field 'speed_mps' of sensors.wind in 'deg'"),
+        ('units = ["kn", "deg"]', 'unit = "kn"', "the field 'cog_deg' of sensors.velocity in 'kn'"),
+        ('field = "angle_deg"\nunit = "deg"', 'field = "angle_deg"\nunit = "m/s"',
+         "the rudder 'rudder' in 'm/s', a unit of speed; it takes angle or ratio or servo pulse"),
+        ('unit = "rpm"', 'unit = "rad/s"', "the propeller 'propeller' in 'rad/s'"),
+        ('unit = "rpm"', 'unit = "us"', "the propeller 'propeller' in 'us', a unit of time"),
+        ("[ship]", "[table]\n'v' = {channel='sway', unit='deg'}\n[ship]",
+         "the column 'v' of [table] in 'deg', a unit of angle; it takes speed"),
+        ("[ship]", "[table]\n't' = {channel='time', unit='m/s'}\n[ship]",
+         "the column 't' of [table] in 'm/s', a unit of speed; it takes time"),
         ("[ship]", "x = " + "9" * 6000 + "\n[ship]", "not valid TOML"),
         ("[ship]", "x = " + "[" * 20_000 + "]" * 20_000 + "\n[ship]", "not valid TOML"),
     ],
@@ -71,6 +84,24 @@ def test_a_place_on_earth_has_its_unit(old, new, words):
     with pytest.raises(ProfileError) as found:
         sailing.profile(text.replace(old, new))
     assert words in found.value.message and '"deg"' in found.value.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('field = "angle_deg"\nunit = "deg"', 'field = "angle_deg"\nunit = "pwm"'),
+        ('field = "angle_deg"\nunit = "deg"', 'field = "angle_deg"\nunit = "%"'),
+        ('unit = "rpm"', 'unit = "1"'),
+        ('unit = "rpm"', 'unit = "rev/s"'),
+        ('"propeller"\ntopic = "/propeller"\nfield = "speed_rpm"\nunit = "rpm"',
+         '"thruster"\ntopic = "/propeller"\nfield = "lever"\nunit = "deg"'),
+        ('unit = "m"\n', 'unit = "ft"\n'),
+        ("[ship]", "[table]\n'mmsi' = {channel='vessel', unit='1'}\n[ship]"),
+    ],
+)  # fmt: skip
+def test_a_command_may_stand_for_what_it_drives(old, new):
+    assert old in sailing.PROFILE
+    sailing.profile(sailing.PROFILE.replace(old, new, 1))
 
 
 def numbers(content, place=()):

@@ -3,11 +3,11 @@
 from fractions import Fraction
 
 import pytest
-import sailing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shiplog import units
+from shiplog.profile import Source
 
 TURN = Fraction("6.283185307179586476925286766559")  # rad
 # NIST SP 811, Appendix B; a servo's full command is 400 us of its pulse.
@@ -31,17 +31,20 @@ def test_every_unit_is_as_it_is_defined():
         assert factor == pytest.approx(float(DEFINED[unit]), rel=1e-15), unit
 
 
+def test_every_unit_measures_one_thing():
+    named = [unit for of_one in units.MEASURES.values() for unit in of_one]
+    assert sorted(named) == sorted(DEFINED)
+    assert units.measure("kn") == "speed" and units.measure("furlong") is None
+
+
 @given(
     value=st.floats(-1e6, 1e6), offset=st.floats(-1e3, 1e3),
     sign=st.sampled_from([1.0, -1.0, 0.5, -12.0]), unit=st.sampled_from(sorted(DEFINED)),
 )  # fmt: skip
 @settings(max_examples=60, deadline=None)
 def test_what_a_profile_makes_of_a_number_is_undone_by_the_definition(value, offset, sign, unit):
-    text = sailing.PROFILE.replace(
-        'field = "angle_deg"\nunit = "deg"\nsign = -1.0',
-        f'field = "angle_deg"\nunit = "{unit}"\nsign = {sign!r}\noffset = {offset!r}',
-    )
-    ((zero, factor),) = sailing.profile(text).actuators[0].scale()
+    source = Source(topic="/rudder", field="angle", unit=unit, sign=sign, offset=offset)
+    ((zero, factor),) = source.scale()
     si = (value - zero) * factor
     back = si / (sign * float(DEFINED[unit])) + offset
     assert back == pytest.approx(value, abs=1e-9 * (abs(value) + abs(offset) + 1.0))

@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from shiplog import profile, profile_file, units
 from shiplog.profile import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS, Section
+from shiplog.profile_units import DRIVEN
 from shiplog.report import tables
 
 HEAD = """# The ship profile
@@ -132,6 +133,9 @@ def text() -> str:
             "Factors to SI; propellers are in rev/s. `pwm` is a servo pulse in µs: `offset` is the "
             "neutral pulse, and\n400 µs more or less is full command, 1 or -1.\n",
             _units(),
+            "\nA unit that measures something else than its channel is refused. An actuator may be "
+            "given as its\nvalue, or as what commands it:\n",
+            _driven(),
             "\n## Shipped profiles\n",
             ", ".join(f"`{name}`" for name in profile_file.shipped())
             + ": in `shiplog/profiles/`, to start from.",
@@ -207,8 +211,16 @@ def _channels() -> str:
 
 
 def _units() -> str:
-    rows = [(f"`{unit}`", f"{factor:.7g}") for unit, factor in units.TO_SI.items()]
-    return tables.table(("unit", "factor"), rows)
+    rows = [
+        (f"`{unit}`", units.measure(unit) or "", f"{factor:.7g}")
+        for unit, factor in units.TO_SI.items()
+    ]
+    return tables.table(("unit", "measures", "factor"), rows)
+
+
+def _driven() -> str:
+    rows = [(f"`{kind}`", ", ".join(takes)) for kind, takes in DRIVEN.items()]
+    return tables.table(("actuator", "takes a unit of"), rows)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,65 +11,14 @@ import polars as pl
 
 from shiplog.exceptions import LogUnreadable, ProfileError, listed
 from shiplog.logs.read import Contents, contents, fields, read
-from shiplog.voyages.draft_profile import facts, words
+from shiplog.profile_units import DRIVEN
+from shiplog.voyages.draft_profile import facts, guesses, words
+from shiplog.voyages.draft_profile.guesses import ACTUATOR_TOPICS, GUESSES, Guess
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
 LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted
+OPTIONAL = ("yaw_rate", "wind")  # left out where no topic holds a value
 SEARCHED = 200  # topics whose data are read at most, for the comments of the lines
-
-
-@dataclass(frozen=True, slots=True)
-class Guess:
-    """One way a channel may stand in a log: the fields' names and what they mean."""
-
-    kind: str
-    patterns: tuple[str, ...]
-    unit: str
-    topic: str = ""
-    check: str = ""  # what no name can say
-
-
-ENU = 'CHECK: ROS turns from east; some compasses write "quaternion_ned"'
-AXES_TO_CHECK = 'CHECK: axes of the ship; or "enu", "ned" of the earth'
-LINEAR = (r"(twist_)?linear[._]x$", r"(twist_)?linear[._]y$")
-GUESSES = {  # in order of trust, after that of the topics themselves
-    "position": (
-        Guess("geodetic", (r"lat(itude)?(_deg)?$", r"lon(gitude)?(_deg)?$"), "deg"),
-        Guess("local", (r"x0?(_m)?$", r"y0?(_m)?$"), "m", r"local|pos|pose|state|ned"),
-        Guess("local", (r"north(_m)?$", r"east(_m)?$"), "m"),
-    ),
-    "velocity": (
-        Guess("sog_cog", (r"sog(_\w+)?$|speed(_\w+)?$", r"cog(_\w+)?$|course(_\w+)?$"), "m/s deg"),
-        Guess("body", (r"(surge|ahead)(_\w+)?$", r"(sway|starboard)(_\w+)?$"), "m/s"),
-        Guess("ned", (r"(v_?n|north)(_\w+)?$", r"(v_?e|east)(_\w+)?$"), "m/s", r"vel|gnss|gps|ned"),
-        Guess("enu", LINEAR, "m/s", r"enu|gnss|gps|fix"),
-        Guess("body", LINEAR, "m/s", r"twist|vel|odom", AXES_TO_CHECK),
-    ),
-    "heading": (
-        Guess("angle", (r"(true_?)?(heading|hdg|psi|yaw)(_deg|_rad)?$",), "deg"),
-        Guess("quaternion_enu", (r"(orientation|quaternion|rotation)[._]z$",
-                                 r"(orientation|quaternion|rotation)[._]w$"), "1", "", ENU),
-    ),
-    "yaw_rate": (
-        Guess("rate", (r"(yaw_?rate|rot|rate_of_turn)(_\w+)?$",), "deg/s"),
-        Guess("rate", (r"angular(_velocity)?[._]z$",), "rad/s"),
-    ),
-    "wind": (
-        Guess("from_bow", (r"speed(_\w+)?$", r"(direction|angle)(_\w+)?$"), "m/s deg",
-              r"wind|anemo"),
-    ),
-}  # fmt: skip
-ACTUATOR_TOPICS = (  # kind, in the topic's name, and the field that holds the value
-    ("rudder", r"rudder|steer", r"angle(_\w+)?$|position(_\w+)?$|data$", "deg"),
-    ("propeller", r"prop|shaft|engine", r"(speed|rpm|rps|revs)(_\w+)?$|data$", "rps"),
-    ("azimuth", r"azimuth|azipod", r"angle(_\w+)?$|data$", "deg"),
-    (
-        "thruster",
-        r"thrust|motor|esc|actuator",
-        r"(command|speed|rpm|motor_speed|throttle)(_\w+)?$|data$",
-        "1",
-    ),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +65,24 @@ class Log:
         frame = self.data.get(topic)
         return facts.of_values(frame[path]) if frame is not None and path in frame else "unread"
 
-    def unit(self, path: str, topic: str) -> str | None:
-        """What the field's own name or the channel's metadata says."""
-        return words.unit_of(path) or self.contents.topics[topic].metadata.get("unit")
+    def column(self, topic: str, path: str) -> pl.Series:
+        """Numbers of a field; none where it was not read."""
+        frame = self.data.get(topic)
+        if frame is None or path not in frame:
+            return pl.Series(path, [], pl.Float64)
+        return frame[path].cast(pl.Float64, strict=False)
+
+    def drives(self, topic: str, path: str) -> bool:
+        """Whether numbers stand where an actuator is looked for: a text drives nothing."""
+        frame = self.data.get(topic)
+        if frame is None or path not in frame.columns or frame[path].dtype == pl.Boolean:
+            return False
+        return bool(frame[path].cast(pl.Float64, strict=False).is_finite().any())
+
+    def unit(self, paths: Sequence[str], at: int, topic: str, takes: tuple[str, ...]) -> str | None:
+        """What the field's own name says, or the channel's metadata, which has one unit."""
+        stated = self.contents.topics[topic].metadata.get("unit") if len(paths) == 1 else None
+        return guesses.known_unit(paths[at], stated, takes)
 
 
 def draft(path: str | Path, vessel: str | None = None) -> str:
@@ -136,12 +100,12 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
         choices["heading"] = _choices("heading", log.leaves, near)
     log.look(_fields_of(choice for found in choices.values() for choice in found[:LOOKED_AT]))
     choices = {
-        name: [c for c in found[:LOOKED_AT] if log.holds(c)] or found[:1]
+        name: [c for c in found[:LOOKED_AT] if log.holds(c)]
+        or [c for c in found[:1] if name not in OPTIONAL]
         for name, found in choices.items()
     }
     best = [found[0] for found in choices.values() if found]
-    driven = list(_actuators(log.leaves, {choice.topic for choice in best}))
-    log.look({topic: {field_} for _, topic, field_, _ in driven})
+    driven = _actuators(log, {choice.topic for choice in best})
     parts = [_ship(log.contents)]
     parts += [_sensor(name, found, log) for name, found in choices.items()]
     parts += [_actuator(*one, log=log) for one in driven] or [NO_ACTUATOR]
@@ -208,8 +172,14 @@ def _choices(name: str, leaves: dict[str, tuple[str, ...]], near: str = "") -> l
         for order, guess in enumerate(GUESSES[name]):
             if not re.search(guess.topic, called, re.IGNORECASE):
                 continue
-            paths = [_first(pattern, columns) for pattern in guess.patterns]
+            takes = guesses.measures(name, guess.kind)
+            paths = [
+                guesses.first(pattern, columns, (of_one,))
+                for pattern, of_one in zip(guess.patterns, takes, strict=True)
+            ]
             if any(p is None for p in paths):
+                continue
+            if name == "wind" and words.is_true_wind(" ".join((topic, *filter(None, paths)))):
                 continue
             whole = tuple(p for p in paths if p)
             key = (*words.trust(name, called), order, name not in topic, topic)
@@ -228,69 +198,104 @@ def _receiver(positions: list[Choice]) -> str:
 
 def _sensor(name: str, choices: list[Choice], log: Log) -> str:
     if not choices:
-        optional = name in ("yaw_rate", "wind")
-        return f"# No {name} was recognised{'; shiplog does without it' if optional else ''}.\n"
+        does = "; shiplog does without it" if name in OPTIONAL else ""
+        return f"# No {name} was recognised{does}.\n"
     text = _section(name, choices[0], log)
     for second in choices[1:2]:
-        quoted = ", ".join(f'"{p}"' for p in second.paths)
+        kind, _ = guesses.kind_of(second.guess, second.topic)
+        seen = _axes(second, log)
+        quoted = ", ".join(f'"{p}"' for p in seen.paths)
+        sign = f", sign = {_toml(seen.sign)}" if seen.sign else ""
         text += (
-            f'# Second choice: kind = "{second.guess.kind}", topic = "{second.topic}", '
-            f"fields = [{quoted}]  # {log.rate(second.topic)}\n"
+            f'# Second choice: kind = "{kind}", topic = "{second.topic}", '
+            f"fields = [{quoted}]{sign}  # {log.rate(second.topic)}\n"
         )
     return text
 
 
 def _section(name: str, choice: Choice, log: Log) -> str:
-    guess, topic, paths = choice.guess, choice.topic, choice.paths
+    guess, topic = choice.guess, choice.topic
+    kind, of_kind = guesses.kind_of(guess, topic)
+    seen = _axes(choice, log)
+    paths, takes = seen.paths, guesses.measures(name, kind)
     fallback = guess.unit.split()
     fallback = fallback * len(paths) if len(fallback) == 1 else fallback
-    known = [log.unit(path, topic) for path in paths]
+    known = [log.unit(paths, at, topic, (takes[at],)) for at in range(len(paths))]
     units = [unit or other for unit, other in zip(known, fallback, strict=True)]
-    sure = all(known) or guess.kind.startswith("quaternion")
+    sure = all(known) or kind.startswith("quaternion")
     ordered = "CHECK: a set-point, not a measurement; " if words.is_set_point(topic) else ""
     lines = [f"[sensors.{name}]"]
-    lines.append(f'kind = "{guess.kind}"' + (f"  # {guess.check}" if guess.check else ""))
-    lines.append(f'topic = "{topic}"  # {ordered}{log.rate(topic)}')
+    lines.append(f'kind = "{kind}"' + (f"  # {of_kind}" if of_kind else ""))
+    lines.append(f'topic = "{topic}"  # {ordered}{_doubt(name, topic, paths)}{log.rate(topic)}')
     quoted = ", ".join(f'"{p}"' for p in paths)
-    lines.append(f"fields = [{quoted}]" if len(paths) > 1 else f"field = {quoted}")
+    named = f"fields = [{quoted}]" if len(paths) > 1 else f"field = {quoted}"
+    lines.append(named + (f"  # {seen.check}" if seen.check and not seen.sign else ""))
     lines += [f"#   {path}: {log.values(topic, path)}" for path in paths]
+    if name == "heading" and (blank := facts.unavailable(name, log.column(topic, choice.paths[0]))):
+        lines.append(f"# CHECK: {blank}")
     check = "" if sure else "  # CHECK: the log does not say"
     if len(set(units)) == 1:
         lines.append(f'unit = "{units[0]}"{check}')
     else:
         lines.append("units = [" + ", ".join(f'"{u}"' for u in units) + f"]{check}")
+    if seen.sign:
+        lines.append(f"sign = {_toml(seen.sign)}  # {seen.check}")
+    if kind == "geodetic":
+        lines += facts.of_coordinates(*(log.column(topic, path) for path in paths))
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
     return "\n".join(lines) + "\n"
 
 
-def _actuators(
-    leaves: dict[str, tuple[str, ...]], used: set[str]
-) -> Iterator[tuple[str, str, str, str]]:
+def _toml(signs: tuple[float, ...]) -> str:
+    return str(signs[0] if len(signs) == 1 else list(signs))
+
+
+def _axes(choice: Choice, log: Log) -> guesses.Axes:
+    schema = log.contents.topics[choice.topic].schema
+    return guesses.axes(choice.guess, choice.paths, choice.topic, schema)
+
+
+def _doubt(name: str, topic: str, paths: Sequence[str]) -> str:
+    """What the names of a sensor leave open, to stand before its other facts."""
+    called = " ".join((topic, *paths))
+    if name == "wind" and not words.is_apparent(called):
+        return "CHECK: apparent wind, or true? "
+    if name == "heading" and words.is_magnetic(called):
+        return "CHECK: magnetic, off by the variation; "
+    if name == "position" and re.search(r"(^|[._])x(_m)?$", paths[0], re.IGNORECASE):
+        return "CHECK: x to the north, y to the east? "
+    return ""
+
+
+def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
     """Kind, topic, field and fallback unit of each; orders only of a kind that nobody measured."""
-    taken = set(used)
-    measured = {topic: paths for topic, paths in leaves.items() if not words.is_set_point(topic)}
+    found: dict[str, tuple[str, str, str, str]] = {}
+    for kind, _, _, fallback in ACTUATOR_TOPICS:
+        for topic, columns in sorted(log.leaves.items()):
+            path = guesses.drives(kind, topic, columns)
+            if path and topic not in used:
+                found.setdefault(topic, (kind, topic, path, fallback))
+    log.look({topic: {path} for _, topic, path, _ in found.values()})
+    chosen: list[tuple[str, str, str, str]] = []
     kinds: set[str] = set()
-    for source in (measured, leaves):
-        for kind, in_topic, in_field, fallback in ACTUATOR_TOPICS:
-            if kind in kinds and source is leaves:
+    for ordered in (False, True):
+        for one in found.values():
+            kind, topic, path, _ = one
+            if words.is_set_point(topic) != ordered or not log.drives(topic, path):
                 continue
-            for topic, columns in sorted(source.items()):
-                if topic in taken or not re.search(in_topic, topic, re.IGNORECASE):
-                    continue
-                path = _first(in_field, columns)
-                if path is None:
-                    continue
-                taken.add(topic)
-                if source is measured:
-                    kinds.add(kind)
-                elif kinds & {"thruster", "propeller"} and kind in ("thruster", "propeller"):
-                    continue  # the order of what is measured as the other of the two
-                yield kind, topic, path, fallback
+            # The order of what is measured, as this or as the other of the two.
+            other = {"thruster", "propeller"} if kind in ("thruster", "propeller") else {kind}
+            if not ordered:
+                kinds.add(kind)
+            elif kinds & other:
+                continue
+            chosen.append(one)
+    return chosen
 
 
 def _actuator(kind: str, topic: str, path: str, fallback: str, *, log: Log) -> str:
-    unit = log.unit(path, topic)
+    unit = log.unit((path,), 0, topic, DRIVEN[kind])
     check = "" if unit else "  # CHECK: the log does not say"
     ordered = "CHECK: a set-point, what was ordered; " if words.is_set_point(topic) else ""
     name = re.sub(r"\W+", "_", topic.strip("/")).strip("_").lower()
@@ -301,9 +306,3 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, *, log: Log) -> s
         f'topic = "{topic}"  # {ordered}{log.rate(topic)}\n'
         f'field = "{path}"  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
     )
-
-
-def _first(pattern: str, columns: tuple[str, ...]) -> str | None:
-    """The shallowest field whose last name, or whose path's end, matches."""
-    matching = [c for c in columns if re.search(rf"(^|\.)({pattern})", c, re.IGNORECASE)]
-    return min(matching, key=lambda c: (c.count("."), len(c))) if matching else None
