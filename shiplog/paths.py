@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence, Sized
 from pathlib import Path
 
+from shiplog import files
 from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
 
 
@@ -71,19 +72,30 @@ def check_writable(path: Path, option: str) -> None:
         )
 
 
-def check_file(path: Path, option: str) -> None:
-    """Raises ShiplogError where no file of this name can be written; one that is there can be
-    replaced."""
-    if path.is_dir():
+def check_file(path: Path, option: str, streams: bool = False) -> Path:
+    """The file to write: of a symbolic link, the one that it leads to.
+
+    streams   whether it may be a pipe or a device, which is written to and not replaced
+
+    Raises ShiplogError where no file of this name can be written; one that is there can be
+    replaced.
+    """
+    if streams and files.is_stream(path) and os.access(path, os.W_OK):
+        return path
+    if path.is_dir() or (path.exists() and not path.is_file()):
+        what = "it is a folder" if path.is_dir() else "it is no file that can be replaced"
         raise ShiplogError(
-            f"{option} {path} cannot be written: it is a folder.", hint="give a file's path."
+            f"{option} {path} cannot be written: {what}.", hint="give a file's path."
         )
+    if path.is_symlink():
+        path = Path(os.path.realpath(path))
     if not path.parent.exists():
         raise ShiplogError(
             f"{option} {path} cannot be written: there is no folder {path.parent}.",
             hint=f"give {option} a path in a folder that exists.",
         )
     check_writable(path.parent, option)
+    return path
 
 
 def check_run(path: Path) -> None:

@@ -32,7 +32,7 @@ def compare(
 
     check_runs(runs, store, voyages, cause)
     if save is not None:
-        check_file(save, "--save")
+        save = check_file(save, "--save")
     from pipelines.bars import loading
 
     with loading():

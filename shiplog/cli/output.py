@@ -33,7 +33,7 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
         _print(text)
     if json_to:
         try:
-            files.write_text(Path(json_to), files.json_text(content))
+            files.write_answer(Path(json_to), files.json_text(content))
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",

@@ -288,6 +288,8 @@ FOLDERS = {
         "voyages", "--store", d.store, "--json", d.folder]),
     "--json in no folder": (1, ["there is no folder"], lambda d: [
         "voyages", "--store", d.store, "--json", d.path("none") / "a.json"]),
+    "--json of an empty variable": (2, ["--json is given no path"], lambda d: [
+        "voyages", "--store", d.store, "--json", ""]),
     "--json in a file": (1, ["is a file"], lambda d: [
         "check", d.log, "--json", d.file("f") / "a.json"]),
     "demo: no logs": (1, ["No log in"], lambda d: ["demo", "--logs", d.dir("logs")]),
