@@ -24,7 +24,7 @@ from shiplog.diagnosis import (
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.models.causes import Cause, user
-from shiplog.paths import refuse_taken
+from shiplog.paths import check_diagnosis
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, DiagnosedTrial
@@ -62,8 +62,7 @@ def diagnose_run(
 ) -> DiagnosedTrial:
     """The whole way. Raises ShiplogError."""
     began = time.time()
-    if extend is not None:
-        refuse_taken(extend, "--extend")
+    check_diagnosis(out, extend)
     causes = user.load(cause_files)
     run = load_model.load(run_path, causes)
     names = trial_voyages.voyages_of(run, store, voyages)

@@ -8,7 +8,7 @@ from collections.abc import Sequence, Sized
 from pathlib import Path
 
 from shiplog import files
-from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
+from shiplog.exceptions import LogUnreadable, RunError, ShiplogError, UsageError
 
 
 def sample_logs(given: Path | None = None) -> Path:
@@ -114,6 +114,27 @@ def check_run(path: Path) -> None:
             hint="give the folder that shiplog train --out RUN made.",
         )
     raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+
+
+def check_diagnosis(out: Path, extend: Path | None) -> None:
+    """Where a report goes, and the run that --extend makes. Raises ShiplogError where a report
+    would replace a run's own provenance, or where the one would be in the other's way."""
+    if (out / "config.toml").is_file():
+        raise RunError(
+            f"--out {out} is a run: the report's provenance.json would replace the run's.",
+            hint="choose another --out; a folder in the run will do.",
+        )
+    check_writable(out, "--out")
+    if extend is None:
+        return
+    refuse_taken(extend, "--extend")
+    check_writable(extend, "--extend")
+    report, run = (Path(os.path.realpath(path)) for path in (out, extend))
+    if run == report or run in report.parents:
+        raise UsageError(
+            f"--extend {extend} is a folder for a run, and --out {out} for a report in it.",
+            hint="give --extend a folder of its own, such as runs/extended.",
+        )
 
 
 def refuse_same_names(runs: Sequence[Path]) -> None:

@@ -29,13 +29,10 @@ def diagnose(
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """
-    from shiplog.paths import check_writable, refuse_taken
+    from shiplog.paths import check_diagnosis
 
+    check_diagnosis(out, extend)
     check_runs([run], store, voyages, cause)
-    check_writable(out, "--out")
-    if extend is not None:
-        refuse_taken(extend, "--extend")
-        check_writable(extend, "--extend")
     from pipelines.bars import loading
 
     with loading():

@@ -247,6 +247,10 @@ OPTIONS = {
         lambda d: d.train("--voyages", "one", "--window", "40")),
     "a profile without actuators": (1, ["actuator"], lambda d: [
         "train", "--store", undriven(d), "--out", d.path("run")]),
+    "--extend where the report goes": (2, ["--extend runs/mmg2 is a folder for a run"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "runs/mmg2", "--extend", "runs/mmg2"]),
+    "--extend above the report": (2, ["--extend a is a folder for a run"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "a/b/../c", "--extend", "a"]),
     "two ships": (1, ["different ships"], lambda d: ["train", "--store", two_ships(d), "--out",
         d.path("run")]),
 }  # fmt: skip

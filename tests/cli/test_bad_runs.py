@@ -161,6 +161,8 @@ CASES = {
         *d.on("diagnose", "mmg"), "--extend", d.dir("r")]),
     "diagnose: --extend in a file": (["--extend", "is a file"], lambda d: [
         *d.on("diagnose", "mmg"), "--extend", d.file("f") / "r"]),
+    "diagnose: --out is a run": (["--out", "is a run", "choose another"], lambda d: [
+        *d.on("diagnose", "mmg"), "--out", d.sea / "mmg"]),
     "diagnose: --out is a file": (["--out", "is a file"], lambda d: [
         *d.on("diagnose", "mmg"), "--out", d.file("f")]),
     "train: --out is a run": (["exists already"], lambda d: [
