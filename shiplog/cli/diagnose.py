@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer
 
 
 def diagnose(
@@ -42,3 +42,5 @@ def diagnose(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
     )
     answer(found.text, found.content, json_to)
+    if not found.complete:
+        raise typer.Exit(LOST)
