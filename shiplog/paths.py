@@ -50,6 +50,18 @@ def refuse_taken(path: Path, option: str = "--out") -> None:
         raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
 
 
+def refuse_namesake(name: str, begun: set[str], path: Path) -> None:
+    """Raises ShiplogError for a second voyage of a table that is to be the same file; `begun`
+    holds the names of the others, and then this one."""
+    if name in begun:
+        raise ShiplogError(
+            f"Two voyages of {path.name} would be {name}.mcap: their names differ only in letters "
+            "that a file's name cannot have.",
+            hint="the first one is converted; give the other one another name in the table.",
+        )
+    begun.add(name)
+
+
 def check_there(path: Path, what: str) -> None:
     """Raises LogUnreadable where there is no such path. `what`: what may be given instead."""
     if not path.exists():
