@@ -181,7 +181,7 @@ def compare(
     ShiplogError."""
     to = None if save is None else Path(save)
     done = evaluating.compare_runs(_runs(runs), Store(_path(store)), _names(voyages), to)
-    return Comparison(done.recording, done.text)
+    return Comparison(done.written(), done.text)
 
 
 def diagnose(

@@ -86,10 +86,10 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
-        f"Look at it again: rerun {result.recording} {season.recording}\n"
+        f"Look at it again: rerun {result.written()} {season.written()}\n"
         "The store has two more seasons, season3_* and season4_*: "
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
-    content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
+    content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
-    return Demo(ending, content, result.recording)
+    return Demo(ending, content, result.written())

@@ -93,6 +93,14 @@ def leave(done, json_to: str | None) -> None:
         raise typer.Exit(LOST)
 
 
+def leave_lost(lost: Sequence[ShiplogError]) -> None:
+    """What was lost of a job that is done otherwise, and exit 3; nothing where nothing was."""
+    for why in lost:
+        typer.echo(str(why), err=True)
+    if lost:
+        raise typer.Exit(LOST)
+
+
 def show(recording: Path, web: bool) -> None:
     from shiplog.report import viewer
 

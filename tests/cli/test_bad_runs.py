@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -289,7 +290,7 @@ def test_a_begun_run_with_spoilt_settings_is_begun_anew(desk, capsys, caplog, co
 @pytest.mark.parametrize(("number", "words"), [
     (30, "Read-only file system"), (28, "No space left on device"), (13, "Permission denied"),
 ])  # fmt: skip
-def test_a_run_that_cannot_be_written_stays_as_it_was(desk, capsys, monkeypatch, number, words):
+def test_a_run_that_cannot_be_written_costs_no_answer(desk, capsys, monkeypatch, number, words):
     """A disk that is full, or a network drive that is read-only now."""
     copy = desk.spoilt("nothing")[1]
     before = {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()}
@@ -298,9 +299,21 @@ def test_a_run_that_cannot_be_written_stays_as_it_was(desk, capsys, monkeypatch,
         raise OSError(number, words)
 
     monkeypatch.setattr(files, "flush", refuse)
-    judge(desk.on("evaluate", copy), 1, [f"errors.parquet: {words}", "has room on its disk"],
-          capsys)  # fmt: skip
-    assert {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()} == before
+    evaluate = desk.on("evaluate", copy)
+    compare = [*desk.on("compare", copy), "--save", desk.path("a.rrd")]
+    for arguments, more in ((evaluate, ()), (compare, ("a.rrd could not be written",))):
+        judge(arguments, 3, ["Per voyage, spoilt", f"errors.parquet: {words}",
+              "has room on its disk", *more], capsys)  # fmt: skip
+        assert {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()} == before
+
+
+def test_a_run_that_cannot_be_written_needs_another_place_for_its_recording(
+    desk, capsys, monkeypatch
+):
+    """Before the work."""
+    copy = desk.spoilt("nothing")[1]
+    monkeypatch.setattr(os, "access", lambda path, how: (path, how) != (copy, os.W_OK))
+    judge(desk.on("compare", copy), 1, ["spoilt is not writable", "choose another --save"], capsys)
 
 
 def test_a_refused_diagnosis_leaves_nothing(desk, capsys):
