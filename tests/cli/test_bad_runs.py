@@ -271,7 +271,10 @@ def test_a_catalogue_of_rubbish_is_made_again(desk, capsys):
 
 
 def test_again_takes_no_other_setting(desk, capsys):
-    for option in (("--window", 30), ("--model", "mmg"), ("--voyages", "trip_1")):
+    for option in (
+        ("--window", 30), ("--model", "mmg"), ("--voyages", "trip_1"), ("--seeds", 1),
+        ("--recipe", "fast"), ("--window", 100), ("--fit",), ("--no-fit", "--model", "mmg"),
+    ):  # fmt: skip
         judge(["train", "--again", desk.sea / "mmg", "--out", desk.path("r"), *option], 2,
               ["--again repeats a run as it was", f"{option[0]} would change it",
                "leave the other options out"], capsys)  # fmt: skip
