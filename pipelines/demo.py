@@ -14,6 +14,8 @@ from pipelines.prepare import ingest_logs
 from pipelines.train_networks import train_run
 from shiplog.exceptions import listed
 from shiplog.paths import refuse_no_season, refuse_none_ingested, sample_logs
+from shiplog.training import run_folder
+from shiplog.training.run_checks import refuse_other_rows
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.store import Store
@@ -51,15 +53,14 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     for data in DATASETS:
         path = out / "runs" / data
         paths.append(path)
-        if path.exists():
-            log.info("2/4 %s is trained already", path)
+        if _trained_already(path, store):
             continue
         split = choose_split(store, (), (), data, 100)
         training, validation = listed(split.training), listed(split.validation)
         log.info("2/4 training on %s: %s, validating on %s", data, training, validation)
         train_run(Config(data=data, seeds=SEEDS, split=split, fast=RECIPE), store, path)
     path = out / "runs" / "mmg"
-    if not path.exists():
+    if not _trained_already(path, store):
         split = choose_physical_split(store, (), (), DATASETS[0], 100)
         log.info("2/4 identifying mmg on %s", listed(split.training))
         config = Config(model="mmg", data=DATASETS[0], split=split, physics=Physics(folds=2))
@@ -93,3 +94,12 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
     return Demo(ending, content, result.written())
+
+
+def _trained_already(path: Path, store: Store) -> bool:
+    """Whether there is such a run. Raises RunError where it is of other rows than the store's."""
+    if not path.exists():
+        return False
+    refuse_other_rows(run_folder.open_finished(path), store)
+    log.info("2/4 %s is trained already", path)
+    return True
