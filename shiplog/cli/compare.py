@@ -10,7 +10,7 @@ import typer
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
 from shiplog.cli.output import answer, leave_lost, show
-from shiplog.exceptions import ShiplogError
+from shiplog.exceptions import ShiplogError, UsageError
 
 
 def compare(
@@ -30,6 +30,11 @@ def compare(
     """
     from shiplog.paths import check_file
 
+    if web and save is not None:
+        raise UsageError(
+            "--web serves the recording, and --save writes it and opens nothing.",
+            hint="leave one of them out.",
+        )
     check_runs(runs, store, voyages, cause)
     to = check_file(save or runs[0] / "compare.rrd", "--save")
     from pipelines.bars import loading

@@ -231,6 +231,10 @@ OPTIONS = {
         "--model", "mmg", "--device", "cuda", "--recipe", "paper")),
     "a GPU and processes": (2, ["--jobs says nothing to --device cuda"], lambda d: [
         "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--jobs", "2"]),
+    "processes and a cluster": (2, ["--jobs says nothing to --ray"], lambda d: [
+        "paper", "--store", d.store, "--jobs", "2", "--ray", "a:1"]),
+    "--web and --save": (2, ["--web serves", "leave one of them out"], lambda d: [
+        "compare", "runs/mmg", "--web", "--save", d.path("a.rrd")]),
     "a GPU and a cluster": (2, ["--ray says nothing to --device cuda"], lambda d: [
         "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--ray", "a:1"]),
     "--no-fit of a network": (2, ["says nothing to a network"], lambda d: d.train("--no-fit")),
