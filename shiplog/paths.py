@@ -10,6 +10,8 @@ from pathlib import Path
 from shiplog import files
 from shiplog.exceptions import LogUnreadable, RunError, ShiplogError, UsageError
 
+BEGUN = ".partial"  # end of a run's name until it is finished
+
 
 def sample_logs(given: Path | None = None) -> Path:
     """The folder of logs for the demo: the one given, or that of the checkout this runs from.
@@ -48,6 +50,17 @@ def refuse_taken(path: Path, option: str = "--out") -> None:
     """Raises RunError where something is there already."""
     if path.exists():
         raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
+
+
+def refuse_run(path: Path, option: str = "--out") -> None:
+    """Raises RunError where something is there already, and UsageError for a name that only a
+    begun run has: it would never count as finished."""
+    if path.name.endswith(BEGUN):
+        raise UsageError(
+            f"{option} {path} ends as the folder of a run that is not finished does.",
+            hint=f"leave {BEGUN} out: shiplog adds it until the run is finished.",
+        )
+    refuse_taken(path, option)
 
 
 def refuse_namesake(name: str, begun: set[str], path: Path) -> None:
@@ -112,12 +125,12 @@ def check_file(path: Path, option: str, streams: bool = False) -> Path:
 
 def check_run(path: Path) -> None:
     """Raises RunError for what is no finished run."""
-    begun = path.name.endswith(".partial")
+    begun = path.name.endswith(BEGUN)
     if (path / "config.toml").is_file() and not begun:
         return
-    if (path if begun else path.with_name(f"{path.name}.partial")).is_dir():
+    if (path if begun else path.with_name(f"{path.name}{BEGUN}")).is_dir():
         raise RunError(
-            f"The run {path.with_name(path.name.removesuffix('.partial'))} is not finished.",
+            f"The run {path.with_name(path.name.removesuffix(BEGUN))} is not finished.",
             hint="give the same `shiplog train` again: it goes on.",
         )
     if path.exists():
@@ -139,7 +152,7 @@ def check_diagnosis(out: Path, extend: Path | None) -> None:
     check_writable(out, "--out")
     if extend is None:
         return
-    refuse_taken(extend, "--extend")
+    refuse_run(extend, "--extend")
     check_writable(extend, "--extend")
     report, run = (Path(os.path.realpath(path)) for path in (out, extend))
     if run == report or run in report.parents:

@@ -96,7 +96,7 @@ def train(
 
     Example: shiplog train --again runs/mmg --out runs/mmg-2
     """
-    from shiplog.paths import check_run, check_writable, refuse_taken
+    from shiplog.paths import check_run, check_writable, refuse_run
     from shiplog.training.options import TrainOptions
 
     options = TrainOptions(
@@ -106,7 +106,7 @@ def train(
         free=tuple(free or ()), folds=folds,
     )  # fmt: skip
     options.check()
-    refuse_taken(out)
+    refuse_run(out)
     check_writable(out, "--out")
     if again is not None:
         _refuse_others(context)

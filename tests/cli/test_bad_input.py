@@ -261,6 +261,10 @@ OPTIONS = {
         "diagnose", "runs/mmg", "--out", "runs/mmg2", "--extend", "runs/mmg2"]),
     "--extend above the report": (2, ["--extend a is a folder for a run"], lambda d: [
         "diagnose", "runs/mmg", "--out", "a/b/../c", "--extend", "a"]),
+    "--out of a begun run": (2, ["leave .partial out"], lambda d: [
+        "train", "--store", d.store, "--out", d.path("run.partial")]),
+    "--extend of a begun run": (2, ["leave .partial out"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "a", "--extend", d.path("run.partial")]),
     "two ships": (1, ["different ships"], lambda d: ["train", "--store", two_ships(d), "--out",
         d.path("run")]),
 }  # fmt: skip
