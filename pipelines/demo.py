@@ -14,6 +14,7 @@ from pipelines.prepare import ingest_logs
 from pipelines.train_networks import train_run
 from shiplog.exceptions import listed
 from shiplog.paths import refuse_no_season, refuse_none_ingested, sample_logs
+from shiplog.report import tables, viewer
 from shiplog.training import run_folder
 from shiplog.training.run_checks import refuse_other_rows
 from shiplog.training.run_config import Config, Fast, Physics
@@ -30,11 +31,15 @@ RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo says and where the recording is."""
+    """What the demo says and where the recording is.
+
+    complete   whether every log was taken, and every message of it could be read
+    """
 
     text: str
     content: dict
     recording: Path
+    complete: bool = True
 
 
 def run_demo(out: Path, logs: Path | None) -> Demo:
@@ -47,6 +52,8 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
     for refused, why in done.refused.items():
         log.warning("%s refused: %s", Path(refused).name, why)
+    for line in (line for report in done.damaged for line in tables.voyage_lines(report)):
+        log.warning("%s", line)
     refuse_none_ingested(done.reports, folder)
     refuse_no_season(store.select(), NEXT_SEASON, folder)
     paths = []
@@ -87,13 +94,13 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
-        f"Look at it again: rerun {result.written()} {season.written()}\n"
+        f"Look at it again: {viewer.RERUN} {result.written()} {season.written()}\n"
         "The store has two more seasons, season3_* and season4_*: "
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
     content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
-    return Demo(ending, content, result.written())
+    return Demo(ending, content, result.written(), done.complete)
 
 
 def _trained_already(path: Path, store: Store) -> bool:

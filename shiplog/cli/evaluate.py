@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import answer, leave_lost
+from shiplog.cli.output import LOST, answer, leave_lost
 
 
 def evaluate(
@@ -33,3 +33,5 @@ def evaluate(
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
     answer(found.text(), found.answer(found.runs[0]), json_to)
     leave_lost(save(found))
+    if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
+        raise typer.Exit(LOST)

@@ -319,6 +319,16 @@ def test_a_run_that_cannot_be_written_needs_another_place_for_its_recording(
     judge(desk.on("compare", copy), 1, ["spoilt is not writable", "choose another --save"], capsys)
 
 
+def test_a_voyage_without_a_window_is_lost_where_it_is_named(desk, capsys):
+    whole = desk.on("evaluate", "mmg")
+    to = desk.path("a.json")
+    named = [*desk.on("evaluate", "mmg", voyages="trip_3[0:15]"), "--voyages", "trip_3[20:60]"]
+    judge([*named, "--json", to], 3, ["Without a window of that length: trip_3[0:15]"], capsys)
+    assert json.loads(to.read_text())["too_short"] == ["trip_3[0:15]"]
+    judge([*whole, "--json", to], 0, ["Per voyage"], capsys)
+    assert json.loads(to.read_text())["too_short"] == []
+
+
 def test_a_refused_diagnosis_leaves_nothing(desk, capsys):
     judge([*desk.on("diagnose", "mmg"), "--out", desk.path("out"), "--extend", desk.dir("r")],
           1, ["exists already"], capsys)  # fmt: skip
