@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -67,16 +68,19 @@ def _drawn(lines: Sequence[str]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    head, rule, *rows = (
-        [cell.strip() for cell in line.removeprefix("| ").removesuffix(" |").split(" | ")]
-        for line in lines
-    )
+    head, rule, *rows = map(_cells, lines)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title, dashes in zip(head, rule, strict=True):
         table.add_column(Text(title), justify="right" if dashes.endswith(":") else "left")
     for row in rows:
         table.add_row(*map(Text, row))
     return table
+
+
+def _cells(line: str) -> list[str]:
+    """Of a row, blank ones included; a bar inside a cell has a backslash before it."""
+    cells = re.split(r"(?<!\\)\|", line.strip().removeprefix("|").removesuffix("|"))
+    return [cell.strip().replace("\\|", "|") for cell in cells]
 
 
 def leave(done, json_to: str | None) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -12,8 +14,10 @@ import pytest
 from command_desk import judge
 
 from shiplog import files
+from shiplog.cli import output
 from shiplog.exceptions import ShiplogError
 from shiplog.paths import check_file
+from shiplog.report.text_table import table
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links of POSIX")
 
@@ -57,3 +61,29 @@ def test_a_device_is_written_to_and_never_replaced(tmp_path, monkeypatch):
     link = tmp_path / "a.rrd"
     link.symlink_to(tmp_path / "b.rrd")
     assert check_file(link, "--save") == tmp_path.resolve() / "b.rrd"
+
+
+@posix
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_command_goes_on_without_standard_streams(desk, closed):
+    to = desk.path("a.json")
+    words = [sys.executable, "-m", "shiplog.cli", "voyages", "--store", desk.store, "--json", to]
+    shell = ["sh", "-c", f'exec "$@" {closed}', "sh", *map(str, words)]
+    done = subprocess.run(shell, cwd=Path(__file__).parents[2], check=False)
+    assert done.returncode == 0 and len(json.loads(to.read_text())["voyages"]) == 2
+
+
+def test_a_voyage_that_cannot_be_read_is_lost_from_the_list(desk, capsys, caplog):
+    store = shutil.copytree(desk.store, desk.path("spoilt"))
+    (store / "voyage=one" / "voyage.json").write_text("{}")
+    output = judge(["voyages", "--store", store], 3, ["two"], capsys)
+    assert "voyage=one cannot be read and is left out" in caplog.text and "| one" not in output
+    judge(["voyages", "--store", store, "--voyages", "two"], 0, ["two"], capsys)
+
+
+def test_blank_cells_and_bars_in_cells_are_drawn_in_their_columns():
+    drawn = output._drawn(table(("a", "L of x | y"), [("", 1.5), ("p|q", 2.0)]).splitlines())
+    assert [column.header.plain for column in drawn.columns] == ["a", "L of x | y"]
+    cells = [[cell.plain for cell in column.cells] for column in drawn.columns]
+    assert cells == [["", "p|q"], ["1.5", "2"]]
+    assert output._cells("| channel | gnss | | |") == ["channel", "gnss", "", ""]
