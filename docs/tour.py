@@ -34,7 +34,7 @@ scored.errors
 
 # %%
 pictures = shiplog.compare(run, store, "voyage_6", save="tour/compare.rrd")
-print(f"rerun {pictures.recording}")
+print(f"rerun --bind 127.0.0.1 {pictures.recording}")
 
 # %% [markdown]
 # What the model gets wrong half a year later, why, and what is gained by putting it right.

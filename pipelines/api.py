@@ -163,10 +163,14 @@ def evaluate(
     runs: Run | str | Path | Sequence[Run | str | Path],
     store: Store | str | Path,
     voyages: Names = (),
+    *,
+    causes: Files = (),
 ) -> Evaluation:
     """Simulated against measured, window by window, with baselines. Without `voyages`, those that
-    the run kept for its test. Raises ShiplogError."""
-    found = evaluating.evaluate_runs(_runs(runs), Store(_path(store)), _names(voyages))
+    the run kept for its test. `causes`: as for `load`. Raises ShiplogError."""
+    found = evaluating.evaluate_runs(
+        _runs(runs), Store(_path(store)), _names(voyages), _files(causes)
+    )
     return Evaluation(found.errors, found.rollouts, found.coverage, found.text())
 
 
@@ -176,12 +180,15 @@ def compare(
     voyages: Names = (),
     *,
     save: str | Path | None = None,
+    causes: Files = (),
 ) -> Comparison:
     """The same as a Rerun recording: `save`, or compare.rrd in the first run. Raises
     ShiplogError."""
     to = None if save is None else Path(save)
-    done = evaluating.compare_runs(_runs(runs), Store(_path(store)), _names(voyages), to)
-    return Comparison(done.recording, done.text)
+    done = evaluating.compare_runs(
+        _runs(runs), Store(_path(store)), _names(voyages), to, _files(causes)
+    )
+    return Comparison(done.written(), done.text)
 
 
 def diagnose(

@@ -185,7 +185,7 @@ _CURRENT: ContextVar[_StageBar | None] = ContextVar("bar", default=None)
 
 def drawable() -> bool:
     """Whether a bar can be drawn: stderr is a terminal."""
-    return sys.stderr.isatty()
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.logs.write import Series, refuse_existing, write_log
-from shiplog.paths import check_there
+from shiplog.paths import check_there, refuse_namesake
 from shiplog.profile import Profile
 from shiplog.unexpected import unexpected
 from shiplog.voyages.draft_profile import draft as draft_log
@@ -49,10 +49,8 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
             with nullcontext() if drawable() else saying(f"{path.name}: converting"):
                 for target in _each(path, profile, out, done):
                     done.logs.append(target)
-        except ShiplogError as error:
-            done.refused[str(path)] = str(error)
         except BaseException as error:  # one bad source never ends the others; a panic, too
-            done.refused[str(path)] = str(unexpected(error, path.name))
+            done.refused[str(path)] = _why(error, path.name)
     reading_limits.end()
     return done
 
@@ -101,9 +99,21 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
         if lost:
             done.lost[str(path)] = ", ".join(lost)
+        begun: set[str] = set()
         for name, part in voyages:
-            series = columns.series(part, profile)
-            yield _written(out / f"{name}.mcap", series, profile, ship, path)
+            try:  # one bad voyage never ends the others
+                refuse_namesake(name, begun, path)
+                series = columns.series(part, profile)
+                target = _written(out / f"{name}.mcap", series, profile, ship, path)
+            except BaseException as error:
+                where = str(path) if name == path.stem else f"{path}: {name}"
+                done.refused[where] = _why(error, f"{path.name}: {name}")
+                continue
+            yield target
+
+
+def _why(error: BaseException, doing: str) -> str:
+    return str(error if isinstance(error, ShiplogError) else unexpected(error, doing))
 
 
 def _written(

@@ -14,6 +14,9 @@ from pipelines.prepare import ingest_logs
 from pipelines.train_networks import train_run
 from shiplog.exceptions import listed
 from shiplog.paths import refuse_no_season, refuse_none_ingested, sample_logs
+from shiplog.report import tables, viewer
+from shiplog.training import run_folder
+from shiplog.training.run_checks import refuse_other_rows
 from shiplog.training.run_config import Config, Fast, Physics
 from shiplog.voyages.split import choose_physical_split, choose_split
 from shiplog.voyages.store import Store
@@ -28,11 +31,15 @@ RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo says and where the recording is."""
+    """What the demo says and where the recording is.
+
+    complete   whether every log was taken, and every message of it could be read
+    """
 
     text: str
     content: dict
     recording: Path
+    complete: bool = True
 
 
 def run_demo(out: Path, logs: Path | None) -> Demo:
@@ -45,21 +52,22 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     done = ingest_logs(sorted(folder.glob("*.mcap")), None, store)
     for refused, why in done.refused.items():
         log.warning("%s refused: %s", Path(refused).name, why)
+    for line in (line for report in done.damaged for line in tables.voyage_lines(report)):
+        log.warning("%s", line)
     refuse_none_ingested(done.reports, folder)
     refuse_no_season(store.select(), NEXT_SEASON, folder)
     paths = []
     for data in DATASETS:
         path = out / "runs" / data
         paths.append(path)
-        if path.exists():
-            log.info("2/4 %s is trained already", path)
+        if _trained_already(path, store):
             continue
         split = choose_split(store, (), (), data, 100)
         training, validation = listed(split.training), listed(split.validation)
         log.info("2/4 training on %s: %s, validating on %s", data, training, validation)
         train_run(Config(data=data, seeds=SEEDS, split=split, fast=RECIPE), store, path)
     path = out / "runs" / "mmg"
-    if not path.exists():
+    if not _trained_already(path, store):
         split = choose_physical_split(store, (), (), DATASETS[0], 100)
         log.info("2/4 identifying mmg on %s", listed(split.training))
         config = Config(model="mmg", data=DATASETS[0], split=split, physics=Physics(folds=2))
@@ -86,10 +94,19 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         f"{diagnosis.verdict.sentence}\n\nThe extended model, diagnosed again: {repeated}\n\n"
         f"Took {took:.0f} s. The voyages are in {store.path}, the runs in {out / 'runs'}, the "
         f"diagnosis in {out / 'diagnosis' / 'report.md'}.\n"
-        f"Look at it again: rerun {result.recording} {season.recording}\n"
+        f"Look at it again: {viewer.RERUN} {result.written()} {season.written()}\n"
         "The store has two more seasons, season3_* and season4_*: "
         f"shiplog diagnose {path} --voyages 'season3_*' --store {store.path}"
     )
-    content |= {"season2_recording": str(season.recording), "seconds": round(took, 1)}
+    content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
-    return Demo(ending, content, result.recording)
+    return Demo(ending, content, result.written(), done.complete)
+
+
+def _trained_already(path: Path, store: Store) -> bool:
+    """Whether there is such a run. Raises RunError where it is of other rows than the store's."""
+    if not path.exists():
+        return False
+    refuse_other_rows(run_folder.open_finished(path), store)
+    log.info("2/4 %s is trained already", path)
+    return True

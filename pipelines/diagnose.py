@@ -23,8 +23,9 @@ from shiplog.diagnosis import (
 )
 from shiplog.diagnosis import result as decisions
 from shiplog.diagnosis.held_out import HeldOut
+from shiplog.exceptions import ShiplogError
 from shiplog.models.causes import Cause, user
-from shiplog.paths import refuse_taken
+from shiplog.paths import check_diagnosis
 from shiplog.profile import Profile
 from shiplog.report import answer, diagnosis_pictures, page
 from shiplog.report.answer import Context, DiagnosedTrial
@@ -33,6 +34,7 @@ from shiplog.training import extension_file, load_model
 from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.run_checks import refuse_other_ship
+from shiplog.unexpected import unexpected
 from shiplog.voyages import parts
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
@@ -62,8 +64,7 @@ def diagnose_run(
 ) -> DiagnosedTrial:
     """The whole way. Raises ShiplogError."""
     began = time.time()
-    if extend is not None:
-        refuse_taken(extend, "--extend")
+    check_diagnosis(out, extend)
     causes = user.load(cause_files)
     run = load_model.load(run_path, causes)
     names = trial_voyages.voyages_of(run, store, voyages)
@@ -83,7 +84,7 @@ def diagnose_run(
     _save(done, store, names, began)
     if extend is not None:
         _extend(run, done, extend, cause_files)
-    return done
+    return _drawn(done)
 
 
 @dataclass(frozen=True)
@@ -186,12 +187,23 @@ def _write(done: DiagnosedTrial) -> None:
 
 
 def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float) -> None:
-    """Report, verdict, provenance and pictures; those of an earlier diagnosis do not stay."""
+    """Report, verdict and provenance; pictures of an earlier diagnosis do not stay."""
     _write(done)
     files.remove(done.folder / answer.RECORDING)
     files.write_json(done.folder / "provenance.json", provenance(store.hashes(names), began))
-    if done.recording is not None:
+
+
+def _drawn(done: DiagnosedTrial) -> DiagnosedTrial:
+    """The pictures, last: all else is written. Where they fail, the answer says why."""
+    if done.recording is None:
+        return done
+    try:
         diagnosis_pictures.save(done, done.recording)
+    except BaseException as error:  # a panic of polars is no Exception
+        fault = error if isinstance(error, ShiplogError) else unexpected(error, "drawing")
+        log.warning("%s", fault)
+        return replace(done, drawn=False)
+    return done
 
 
 def _extend(run: Run, done: DiagnosedTrial, out: Path, cause_files: Sequence[Path]) -> None:
@@ -220,6 +232,8 @@ def diagnose_command(
     if done.recording is not None:
         text += f"\nRecording: {done.recording}"
         content["recording"] = str(done.recording)
+    elif not done.drawn:
+        text += "\nRecording: none, it could not be made."
     if extend is not None and done.after is not None:
         text += f"\nExtended model: {extend}"
-    return Answer(text, content)
+    return Answer(text, content, complete=done.drawn)

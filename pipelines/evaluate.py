@@ -11,7 +11,7 @@ import polars as pl
 
 from pipelines.bars import reach, staged
 from shiplog.channels import STATE
-from shiplog.exceptions import listed
+from shiplog.exceptions import ShiplogError, listed
 from shiplog.models.causes import user
 from shiplog.paths import refuse_same_names
 from shiplog.report.comparison_data import BAND, ComparisonData, DrawnActuator
@@ -22,6 +22,7 @@ from shiplog.training import load_model
 from shiplog.training.load_model import Run
 from shiplog.training.run_checks import refuse_other_columns, refuse_other_window
 from shiplog.training.voyages_to_test import held_back, say_twins
+from shiplog.unexpected import unexpected
 from shiplog.voyages import windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
@@ -84,11 +85,17 @@ def evaluate_runs(
     )
 
 
-def save(evaluation: EvaluatedRuns) -> None:
-    """errors.parquet and rollouts.parquet into each run's folder."""
+def save(evaluation: EvaluatedRuns) -> tuple[ShiplogError, ...]:
+    """errors.parquet and rollouts.parquet into each run's folder. Returns what the system says of
+    a folder that cannot be written, such as a colleague's: the evaluation is good all the same."""
+    refused = []
     for run in evaluation.runs:
         mine = pl.col("run") == run.name
-        run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
+        try:
+            run.save_evaluation(evaluation.errors.filter(mine), evaluation.rollouts.filter(mine))
+        except OSError as error:
+            refused.append(unexpected(error))
+    return tuple(refused)
 
 
 def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
@@ -123,11 +130,19 @@ def comparison(evaluation: EvaluatedRuns, title: str) -> ComparisonData:
 
 @dataclass(frozen=True)
 class Compared:
-    """What `compare` says and where the recording is."""
+    """What `compare` says and where the recording is; `lost`: what could not be written, and why.
+    Without the recording it is None, and all else is there."""
 
     text: str
     content: dict
-    recording: Path
+    recording: Path | None
+    lost: tuple[ShiplogError, ...] = ()
+
+    def written(self) -> Path:
+        """The recording. Raises ShiplogError where it could not be written."""
+        if self.recording is None:
+            raise self.lost[-1]
+        return self.recording
 
 
 def compare_runs(
@@ -142,13 +157,17 @@ def compare_runs(
     from shiplog.report import viewer
 
     found = evaluate_runs(paths, store, voyages, cause_files)
-    save(found)
+    lost = save(found)
     recording = save_to or found.runs[0].path / "compare.rrd"
     title = f"{found.runs[0].profile.ship.name}: {listed(found.voyages, most=3)}"
-    viewer.save(comparison(found, title), recording)
+    try:
+        viewer.save(comparison(found, title), recording)
+    except ShiplogError as error:
+        recording, lost = None, (*lost, error)
     answers = {run.name: found.answer(run) for run in found.runs}
-    content = {"contract": 1, "recording": str(recording), "runs": answers}
-    return Compared(f"{found.text()}\n\nRecording: {recording}", content, recording)
+    where = None if recording is None else str(recording)
+    content = {"contract": 1, "recording": where, "runs": answers}
+    return Compared(f"{found.text()}\n\nRecording: {where or 'none'}", content, recording, lost)
 
 
 def _numbered(cut: Windows) -> pl.DataFrame:

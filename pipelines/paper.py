@@ -25,7 +25,11 @@ from shiplog.training import gpu, run_folder
 from shiplog.training.options import TrainOptions
 from shiplog.training.provenance import Answer
 from shiplog.training.queue import Task
-from shiplog.training.run_checks import refuse_none_trained, refuse_other_settings
+from shiplog.training.run_checks import (
+    refuse_none_trained,
+    refuse_other_rows,
+    refuse_other_settings,
+)
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
 from shiplog.voyages import parts
@@ -177,6 +181,7 @@ def train_sets(
             if path.is_dir():
                 done = run_folder.open_finished(path)
                 refuse_other_settings(done, config)
+                refuse_other_rows(done, store)
                 finished[name] = done
                 continue
             begun[name] = train_networks.begin(config, store, path)

@@ -35,11 +35,17 @@ class IngestedLogs:
     @property
     def complete(self) -> bool:
         """Every log was taken, and every message of it could be read."""
-        damaged = {"crc", "truncated"}
-        return not self.refused and not any(
-            report.messages_lost != 0 or any(f.kind in damaged for f in report.findings)
+        return not self.refused and not self.damaged
+
+    @property
+    def damaged(self) -> list[VoyageReport]:
+        """Of logs of which something could not be read."""
+        kinds = {"crc", "truncated"}
+        return [
+            report
             for report in self.reports
-        )
+            if report.messages_lost != 0 or any(f.kind in kinds for f in report.findings)
+        ]
 
 
 def ingest_logs(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.bars import loading
 from shiplog.models import MODELS, NETWORK, PHYSICS
-from shiplog.paths import refuse_taken
+from shiplog.paths import refuse_run
 from shiplog.training.options import TrainOptions
 from shiplog.voyages.split import choose_physical_split, choose_split, say
 from shiplog.voyages.split_settings import Split
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     """Raises ShiplogError, for what the user chose before anything heavy is loaded."""
     options.check()
-    refuse_taken(out)
+    refuse_run(out)
     choose, train = FLOWS[MODELS[options.model].family.name]
     store = Store(store_path)
     split = choose(store, options.voyages, options.validation, options.data, options.window)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipelines.bars import loading
 from shiplog.models import NETWORK, PHYSICS
-from shiplog.paths import refuse_taken
+from shiplog.paths import refuse_run
 from shiplog.training import run_folder
 from shiplog.training.provenance import Answer
 from shiplog.training.run_checks import refuse_extended
@@ -15,7 +15,7 @@ from shiplog.training.run_folder import RunFolder
 
 def again_command(store_path: Path, out: Path, path: Path) -> Answer:
     """The same settings, rows and windows as the run `path`. Raises ShiplogError."""
-    refuse_taken(out)
+    refuse_run(out)
     old = run_folder.open_finished(path)
     refuse_extended(path)
     return FLOWS[old.kind.family.name](old, out, store_path)

@@ -144,6 +144,21 @@ def write_text(path: Path, text: str) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
+def is_stream(path: Path) -> bool:
+    """Whether a path is written to as it goes, and never replaced: a pipe, or a device such as
+    /dev/null."""
+    return path.is_fifo() or path.is_char_device()
+
+
+def write_answer(path: Path, text: str) -> None:
+    """Where a user wants an answer: into a stream, or as a file."""
+    if not is_stream(path):
+        write_text(path, text)
+        return
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write(text)
+
+
 def write_json(path: Path, content: Any) -> None:
     """A number that is not finite becomes null."""
     write_text(path, json_text(content))

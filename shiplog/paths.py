@@ -7,7 +7,10 @@ import os
 from collections.abc import Sequence, Sized
 from pathlib import Path
 
-from shiplog.exceptions import LogUnreadable, RunError, ShiplogError
+from shiplog import files
+from shiplog.exceptions import LogUnreadable, RunError, ShiplogError, UsageError
+
+BEGUN = ".partial"  # end of a run's name until it is finished
 
 
 def sample_logs(given: Path | None = None) -> Path:
@@ -49,6 +52,29 @@ def refuse_taken(path: Path, option: str = "--out") -> None:
         raise RunError(f"{path} exists already.", hint=f"choose another {option}, or remove it.")
 
 
+def refuse_run(path: Path, option: str = "--out") -> None:
+    """Raises RunError where something is there already, and UsageError for a name that only a
+    begun run has: it would never count as finished."""
+    if path.name.endswith(BEGUN):
+        raise UsageError(
+            f"{option} {path} ends as the folder of a run that is not finished does.",
+            hint=f"leave {BEGUN} out: shiplog adds it until the run is finished.",
+        )
+    refuse_taken(path, option)
+
+
+def refuse_namesake(name: str, begun: set[str], path: Path) -> None:
+    """Raises ShiplogError for a second voyage of a table that is to be the same file; `begun`
+    holds the names of the others, and then this one."""
+    if name in begun:
+        raise ShiplogError(
+            f"Two voyages of {path.name} would be {name}.mcap: their names differ only in letters "
+            "that a file's name cannot have.",
+            hint="the first one is converted; give the other one another name in the table.",
+        )
+    begun.add(name)
+
+
 def check_there(path: Path, what: str) -> None:
     """Raises LogUnreadable where there is no such path. `what`: what may be given instead."""
     if not path.exists():
@@ -71,29 +97,40 @@ def check_writable(path: Path, option: str) -> None:
         )
 
 
-def check_file(path: Path, option: str) -> None:
-    """Raises ShiplogError where no file of this name can be written; one that is there can be
-    replaced."""
-    if path.is_dir():
+def check_file(path: Path, option: str, streams: bool = False) -> Path:
+    """The file to write: of a symbolic link, the one that it leads to.
+
+    streams   whether it may be a pipe or a device, which is written to and not replaced
+
+    Raises ShiplogError where no file of this name can be written; one that is there can be
+    replaced.
+    """
+    if streams and files.is_stream(path) and os.access(path, os.W_OK):
+        return path
+    if path.is_dir() or (path.exists() and not path.is_file()):
+        what = "it is a folder" if path.is_dir() else "it is no file that can be replaced"
         raise ShiplogError(
-            f"{option} {path} cannot be written: it is a folder.", hint="give a file's path."
+            f"{option} {path} cannot be written: {what}.", hint="give a file's path."
         )
+    if path.is_symlink():
+        path = Path(os.path.realpath(path))
     if not path.parent.exists():
         raise ShiplogError(
             f"{option} {path} cannot be written: there is no folder {path.parent}.",
             hint=f"give {option} a path in a folder that exists.",
         )
     check_writable(path.parent, option)
+    return path
 
 
 def check_run(path: Path) -> None:
     """Raises RunError for what is no finished run."""
-    begun = path.name.endswith(".partial")
+    begun = path.name.endswith(BEGUN)
     if (path / "config.toml").is_file() and not begun:
         return
-    if (path if begun else path.with_name(f"{path.name}.partial")).is_dir():
+    if (path if begun else path.with_name(f"{path.name}{BEGUN}")).is_dir():
         raise RunError(
-            f"The run {path.with_name(path.name.removesuffix('.partial'))} is not finished.",
+            f"The run {path.with_name(path.name.removesuffix(BEGUN))} is not finished.",
             hint="give the same `shiplog train` again: it goes on.",
         )
     if path.exists():
@@ -102,6 +139,27 @@ def check_run(path: Path) -> None:
             hint="give the folder that shiplog train --out RUN made.",
         )
     raise RunError(f"There is no run in {path}.", hint="train one: shiplog train --out RUN.")
+
+
+def check_diagnosis(out: Path, extend: Path | None) -> None:
+    """Where a report goes, and the run that --extend makes. Raises ShiplogError where a report
+    would replace a run's own provenance, or where the one would be in the other's way."""
+    if (out / "config.toml").is_file():
+        raise RunError(
+            f"--out {out} is a run: the report's provenance.json would replace the run's.",
+            hint="choose another --out; a folder in the run will do.",
+        )
+    check_writable(out, "--out")
+    if extend is None:
+        return
+    refuse_run(extend, "--extend")
+    check_writable(extend, "--extend")
+    report, run = (Path(os.path.realpath(path)) for path in (out, extend))
+    if run == report or run in report.parents:
+        raise UsageError(
+            f"--extend {extend} is a folder for a run, and --out {out} for a report in it.",
+            hint="give --extend a folder of its own, such as runs/extended.",
+        )
 
 
 def refuse_same_names(runs: Sequence[Path]) -> None:

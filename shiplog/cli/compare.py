@@ -9,8 +9,8 @@ import typer
 
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import LOST, answer, show
-from shiplog.exceptions import ShiplogError
+from shiplog.cli.output import answer, leave_lost, show
+from shiplog.exceptions import ShiplogError, UsageError
 
 
 def compare(
@@ -30,20 +30,25 @@ def compare(
     """
     from shiplog.paths import check_file
 
+    if web and save is not None:
+        raise UsageError(
+            "--web serves the recording, and --save writes it and opens nothing.",
+            hint="leave one of them out.",
+        )
     check_runs(runs, store, voyages, cause)
-    if save is not None:
-        check_file(save, "--save")
+    to = check_file(save or runs[0] / "compare.rrd", "--save")
     from pipelines.bars import loading
 
     with loading():
         from pipelines.evaluate import compare_runs
     from shiplog.voyages.store import Store
 
-    result = compare_runs(runs, Store(store), voyages or [], save, cause or [])
+    result = compare_runs(runs, Store(store), voyages or [], to, cause or [])
     answer(result.text, result.content, json_to)
-    if save is None:
+    lost = list(result.lost)
+    if save is None and result.recording is not None:
         try:
             show(result.recording, web)
         except ShiplogError as error:
-            typer.echo(str(error), err=True)
-            raise typer.Exit(LOST) from None
+            lost.append(error)
+    leave_lost(lost)

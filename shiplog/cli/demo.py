@@ -40,5 +40,5 @@ def demo(
             show(result.recording, web=False)
         except ShiplogError as error:  # the job is done; only the window is missing
             typer.echo(f"The viewer was not opened: {error.message}", err=True)
-    if result.content["refused"]:  # named while they were ingested
+    if not result.complete:  # named while they were ingested
         raise typer.Exit(LOST)

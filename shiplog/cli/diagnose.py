@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer
 
 
 def diagnose(
@@ -29,13 +29,10 @@ def diagnose(
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """
-    from shiplog.paths import check_writable, refuse_taken
+    from shiplog.paths import check_diagnosis
 
+    check_diagnosis(out, extend)
     check_runs([run], store, voyages, cause)
-    check_writable(out, "--out")
-    if extend is not None:
-        refuse_taken(extend, "--extend")
-        check_writable(extend, "--extend")
     from pipelines.bars import loading
 
     with loading():
@@ -45,3 +42,5 @@ def diagnose(
         store, run, voyages=voyages or [], out=out, extend=extend, cause_files=cause or []
     )
     answer(found.text, found.content, json_to)
+    if not found.complete:
+        raise typer.Exit(LOST)

@@ -9,7 +9,7 @@ import typer
 
 from shiplog.cli.inputs import check_runs
 from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer, leave_lost
 
 
 def evaluate(
@@ -31,5 +31,7 @@ def evaluate(
     from shiplog.voyages.store import Store
 
     found = evaluate_runs([run], Store(store), voyages or [], cause or [])
-    save(found)
     answer(found.text(), found.answer(found.runs[0]), json_to)
+    leave_lost(save(found))
+    if set(found.too_short) & set(voyages or ()):  # by its own name, and the answer says so
+        raise typer.Exit(LOST)

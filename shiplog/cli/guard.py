@@ -76,6 +76,8 @@ def _fork(fatal: dict[bytes, int]) -> _Child | None:
         return _Child(pid, reading)
     os.close(reading)
     os.setpgid(0, 0)  # Ctrl-C reaches the parent alone, which passes it on once
+    # The child is in the background for the terminal, which may stop such a one that writes.
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -90,7 +92,9 @@ class _Child:
 
     def wait(self) -> tuple[int, bytes]:
         """Its exit code, or minus the signal that ended it; and the file that it was reading."""
-        passed_on = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        passed_on = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+        if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
+            passed_on.append(signal.SIGTSTP)
         before = {number: signal.signal(number, lambda *_: None) for number in passed_on}
         # Their numbers come through a pipe, too: one that arrives just before a read is not late
         # until something can be read (the self-pipe trick of D. J. Bernstein).
@@ -119,4 +123,13 @@ class _Child:
 
     def _pass_on(self, number: int) -> None:
         with contextlib.suppress(ProcessLookupError):
-            os.kill(self.pid, number)
+            if number != signal.SIGTSTP:
+                os.kill(self.pid, number)
+                return
+            # Ctrl-Z: both stop, and go on together. Where nobody could let this process go on,
+            # the system does not stop it.
+            os.kill(self.pid, signal.SIGSTOP)
+            handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGTSTP)
+            signal.signal(signal.SIGTSTP, handler)
+            os.kill(self.pid, signal.SIGCONT)

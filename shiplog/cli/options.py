@@ -8,15 +8,18 @@ from typing import Annotated
 import typer
 
 from shiplog.channels import LEAST_WINDOW
+from shiplog.exceptions import UsageError
 
 
 def _ask_json(json_to: str | None) -> str | None:
     """Whether --json can be written is known before the work."""
-    if json_to and json_to != "-":
-        from shiplog.paths import check_file
+    if json_to is None or json_to == "-":
+        return json_to
+    if not json_to:
+        raise UsageError("--json is given no path.", hint="give --json a file's path, or -.")
+    from shiplog.paths import check_file
 
-        check_file(Path(json_to), "--json")
-    return json_to
+    return str(check_file(Path(json_to), "--json", streams=True))
 
 
 Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]

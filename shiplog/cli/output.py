@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,7 +34,7 @@ def answer(text: str, content: dict, json_to: str | None) -> None:
         _print(text)
     if json_to:
         try:
-            files.write_text(Path(json_to), files.json_text(content))
+            files.write_answer(Path(json_to), files.json_text(content))
         except OSError as error:
             raise ShiplogError(
                 f"{json_to} cannot be written: {error.strerror}.",
@@ -67,16 +68,19 @@ def _drawn(lines: Sequence[str]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    head, rule, *rows = (
-        [cell.strip() for cell in line.removeprefix("| ").removesuffix(" |").split(" | ")]
-        for line in lines
-    )
+    head, rule, *rows = map(_cells, lines)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title, dashes in zip(head, rule, strict=True):
         table.add_column(Text(title), justify="right" if dashes.endswith(":") else "left")
     for row in rows:
         table.add_row(*map(Text, row))
     return table
+
+
+def _cells(line: str) -> list[str]:
+    """Of a row, blank ones included; a bar inside a cell has a backslash before it."""
+    cells = re.split(r"(?<!\\)\|", line.strip().removeprefix("|").removesuffix("|"))
+    return [cell.strip().replace("\\|", "|") for cell in cells]
 
 
 def leave(done, json_to: str | None) -> None:
@@ -90,6 +94,14 @@ def leave(done, json_to: str | None) -> None:
     if done.refused and not done.reports:
         raise typer.Exit(1)
     if not done.complete:
+        raise typer.Exit(LOST)
+
+
+def leave_lost(lost: Sequence[ShiplogError]) -> None:
+    """What was lost of a job that is done otherwise, and exit 3; nothing where nothing was."""
+    for why in lost:
+        typer.echo(str(why), err=True)
+    if lost:
         raise typer.Exit(LOST)
 
 

@@ -86,7 +86,12 @@ def paper(
 
 
 def _refuse_together(device: str, jobs: int | None, ray: str | None) -> None:
-    """Raises UsageError for a GPU and, at once, processes or a cluster."""
+    """Raises UsageError for two of a GPU, processes and a cluster."""
+    if ray is not None and jobs is not None:
+        raise UsageError(
+            "--jobs says nothing to --ray: the cluster trains as many at a time as it has cores.",
+            hint="leave --jobs or --ray out.",
+        )
     for value, flag in ((jobs, "--jobs"), (ray, "--ray")):
         if device == "cuda" and value is not None:
             raise UsageError(

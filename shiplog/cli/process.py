@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ class _Lines(logging.Handler):
 
 def main() -> None:
     """Entry point: settings of this process, then `run`."""
+    _open_missing()
     disk_cache.keep_compiled()
     logging.basicConfig(format="%(message)s", handlers=[_Lines()], level=logging.WARNING)
     logging.getLogger("shiplog").setLevel(logging.INFO)
@@ -42,6 +44,16 @@ def main() -> None:
             signal.signal(number, _stopped)
     ended = guard.guarded(sys.argv[1:])  # in the child there is none: it runs the command
     sys.exit(run() if ended is None else ended)
+
+
+def _open_missing() -> None:
+    """Standard streams that were closed before the start lead nowhere: a job goes on without them,
+    and no file that it opens takes their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            nowhere = open(os.devnull, mode)  # noqa: SIM115  under the lowest free number: its own
+            os.set_inheritable(nowhere.fileno(), True)
+            setattr(sys, name, nowhere)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -30,7 +30,7 @@ def profile(
 
     if out is not None:
         refuse_taken(out)
-        check_file(out, "--out")
+        out = check_file(out, "--out")
     from pipelines.convert import draft
 
     text = draft(log, vessel)

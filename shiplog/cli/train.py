@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,9 +22,6 @@ from shiplog.cli.options import (
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.models import MODELS
-
-if TYPE_CHECKING:
-    from shiplog.training.options import TrainOptions
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
@@ -65,8 +62,11 @@ Again = Annotated[
     typer.Option(help="Repeat this run from its folder alone; every setting is that run's."),
 ]
 
+OF_AGAIN = ("out", "again", "store", "json_to")  # parameters that go with --again
+
 
 def train(
+    context: typer.Context,
     out: Out,
     model: Model = "feedforward",
     data: Data = "ref",
@@ -96,7 +96,7 @@ def train(
 
     Example: shiplog train --again runs/mmg --out runs/mmg-2
     """
-    from shiplog.paths import check_run, check_writable, refuse_taken
+    from shiplog.paths import check_run, check_writable, refuse_run
     from shiplog.training.options import TrainOptions
 
     options = TrainOptions(
@@ -106,10 +106,10 @@ def train(
         free=tuple(free or ()), folds=folds,
     )  # fmt: skip
     options.check()
-    refuse_taken(out)
+    refuse_run(out)
     check_writable(out, "--out")
     if again is not None:
-        _refuse_others(options)
+        _refuse_others(context)
         check_run(again)
         from pipelines.train_again import again_command
 
@@ -123,12 +123,22 @@ def train(
     answer(found.text, found.content, json_to)
 
 
-def _refuse_others(options: TrainOptions) -> None:
-    """Raises UsageError for options that would change a run which is to be repeated as it was."""
-    given = options.given()
+def _refuse_others(context: typer.Context) -> None:
+    """Raises UsageError for options that would change a run which is to be repeated as it was.
+    One that is given with its default would change a run of another value, too."""
+    given = [
+        "no-fit" if (name, value) == ("fit", False) else name.replace("_", "-")
+        for name, value in context.params.items()
+        if name not in OF_AGAIN and _typed(context, name)
+    ]
     if given:
-        flags = listed(f"--{name.replace('_', '-')}" for name in given)
         raise UsageError(
-            f"--again repeats a run as it was, and {flags} would change it.",
+            f"--again repeats a run as it was, and {listed(f'--{name}' for name in given)} would "
+            "change it.",
             hint="leave the other options out, or train a run of other settings without --again.",
         )
+
+
+def _typed(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"

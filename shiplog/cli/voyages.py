@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from shiplog.cli.options import STORE, JsonOption, StoreOption, Voyages
-from shiplog.cli.output import answer
+from shiplog.cli.output import LOST, answer
 from shiplog.exceptions import ShiplogError
 
 
@@ -52,6 +53,7 @@ def voyages(
 
         Store(store).mend(wait=False)
     entries = catalogue.entries(store)
+    left_out = _left_out(store, {entry.name for entry in entries})
     if voyages:
         from shiplog.voyages import parts
         from shiplog.voyages.store import Store
@@ -60,3 +62,13 @@ def voyages(
         entries = [entry for entry in entries if entry.name in chosen]
     content = {"contract": 1, "voyages": [asdict(entry) for entry in entries]}
     answer(text_table.catalogue(entries) if entries else f"no voyage in {store}", content, json_to)
+    if left_out and not voyages:  # named while the others were read
+        raise typer.Exit(LOST)
+
+
+def _left_out(store: Path, names: set[str]) -> bool:
+    """Whether a voyage of the store is not among these: one that cannot be read."""
+    from shiplog.voyages import catalogue
+
+    there = (path for path in store.glob("voyage=*") if (path / "voyage.json").is_file())
+    return any(catalogue.name_of(path) not in names for path in there)

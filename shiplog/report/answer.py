@@ -37,6 +37,7 @@ class DiagnosedTrial:
     whole   that trial, linearised on overlapping segments
     held    the held-out windows; None where no stretch is long enough for one
     after   the extended model; None without a named cause
+    drawn   whether the pictures could be drawn
     """
 
     verdict: Verdict
@@ -47,11 +48,12 @@ class DiagnosedTrial:
     whole: Linear | None = None
     held: HeldOut | None = None
     after: ExtendedSimulator | None = None
+    drawn: bool = True
 
     @property
     def recording(self) -> Path | None:
-        """Path of the Rerun recording; None where nothing was compared."""
-        return None if self.decision is None else self.folder / RECORDING
+        """Path of the Rerun recording; None where nothing was compared, or could be drawn."""
+        return self.folder / RECORDING if self.decision is not None and self.drawn else None
 
 
 @dataclass(frozen=True)

@@ -39,12 +39,14 @@ class EvaluatedRuns:
     forces: pl.DataFrame | None
 
     def answer(self, run: Run) -> dict:
-        """The contract's JSON for one run, and the share of samples inside its 90 % band."""
+        """The contract's JSON for one run, the share of samples inside its 90 % band, and the
+        voyages that have no window."""
         errors = self.errors.filter(pl.col("run") == run.name)
         answer = tables.evaluation_json(errors, self.means, self.coverage)
         shares = self.inside.filter(pl.col("run") == run.name).select("channel", "share")
         judged = self.judgement(run)
         return answer | {
+            "too_short": list(self.too_short),
             "sentence": judged.sentence,
             "judgement": judged.as_json(),
             "band_90": dict(shares.iter_rows()),

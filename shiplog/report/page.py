@@ -37,7 +37,7 @@ def _cause(cause: dict) -> list[str]:
     ]  # fmt: skip
     for name, p in cause["parameters"].items():
         if isinstance(p["value"], str):
-            lines.append(f"| {name} | {p['value']} | | |")
+            lines.append(f"| {name} | {p['value']} | - | - |")
         else:
             lines.append(
                 f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} |"

@@ -12,6 +12,7 @@ from shiplog.voyages.catalogue import UNSHOWN, CatalogueEntry
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A Markdown table with aligned columns."""
+    head = [_cell(title) for title in head]
     text = [[_cell(value) for value in row] for row in rows]
     widths = [
         max(len(h), *(len(r[i]) for r in text), 3) if text else max(len(h), 3)
@@ -28,7 +29,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
         return f"| {' | '.join(padded)} |"
 
     rule = [("-" * (w - 1) + ":") if n else "-" * w for w, n in zip(widths, numeric, strict=True)]
-    return "\n".join([line(list(head)), line(rule), *map(line, text)])
+    return "\n".join([line(head), line(rule), *map(line, text)])
 
 
 def _cell(value: object) -> str:

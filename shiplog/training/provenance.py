@@ -17,10 +17,14 @@ import polars as pl
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command says: to a person and to a machine."""
+    """What a command says: to a person and to a machine.
+
+    complete   whether nothing of what it was to write was lost
+    """
 
     text: str
     content: dict
+    complete: bool = True
 
 
 def provenance(logs_sha256: Mapping[str, str | None], began: float, device: str = "cpu") -> dict:

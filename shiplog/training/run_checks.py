@@ -6,10 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sized
 from pathlib import Path
 
+import polars as pl
+
 from shiplog.exceptions import RunError, listed
 from shiplog.profile import Profile
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
+from shiplog.voyages.store import Store
 
 
 def refuse_other_ship(run: RunFolder, profile: Profile) -> None:
@@ -50,6 +53,20 @@ def refuse_other_settings(run: RunFolder, config: Config) -> None:
             f"{run.path} is a finished run of other settings.",
             hint="choose another --out, or remove that folder.",
         )
+
+
+def refuse_other_rows(run: RunFolder, store: Store) -> None:
+    """Raises RunError where the store has other rows of a finished run's voyages than it was
+    trained on: their logs were ingested anew, corrected, or by another program."""
+    rows = store.seconds(run.trained_on, store.profile(run.trained_on))
+    split = run.config.split
+    for kept, names in ((run.training(), split.training), (run.validation(), split.validation)):
+        if not kept.equals(rows.filter(pl.col("voyage").is_in(names))):
+            raise RunError(
+                f"{run.path} is a finished run of other data: the voyages of {store.path} were "
+                "ingested anew since.",
+                hint="choose another --out, or remove that folder.",
+            )
 
 
 def refuse_extended(path: Path) -> None:

@@ -196,6 +196,12 @@ TABLES = {
                                   lambda d: d.convert(d.table(), profile=d.profile())),
     "a good table and a bad one": (3, ["bad.csv refused"], lambda d: d.convert(
         d.table(), d.file("bad.csv", "a,b\n1,2\n"))),
+    "a voyage that is there already": (3, ["t.csv: z1 refused", "exists already", "1 logs in"],
+        lambda d: [*d.convert(d.table(run_id=["z1", "z1", "z2"]))[:-1],
+                   d.file("z1.mcap").parent]),
+    "two voyages of one file name": (3, ["2 logs in", "t.csv: a_1 refused: Two voyages of t.csv",
+        "another name in the table"],
+        lambda d: d.convert(d.table(run_id=["a/1", "a:1", "z"]))),
     "a log that is there already": (1, ["exists already"], lambda d: [
         *d.convert(d.table())[:-1], d.file("z1.mcap").parent]),
 }  # fmt: skip
@@ -225,6 +231,10 @@ OPTIONS = {
         "--model", "mmg", "--device", "cuda", "--recipe", "paper")),
     "a GPU and processes": (2, ["--jobs says nothing to --device cuda"], lambda d: [
         "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--jobs", "2"]),
+    "processes and a cluster": (2, ["--jobs says nothing to --ray"], lambda d: [
+        "paper", "--store", d.store, "--jobs", "2", "--ray", "a:1"]),
+    "--web and --save": (2, ["--web serves", "leave one of them out"], lambda d: [
+        "compare", "runs/mmg", "--web", "--save", d.path("a.rrd")]),
     "a GPU and a cluster": (2, ["--ray says nothing to --device cuda"], lambda d: [
         "paper", "--store", d.store, "--device", "cuda", "--recipe", "paper", "--ray", "a:1"]),
     "--no-fit of a network": (2, ["says nothing to a network"], lambda d: d.train("--no-fit")),
@@ -247,6 +257,14 @@ OPTIONS = {
         lambda d: d.train("--voyages", "one", "--window", "40")),
     "a profile without actuators": (1, ["actuator"], lambda d: [
         "train", "--store", undriven(d), "--out", d.path("run")]),
+    "--extend where the report goes": (2, ["--extend runs/mmg2 is a folder for a run"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "runs/mmg2", "--extend", "runs/mmg2"]),
+    "--extend above the report": (2, ["--extend a is a folder for a run"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "a/b/../c", "--extend", "a"]),
+    "--out of a begun run": (2, ["leave .partial out"], lambda d: [
+        "train", "--store", d.store, "--out", d.path("run.partial")]),
+    "--extend of a begun run": (2, ["leave .partial out"], lambda d: [
+        "diagnose", "runs/mmg", "--out", "a", "--extend", d.path("run.partial")]),
     "two ships": (1, ["different ships"], lambda d: ["train", "--store", two_ships(d), "--out",
         d.path("run")]),
 }  # fmt: skip
@@ -288,6 +306,8 @@ FOLDERS = {
         "voyages", "--store", d.store, "--json", d.folder]),
     "--json in no folder": (1, ["there is no folder"], lambda d: [
         "voyages", "--store", d.store, "--json", d.path("none") / "a.json"]),
+    "--json of an empty variable": (2, ["--json is given no path"], lambda d: [
+        "voyages", "--store", d.store, "--json", ""]),
     "--json in a file": (1, ["is a file"], lambda d: [
         "check", d.log, "--json", d.file("f") / "a.json"]),
     "demo: no logs": (1, ["No log in"], lambda d: ["demo", "--logs", d.dir("logs")]),

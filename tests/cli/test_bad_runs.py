@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -161,6 +162,8 @@ CASES = {
         *d.on("diagnose", "mmg"), "--extend", d.dir("r")]),
     "diagnose: --extend in a file": (["--extend", "is a file"], lambda d: [
         *d.on("diagnose", "mmg"), "--extend", d.file("f") / "r"]),
+    "diagnose: --out is a run": (["--out", "is a run", "choose another"], lambda d: [
+        *d.on("diagnose", "mmg"), "--out", d.sea / "mmg"]),
     "diagnose: --out is a file": (["--out", "is a file"], lambda d: [
         *d.on("diagnose", "mmg"), "--out", d.file("f")]),
     "train: --out is a run": (["exists already"], lambda d: [
@@ -268,7 +271,10 @@ def test_a_catalogue_of_rubbish_is_made_again(desk, capsys):
 
 
 def test_again_takes_no_other_setting(desk, capsys):
-    for option in (("--window", 30), ("--model", "mmg"), ("--voyages", "trip_1")):
+    for option in (
+        ("--window", 30), ("--model", "mmg"), ("--voyages", "trip_1"), ("--seeds", 1),
+        ("--recipe", "fast"), ("--window", 100), ("--fit",), ("--no-fit", "--model", "mmg"),
+    ):  # fmt: skip
         judge(["train", "--again", desk.sea / "mmg", "--out", desk.path("r"), *option], 2,
               ["--again repeats a run as it was", f"{option[0]} would change it",
                "leave the other options out"], capsys)  # fmt: skip
@@ -287,7 +293,7 @@ def test_a_begun_run_with_spoilt_settings_is_begun_anew(desk, capsys, caplog, co
 @pytest.mark.parametrize(("number", "words"), [
     (30, "Read-only file system"), (28, "No space left on device"), (13, "Permission denied"),
 ])  # fmt: skip
-def test_a_run_that_cannot_be_written_stays_as_it_was(desk, capsys, monkeypatch, number, words):
+def test_a_run_that_cannot_be_written_costs_no_answer(desk, capsys, monkeypatch, number, words):
     """A disk that is full, or a network drive that is read-only now."""
     copy = desk.spoilt("nothing")[1]
     before = {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()}
@@ -296,9 +302,31 @@ def test_a_run_that_cannot_be_written_stays_as_it_was(desk, capsys, monkeypatch,
         raise OSError(number, words)
 
     monkeypatch.setattr(files, "flush", refuse)
-    judge(desk.on("evaluate", copy), 1, [f"errors.parquet: {words}", "has room on its disk"],
-          capsys)  # fmt: skip
-    assert {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()} == before
+    evaluate = desk.on("evaluate", copy)
+    compare = [*desk.on("compare", copy), "--save", desk.path("a.rrd")]
+    for arguments, more in ((evaluate, ()), (compare, ("a.rrd could not be written",))):
+        judge(arguments, 3, ["Per voyage, spoilt", f"errors.parquet: {words}",
+              "has room on its disk", *more], capsys)  # fmt: skip
+        assert {p: p.read_bytes() for p in copy.rglob("*") if p.is_file()} == before
+
+
+def test_a_run_that_cannot_be_written_needs_another_place_for_its_recording(
+    desk, capsys, monkeypatch
+):
+    """Before the work."""
+    copy = desk.spoilt("nothing")[1]
+    monkeypatch.setattr(os, "access", lambda path, how: (path, how) != (copy, os.W_OK))
+    judge(desk.on("compare", copy), 1, ["spoilt is not writable", "choose another --save"], capsys)
+
+
+def test_a_voyage_without_a_window_is_lost_where_it_is_named(desk, capsys):
+    whole = desk.on("evaluate", "mmg")
+    to = desk.path("a.json")
+    named = [*desk.on("evaluate", "mmg", voyages="trip_3[0:15]"), "--voyages", "trip_3[20:60]"]
+    judge([*named, "--json", to], 3, ["Without a window of that length: trip_3[0:15]"], capsys)
+    assert json.loads(to.read_text())["too_short"] == ["trip_3[0:15]"]
+    judge([*whole, "--json", to], 0, ["Per voyage"], capsys)
+    assert json.loads(to.read_text())["too_short"] == []
 
 
 def test_a_refused_diagnosis_leaves_nothing(desk, capsys):

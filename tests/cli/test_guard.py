@@ -1,6 +1,7 @@
 """Whatever a file does to the process that reads it: one sentence, and the other files are read."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -128,3 +129,51 @@ def test_a_child_that_the_system_kills_is_reported_and_kills_its_command(logs, t
         _, said = started.communicate(timeout=30)
     assert started.returncode == -signal.SIGKILL
     assert "bad.mcap was given up: the process was ended from outside" in said
+
+
+STARTER = "import subprocess, sys; sys.exit(subprocess.call(sys.argv[1:], process_group=0))"
+
+
+def test_ctrl_z_stops_the_child_as_well_and_it_goes_on_with_its_command(logs, tmp_path):
+    """A shell, which can let it go on, starts the command in a group of its own."""
+    asleep = command("print('now', flush=True); time.sleep(60)", *ingest(logs, tmp_path))
+    shell = subprocess.Popen([sys.executable, "-c", STARTER, *asleep], cwd=ROOT, text=True,
+                             stdout=subprocess.PIPE, start_new_session=True)  # fmt: skip
+    with shell:
+        assert shell.stdout and shell.stdout.readline() == "now\n"
+        (parent,) = psutil.Process(shell.pid).children()
+        both = [parent, *parent.children()]
+        parent.send_signal(signal.SIGTSTP)
+        stopped = [become(one, True) for one in both]
+        parent.send_signal(signal.SIGCONT)
+        going_on = [become(one, False) for one in both]
+        parent.terminate()
+        assert shell.wait(30) == 128 + signal.SIGTERM
+    assert stopped == going_on == [True, True]
+
+
+def become(process, stopped) -> bool:
+    """Whether it is stopped, or goes on, within ten seconds."""
+    for _ in range(100):
+        if (process.status() == psutil.STATUS_STOPPED) == stopped:
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def test_a_terminal_that_stops_background_writers_does_not_stop_the_child(tmp_path):
+    """`stty tostop`."""
+    import fcntl
+    import pty
+    import termios
+
+    ours, theirs = pty.openpty()
+    mode = termios.tcgetattr(theirs)
+    mode[3] |= termios.TOSTOP
+    termios.tcsetattr(theirs, termios.TCSANOW, mode)
+    done = subprocess.run(
+        command("pass", "profile", tmp_path / "none.mcap"), cwd=ROOT, timeout=60, check=False,
+        stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )  # fmt: skip
+    assert done.returncode == 1 and b"none.mcap does not exist" in os.read(ours, 1 << 16)

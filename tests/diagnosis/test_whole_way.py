@@ -55,6 +55,7 @@ def test_the_answer_has_the_shape_of_the_contract(sea):
     assert min(reported) >= 0.0 and max(reported) <= 1.0
     report = (sea.work / "out" / "report.md").read_text("utf-8")
     assert "steady current" in report and "Gain" in report
+    assert sea.done.recording.read_bytes()[:4] == b"RRF2"
 
 
 def test_too_little_is_reported_and_nothing_named(sea):

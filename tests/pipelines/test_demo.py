@@ -32,9 +32,9 @@ def test_logs_without_the_season_that_is_diagnosed_are_refused_before_the_traini
         demo.run_demo(tmp_path / "demo", tmp_path / "logs")
 
 
-@pytest.mark.parametrize(("refused", "code"), [({}, 0), ({"bad.mcap": "no log"}, 3)])
-def test_the_demo_exits_with_3_where_a_log_was_refused(tmp_path, monkeypatch, refused, code):
-    made = demo.Demo("done", {"refused": refused}, tmp_path / "a.rrd")
+@pytest.mark.parametrize(("complete", "code"), [(True, 0), (False, 3)])
+def test_the_demo_exits_with_3_where_a_log_is_not_whole(tmp_path, monkeypatch, complete, code):
+    made = demo.Demo("done", {"refused": {}}, tmp_path / "a.rrd", complete)
     monkeypatch.setattr(demo, "run_demo", lambda *_: made)
     assert call("demo", "--no-view", "--out", tmp_path / "demo")[0] == code
 
@@ -54,7 +54,8 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     logs = few_logs(tmp_path / "logs")
     (logs / "bad.mcap").write_bytes(b"no log")
     first = demo.run_demo(tmp_path / "demo", logs)
-    assert list(first.content["refused"]) == [str(logs / "bad.mcap")]
+    assert list(first.content["refused"]) == [str(logs / "bad.mcap")] and not first.complete
+    assert f"rerun --bind 127.0.0.1 {first.recording}" in first.text
     assert "bad.mcap refused" in caplog.text
     output = str(RrdReader(str(first.recording)).store().summary())
     for word in ("/track/voyage_6/measured", "/track/voyage_6/simulated", "/hist/wind/training",

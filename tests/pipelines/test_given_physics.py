@@ -14,6 +14,7 @@ from own_causes import GOOD
 from safetensors.numpy import load_file, save_file
 from short_voyages import BOTH, HULL, STATES, WINDOW, scored, train
 
+import shiplog
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
 from shiplog.training import extension_file, load_model
@@ -78,6 +79,11 @@ def test_code_in_a_run_folder_is_never_run(published, store, tmp_path):
                          "--cause", mine)  # fmt: skip
     assert code == 0 and "mmg with tide_gate" in reported
     assert ran.read_text() == was + "xx"
+    opened = shiplog.load(kept, mine)  # in Python likewise
+    found = shiplog.evaluate(opened, store, "trip_3", causes=mine)
+    assert "mmg with tide_gate" in found.text
+    drawn = shiplog.compare(opened, store, "trip_3", save=tmp_path / "a.rrd", causes=[mine])
+    assert "mmg with tide_gate" in drawn.text and drawn.recording.is_file()
 
 
 def test_a_run_extended_by_the_catalogues_causes_needs_no_file(published, tmp_path):

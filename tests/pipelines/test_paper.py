@@ -1,6 +1,7 @@
 """The whole experiment, short: five voyages of a minute, four sets, two seeds, two iterations."""
 
 import json
+import shutil
 
 import numpy as np
 import polars as pl
@@ -9,11 +10,14 @@ import sailing
 import torch
 from commands import call
 
+from pipelines import demo
 from pipelines import gpu as on_gpu
 from pipelines.paper import _halved, choose_voyages
-from shiplog.exceptions import StoreError
+from shiplog.exceptions import RunError, StoreError
 from shiplog.report.paper import figures, sets
 from shiplog.training import gpu, network_files
+from shiplog.voyages.ingest import ingest
+from shiplog.voyages.store import Store
 
 FEW = ("--window", 20, "--width", 8, "--seeds", 2, "--epochs", 2)
 DATA = ("ref", "sli2", "jit2", "d-ref")
@@ -159,6 +163,22 @@ def test_a_folder_of_other_settings_is_reported_and_not_touched(experiment, stor
                            "--width", 9, "--seeds", 2, "--epochs", 2, "--data", "ref")  # fmt: skip
     assert code == 1
     assert "is a finished run of other settings" in output
+
+
+def test_a_folder_of_other_data_is_reported_and_not_touched(experiment, store, tmp_path):
+    """The log of a training voyage was ingested anew, and differs."""
+    out, _, answer = experiment
+    name = answer["reference"][0]
+    again = Store(shutil.copytree(store.path, tmp_path / "store"))
+    shutil.rmtree(again.path / f"voyage={name}")
+    path = sailing.write(tmp_path / f"{name}.mcap", sailing.series(62.0))
+    again.add(ingest(path, sailing.profile()))
+    code, _, output = call("paper", "--store", again.path, "--out", out, *FEW, "--data", "ref")
+    assert code == 1
+    assert "is a finished run of other data" in output and "choose another --out" in output
+    assert demo._trained_already(out / "runs" / "ref", store)
+    with pytest.raises(RunError, match="of other data"):
+        demo._trained_already(out / "runs" / "ref", again)
 
 
 def test_without_a_test_voyage_there_is_no_experiment(tmp_path):

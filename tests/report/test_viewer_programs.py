@@ -71,6 +71,13 @@ def test_every_program_is_made_to_listen_on_this_machine_only(saved, monkeypatch
     assert (option, address) == ("--bind", "127.0.0.1")
 
 
+def test_a_server_that_does_not_start_names_a_viewer_of_this_machine_only(saved, monkeypatch):
+    monkeypatch.setattr(native, "_program", lambda: Path(sys.executable))  # reads no recording
+    with pytest.raises(ShiplogError, match="did not start") as output:
+        viewer.serve(saved, port=0)
+    assert "`rerun --bind 127.0.0.1 FILE.rrd`" in output.value.hint
+
+
 @pytest.mark.viewer
 def test_the_web_viewer_listens_on_this_machine_only(saved):
     with viewer.serve(saved, port=0) as served:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from shiplog.report.comparison_data import ComparisonData, DrawnActuator
 from shiplog.report.diagnosis_data import Exhibit
-from shiplog.report.viewer.native import Served, open_viewer, serve
+from shiplog.report.viewer.native import RERUN, Served, open_viewer, serve
 
 __all__ = [
+    "RERUN",
     "ComparisonData",
     "DrawnActuator",
     "Exhibit",

@@ -21,6 +21,7 @@ from typing import IO
 from shiplog.exceptions import ShiplogError
 
 HOST = "127.0.0.1"
+RERUN = f"rerun --bind {HOST}"  # as a user starts it: alone, it listens on every interface
 WITHOUT_A_WINDOW = "use --save FILE.rrd to keep the recording, or --web to look at it in a browser."
 NATIVE_PATIENCE = 2.0  # s: a viewer that has no graphics says so at once
 WEB_PATIENCE = 30.0  # s: the first start on a slow disk
@@ -96,7 +97,7 @@ def serve(path: str | Path, port: int = 9090) -> Served:
             stop(process)
             raise ShiplogError(
                 f"The web viewer did not start: {last_words(output)}",
-                hint="use --save FILE.rrd, and open the file with `rerun FILE.rrd`.",
+                hint=f"use --save FILE.rrd, and open the file with `{RERUN} FILE.rrd`.",
             ) from None
     return Served(f"http://{HOST}:{web}/?url={source}", process)
 
