@@ -164,21 +164,6 @@ NEEDED = {  # sensors without which there is no table, and what records them
     "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
 }
-FIELD_COUNT = {
-    "geodetic": 2,
-    "local": 2,
-    "sog_cog": 2,
-    "body": 2,
-    "ned": 2,
-    "enu": 2,
-    "angle": 1,
-    "quaternion_enu": 2,
-    "quaternion_ned": 2,
-    "rate": 1,
-    "from_bow": 2,
-}
-
-
 # What a table's column may hold, sensor by sensor and kind by kind, in the order of its fields.
 TABLE_CHANNELS = {
     ("position", "geodetic"): ("latitude", "longitude"),
@@ -217,9 +202,10 @@ class Sensors(Section):
             kind = sensor.kind or kinds[0]
             if kind not in kinds:
                 raise ValueError(f"sensors.{name}.kind is {kind!r}; it can be {listed(kinds)}")
-            if len(sensor.paths) != FIELD_COUNT[kind]:
+            fields = len(TABLE_CHANNELS[name, kind])
+            if len(sensor.paths) != fields:
                 raise ValueError(
-                    f"sensors.{name} of kind {kind!r} needs {FIELD_COUNT[kind]} field(s), "
+                    f"sensors.{name} of kind {kind!r} needs {fields} field(s), "
                     f"not {len(sensor.paths)}"
                 )
             if kind == "geodetic" and not (sensor.unit or sensor.units):

@@ -185,7 +185,7 @@ def _toml(value: object) -> str:
 
 def _kinds() -> str:
     rows = [
-        (f"`{sensor}`", f"`{_toml(kind)}`", str(profile.FIELD_COUNT[kind]), MEANT[kind])
+        (f"`{sensor}`", f"`{_toml(kind)}`", str(len(TABLE_CHANNELS[sensor, kind])), MEANT[kind])
         for sensor, kinds in SENSOR_KINDS.items()
         for kind in kinds
     ]
