@@ -163,7 +163,6 @@ def become(process, stopped) -> bool:
 
 def test_a_terminal_that_stops_background_writers_does_not_stop_the_child(tmp_path):
     """`stty tostop`."""
-    import fcntl
     import pty
     import termios
 
@@ -171,9 +170,14 @@ def test_a_terminal_that_stops_background_writers_does_not_stop_the_child(tmp_pa
     mode = termios.tcgetattr(theirs)
     mode[3] |= termios.TOSTOP
     termios.tcsetattr(theirs, termios.TCSANOW, mode)
+    takes_the_terminal = (
+        "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+        "os.execv(sys.argv[1], sys.argv[1:])"
+    )
     done = subprocess.run(
-        command("pass", "profile", tmp_path / "none.mcap"), cwd=ROOT, timeout=60, check=False,
+        [sys.executable, "-c", takes_the_terminal,
+         *map(str, command("pass", "profile", tmp_path / "none.mcap"))],
+        cwd=ROOT, timeout=60, check=False,
         stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
-        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
     )  # fmt: skip
     assert done.returncode == 1 and b"none.mcap does not exist" in os.read(ours, 1 << 16)
