@@ -32,15 +32,15 @@ def require_fitting(profile: Profile) -> None:
 
     What has no unit is SI, and is not looked at.
     """
-    for place, unit, takes in _stated(profile):
+    for place, unit, wanted in _stated(profile):
         measure = units.measure(unit)
-        if measure is None or measure in takes:
+        if measure is None or measure in wanted:
             continue
-        known = ", ".join(one for name in takes for one in units.MEASURES[name])
-        meant = ADVICE.get(unit, "") if "shaft speed" in takes else ""
+        known = ", ".join(one for name in wanted for one in units.MEASURES[name])
+        meant = ADVICE.get(unit, "") if "shaft speed" in wanted else ""
         raise ProfileError(
             f"The profile {profile.source} gives {place} in {unit!r}, a unit of {measure}; it "
-            f"takes {' or '.join(takes)}: {known}.",
+            f"takes {' or '.join(wanted)}: {known}.",
             hint=meant
             or "correct `unit` there; of two fields that differ, `units` names each "
             "one's in the order of `fields`.",

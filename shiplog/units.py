@@ -30,6 +30,19 @@ MEASURES = {  # what each unit measures
 }
 
 
+# A number is Unix time in the one of these units in which it lies between 2000 and 2100: the ranges
+# do not overlap.
+UNIX_NS = {"s": SECOND_NS, "ms": 1_000_000, "us": 1_000, "ns": 1}
+YEAR_2000_NS, YEAR_2100_NS = 946_684_800 * SECOND_NS, 4_102_444_800 * SECOND_NS
+
+
+def unix_unit(count: float) -> str | None:
+    """The unit of `UNIX_NS` in which a number is Unix time; None where it is in none."""
+    return next(
+        (unit for unit, ns in UNIX_NS.items() if YEAR_2000_NS <= count * ns < YEAR_2100_NS), None
+    )
+
+
 def measure(unit: str) -> str | None:
     """What `unit` measures; None for a unit not in the table."""
     return next((name for name, units in MEASURES.items() if unit in units), None)

@@ -12,6 +12,8 @@ import numpy as np
 
 from shiplog.models.causes import CATALOGUE
 from shiplog.models.causes.base import Cause, Parameter
+from shiplog.models.causes.environment import ShallowWater
+from shiplog.models.causes.ship import RudderOffset
 from shiplog.models.coefficients import ParameterEntry
 from shiplog.models.mmg.parameters import TABLE
 from shiplog.report import tables
@@ -50,8 +52,10 @@ PARAMETERS = {  # as the report prints them
     "wind_speed_scale": "`value` (measured over true)",
 }
 WITHOUT_PARAMETERS = {  # numbers that are made for each ship: realistic and practical size
-    "shallow_water": ("0.3", "0.05"),
-    "rudder_offset": ("4 deg", "0.3 deg"),
+    "shallow_water": tuple(f"{size:g}" for size in (ShallowWater.realistic, ShallowWater.least)),
+    "rudder_offset": tuple(
+        f"{np.degrees(size):.3g} deg" for size in (RudderOffset.realistic, RudderOffset.least)
+    ),
 }
 NEEDED = {
     "yaw rate": "a yaw rate sensor",

@@ -219,7 +219,7 @@ def _units() -> str:
 
 
 def _driven() -> str:
-    rows = [(f"`{kind}`", ", ".join(takes)) for kind, takes in DRIVEN.items()]
+    rows = [(f"`{kind}`", ", ".join(measures)) for kind, measures in DRIVEN.items()]
     return tables.table(("actuator", "takes a unit of"), rows)
 
 

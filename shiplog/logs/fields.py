@@ -7,19 +7,18 @@ from collections.abc import Mapping
 
 import polars as pl
 
-from shiplog.units import SECOND_NS
+from shiplog import units
+from shiplog.units import SECOND_NS, UNIX_NS
 
 STAMP_FIELDS = (
     "timestamp", "stamp", "header.stamp", "header.timestamp",
     "transforms[0].timestamp", "transforms[0].header.stamp",
 )  # fmt: skip
 STAMP_PARTS = (("seconds", "nanos"), ("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))
-# A single number is Unix time in the one of these units in which it lies between 2000 and 2100.
-UNITS_NS = (SECOND_NS, 1_000_000, 1_000, 1)  # ns: s, ms, µs and ns
-YEAR_2000_NS, YEAR_2100_NS = 946_684_800 * SECOND_NS, 4_102_444_800 * SECOND_NS
-# Numbers that are not: they gain as much as the recorder's clock does in another unit, to a factor
-# of two for a log that is played faster or slower, and would be of messages further apart than any
-# instrument's. The latter keeps a log whose recorder wrote all at once, a thousand times as fast.
+# Numbers that look like Unix time and are not: they gain as much as the recorder's clock does in
+# another unit, to a factor of two for a log that is played faster or slower, and would be of
+# messages further apart than any instrument's. The latter keeps a log whose recorder wrote all at
+# once, a thousand times as fast.
 SAME_PACE, LONGEST_PERIOD_NS = 2.0, 5.0 * SECOND_NS
 LOW, HIGH = 0.05, 0.95  # quantiles: a few stray times do not make a pace
 MOST_NS = 9.2e18  # what 64 bits hold
@@ -160,11 +159,11 @@ def unix_unit(counts: pl.Series, logged: pl.Series) -> int | None:
     """
     known, logged = counts.drop_nulls(), logged.filter(counts.is_not_null())
     middle = known.quantile(0.5, "nearest") or 0.0
-    unit = next((n for n in UNITS_NS if YEAR_2000_NS <= middle * n < YEAR_2100_NS), None)
+    unit = UNIX_NS.get(units.unix_unit(middle) or "")
     gained, passed = _span(known), _span(logged)
     if unit is None or gained * unit <= LONGEST_PERIOD_NS * (HIGH - LOW) * len(known):
         return unit
-    others = (n for n in UNITS_NS if n != unit)
+    others = (n for n in UNIX_NS.values() if n != unit)
     counting = any(passed / SAME_PACE <= gained * n <= passed * SAME_PACE for n in others)
     return None if counting else unit
 

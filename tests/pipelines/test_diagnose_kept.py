@@ -21,7 +21,7 @@ def test_pictures_that_fail_cost_neither_the_answer_nor_the_extended_run(
 
     def decided(of, out, _causes) -> DiagnosedTrial:
         found: Verdict = answer.too_little(of.run, of.recorded, of.before_effect)
-        return DiagnosedTrial(found, out, decision=found, after=found)  # type: ignore[arg-type]
+        return DiagnosedTrial(found, out, decision=found, after=found)  # type: ignore[arg-type]  # stand-ins
 
     def drawn(*_):
         done.append("pictures")

@@ -29,7 +29,7 @@ def test_a_loss_that_is_huge_but_finite_is_no_stable_start(monkeypatch):
     monkeypatch.setattr(
         setup, "losses", lambda model, values, data: np.array([1.0, by_substeps[model.substeps]])
     )
-    assert setup._stable(Stiff(), None, None).substeps == 4  # type: ignore[arg-type]
+    assert setup._stable(Stiff(), None, None).substeps == 4  # type: ignore[arg-type]  # stand-ins
 
 
 def test_means_are_of_the_windows_that_end_and_the_others_are_counted():

@@ -9,13 +9,10 @@ import polars as pl
 
 from shiplog import units
 from shiplog.exceptions import ProfileError
+from shiplog.logs import fields
 from shiplog.units import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
-# A number without a unit is Unix time if it then lies between 2000 and 2100; these ranges do not
-# overlap. Anything else is seconds from a start of its own.
-UNIX = (("s", 1), ("ms", 1_000), ("us", 1_000_000), ("ns", 1_000_000_000))
-YEAR_2000, YEAR_2100 = 946_684_800, 4_102_444_800  # s
 LONGEST_STEP_S = 60.0  # no ship's motion is recorded more slowly: the numbers are not seconds
 # A date must come whole: "3/4/2024" is two days, and only the other rows can say which.
 DATE_FORMATS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
@@ -100,23 +97,25 @@ def _blank(texts: pl.Series) -> int:
 
 
 def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
-    """Times as `instants` has them, beside which a date stands: their whole days do not count.
+    """Times as `instants` has them, next to a column of dates: their whole days do not count.
 
     Raises ProfileError also where numbers are no seconds of a day, or can be two times of it.
     """
     number = number_of(values) if values.dtype == pl.String else values
     words = number is not values and number.null_count() > _blank(values)
     stated = unit is not None or form is not None or not number.dtype.is_numeric()
-    if stated or words or _unix(number) or counts_minutes(number):
+    if stated or words:
         return instants(values, unit, form)
     most = typical(number.cast(pl.Float64))
+    if units.unix_unit(most) or counts_minutes(number):
+        return instants(values, unit, form)
     digits = can_be_hhmmss(number)
     if digits and most * SECOND_NS >= DAY_NS:
         return _of_digits(number)
     if (digits and most >= 60) or most * SECOND_NS >= 2 * DAY_NS:
         can_be = "can be seconds of it or hhmmss" if digits else "are no seconds of it"
         raise ProfileError(
-            f"The times of column {values.name!r}, such as {most:.10g}, stand beside a date and "
+            f"The times of column {values.name!r}, such as {most:.10g}, are next to a date and "
             f"{can_be}.",
             hint=f'say which in [table]: {values.name} = {{ channel = "time", unit = "s" }}, or '
             f'"ms", or format = "{HHMMSS}".',
@@ -124,37 +123,23 @@ def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) 
     return instants(values, unit, form)
 
 
-def _unix(values: pl.Series) -> list[str]:
-    """The unit in which numbers are Unix time; none where they are not."""
-    most = typical(values.cast(pl.Float64))
-    return [name for name, per in UNIX if YEAR_2000 <= most / per < YEAR_2100]
-
-
 def _counted(values: pl.Series, unit: str | None) -> pl.Series:
     """Numbers to ns; whole ones exactly: a float of seconds holds this century to 0.2 µs."""
     if unit is None:
-        fitting = _unix(values)
         exact = values.cast(pl.Float64)
         most, step = typical(exact), typical(exact.diff())
-        if not fitting and (step > LONGEST_STEP_S or most > YEAR_2100):
+        unit = units.unix_unit(most)
+        if unit is None and (step > LONGEST_STEP_S or most * SECOND_NS > units.YEAR_2100_NS):
             raise ProfileError(
                 f"The times of column {values.name!r}, such as {most:.15g}, step by {step:g}, and "
                 "are no Unix time.",
                 hint=f'say their unit in [table]: {values.name} = {{ channel = "time", '
                 'unit = "us" }, or "ms", or "ns"; or their form, as format = "%Y%m%d%H%M%S".',
             )
-        if not fitting and counts_minutes(values):
+        if unit is None and counts_minutes(values):
             return past_midnight(_of_digits(values))
-        unit = fitting[0] if fitting else "s"
-    nanos = units.factor(unit) * 1e9
-    if values.dtype.is_integer() and nanos >= 1.0:
-        return values.cast(pl.Int64) * round(nanos)
-    exact = values.cast(pl.Float64).fill_nan(None)
-    whole = exact.floor()
-    rest = ((exact - whole) * nanos).round().cast(pl.Int64, strict=False)
-    if nanos >= 1.0:
-        return whole.cast(pl.Int64, strict=False) * round(nanos) + rest
-    return (exact * nanos).round().cast(pl.Int64, strict=False)
+        unit = unit or "s"
+    return fields.instants(values, round(units.factor(unit) * SECOND_NS))
 
 
 def can_be_hhmmss(values: pl.Series) -> bool:
@@ -177,7 +162,7 @@ def counts_minutes(values: pl.Series) -> bool:
     if len(inside) == 0 or not begins.any():
         return False
     on_time = step.filter(begins) <= SAME_STEP * typical(inside.cast(pl.Float64))
-    return bool(on_time.mean() > 0.5)  # type: ignore[operator]
+    return 2 * int(on_time.sum()) > len(on_time)
 
 
 def _of_digits(values: pl.Series) -> pl.Series:

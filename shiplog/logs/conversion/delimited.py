@@ -23,7 +23,7 @@ TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc", ".tab")
 SEPARATORS = (";", "\t", "|", ",", " ")
 SAMPLE_BYTES = 65_536  # bytes that tell the form of a text
 LOOK = 200  # lines of them
-GROUPED = r"^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
+GROUPED = r"^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"  # 1,002 or 12,345,678.9
 REGULAR = 0.8  # share of lines that a separator cuts alike
 
 

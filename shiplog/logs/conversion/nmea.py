@@ -18,7 +18,7 @@ import numpy as np
 import pynmea2
 
 from shiplog.exceptions import ChannelMissing, listed
-from shiplog.logs.conversion.clock import DAY_NS, UNIX, YEAR_2000, YEAR_2100
+from shiplog.logs.conversion.clock import DAY_NS
 from shiplog.logs.conversion.nmea_sentences import (
     INSTEAD,
     SENTENCE_TOPICS,
@@ -28,7 +28,7 @@ from shiplog.logs.conversion.nmea_sentences import (
     family,
 )
 from shiplog.logs.write import Series
-from shiplog.units import SECOND_NS
+from shiplog.units import SECOND_NS, UNIX_NS, unix_unit
 
 log = logging.getLogger(__name__)
 
@@ -170,11 +170,9 @@ class _Reader:
             except ValueError:
                 return None
             return int(whole.timestamp()) * SECOND_NS + _fraction(iso[3])
-        if number := NUMBER.search(around):
-            for _, per in UNIX:
-                if YEAR_2000 <= int(number[1]) / per < YEAR_2100:
-                    scale = SECOND_NS // per
-                    return int(number[1]) * scale + _fraction(number[2]) // per
+        if (number := NUMBER.search(around)) and (unit := unix_unit(int(number[1]))):
+            scale = UNIX_NS[unit]
+            return int(number[1]) * scale + _fraction(number[2]) * scale // SECOND_NS
         if clock := OF_DAY.search(around):
             seconds = (int(clock[1]) * 60 + int(clock[2])) * 60 + int(clock[3])
             of_day = seconds * SECOND_NS + _fraction(clock[4])

@@ -110,10 +110,11 @@ def _numbers(frame: pl.DataFrame, path: Path) -> dict[str, np.ndarray]:
             if number.count() <= words:
                 log.info("%s: %r holds no numbers and is left out", path.name, column.name)
                 continue
-            log.warning(
-                "%s: %d values of %s are no numbers; taken as not measured",
-                path.name, words, column.name,
-            )  # fmt: skip
+            if words:
+                log.warning(
+                    "%s: %d values of %s are no numbers; taken as not measured",
+                    path.name, words, column.name,
+                )  # fmt: skip
             numbers[column.name] = number
     fields = unlike([plain(name) for name in numbers])
     for name, field in zip(numbers, fields, strict=True):

@@ -143,6 +143,8 @@ class ShallowWater(Cause):
 
     places: int = 12
 
+    realistic, least = 0.3, 0.05
+
     name = "shallow_water"
     kind = "environment"
     story = "The water is shallow in places."
@@ -163,7 +165,7 @@ class ShallowWater(Cause):
         return {"shallow.places": setting.places, "shallow.spacing": np.array(setting.spacing)}
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.append(np.full(self.places, 0.3), super().sizes(setting))
+        return np.append(np.full(self.places, self.realistic), super().sizes(setting))
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         low, high = super().bounds(setting)
@@ -190,7 +192,7 @@ class ShallowWater(Cause):
         )
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(p[..., : self.places].max(-1) > 0.05)
+        return np.asarray(p[..., : self.places].max(-1) > self.least)
 
 
 def _bumps(state: Any, places: Any, spacing: Any) -> Any:

@@ -274,6 +274,8 @@ class RudderOffset(_OnRudders):
 
     groups: tuple[str, ...] = ("port", "starboard")
 
+    realistic, least = np.radians(4.0), np.radians(0.3)
+
     name = "rudder_offset"
     story = "The rudders have an offset from their recorded angles."
     equation = "δ = δ_recorded + offset"
@@ -299,7 +301,7 @@ class RudderOffset(_OnRudders):
         return replace(made, groups=groups)
 
     def sizes(self, setting: Setting) -> np.ndarray:
-        return np.full(self.count, np.radians(4.0))
+        return np.full(self.count, self.realistic)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
         return np.full(self.count, -np.radians(40.0)), np.full(self.count, np.radians(40.0))
@@ -324,7 +326,7 @@ class RudderOffset(_OnRudders):
         return f"The {self.what} have an offset of {angles} from the recorded angle."
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
-        return np.asarray(np.abs(p).max(-1) > np.radians(0.3))
+        return np.asarray(np.abs(p).max(-1) > self.least)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.paths import check_causes
 
-# What a verdict or its ranking may say beside the names of the catalogue.
+# What a verdict or its ranking may say in addition to the names of the catalogue.
 ANSWERS = {"side_thrust", "none", "unknown", "undecided", "coverage", "external"}
 
 

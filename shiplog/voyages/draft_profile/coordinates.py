@@ -26,7 +26,7 @@ def on_earth(columns: list[FoundColumn], rows: pl.DataFrame) -> list[FoundColumn
 
 
 def _signed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
-    """South and west are negative: where the letter stands beside an unsigned number, the sign is
+    """South and west are negative: where the letter is next to an unsigned number, the sign is
     the letter's."""
     letters = HEMISPHERES[one.channel]
     values = rows[one.column].cast(pl.Float64).fill_nan(None)
@@ -34,23 +34,23 @@ def _signed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
     header = re.search(r"[\[(]\s*(?:deg|°)?\s*([NSEW])(?:outh|est)?\s*[\])]", one.column)
     if header and header[1] == letters[1] and unsigned:
         return with_doubts(replace(one, sign=-1.0), f"{header[1]} stands in the column's name")
-    beside = _letters_beside(one.column, letters, rows)
-    if beside is None:
+    letter = _letters_near(one.column, letters, rows)
+    if letter is None:
         return one
-    negative = beside == letters[1]
+    negative = letter == letters[1]
     if not unsigned:
-        wrong = bool(((values < 0) != negative).filter((values != 0) & beside.is_not_null()).any())
-        return with_doubts(one, f"its signs are not those of {beside.name!r}") if wrong else one
+        wrong = bool(((values < 0) != negative).filter((values != 0) & letter.is_not_null()).any())
+        return with_doubts(one, f"its signs are not those of {letter.name!r}") if wrong else one
     if bool(negative.drop_nulls().all()):
-        return with_doubts(replace(one, sign=-1.0), f"{letters[1]}, of {beside.name!r}")
+        return with_doubts(replace(one, sign=-1.0), f"{letters[1]}, of {letter.name!r}")
     if bool(negative.any()):
         return with_doubts(
-            one, f"{beside.name!r} is {letters[1]} in some rows: make those negative"
+            one, f"{letter.name!r} is {letters[1]} in some rows: make those negative"
         )
     return one
 
 
-def _letters_beside(column: str, letters: tuple[str, str], rows: pl.DataFrame) -> pl.Series | None:
+def _letters_near(column: str, letters: tuple[str, str], rows: pl.DataFrame) -> pl.Series | None:
     """The hemisphere in each row, of the column of such letters that is next to a coordinate's."""
     at = rows.columns.index(column)
     near = range(max(at - NEAR, 0), min(at + NEAR + 1, len(rows.columns)))

@@ -65,7 +65,7 @@ def unavailable(channel: str, values: pl.Series) -> str:
     if channel not in NOT_AVAILABLE or not values.dtype.is_numeric():
         return ""
     mark, numbers = NOT_AVAILABLE[channel], values.cast(pl.Float64).fill_nan(None).drop_nulls()
-    if numbers.is_empty() or float(numbers.max()) != mark:  # type: ignore[arg-type]
+    if numbers.is_empty() or numbers.max() != mark:
         return ""
     return f'{mark:g} is AIS\'s "not available"; blank it'
 

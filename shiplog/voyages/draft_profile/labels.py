@@ -31,8 +31,7 @@ TIME_UNITS = {  # how a name's last word says in what it counts time
 }  # fmt: skip
 RATES_HZ = (0.02, 100.0)  # how often a ship's motion is recorded
 USUAL_HZ = (1.0, 10.0)  # and how often it mostly is
-DAY_S, LATEST_OF_DAY = 86_400.0, 240_000.0
-CROSSED, LONGEST_STEP = 100.0, 40.0  # counts within which seconds have passed 60 to 99
+DAY_S, MINUTE = 86_400.0, 100.0  # seconds of a day; of hhmmss, what a minute adds
 DAY_NUMBERS = (20_000.0, 80_000.0)  # of a spreadsheet, 1954 to 2119
 
 
@@ -104,14 +103,14 @@ def _is_dated(values: pl.Series, time: FoundColumn) -> bool:
         times = clock.instants(values, time.unit)
     except ShiplogError:
         return False
-    return clock.typical(times.cast(pl.Float64)) * 1e-9 >= clock.YEAR_2000
+    return clock.typical(times.cast(pl.Float64)) >= units.YEAR_2000_NS
 
 
-def _time(values: pl.Series, table: DelimitedTable, date_beside: bool) -> FoundColumn:
+def _time(values: pl.Series, table: DelimitedTable, with_date: bool) -> FoundColumn:
     """The column of times; a unit only where its size does not say it."""
     number = clock.number_of(values) if values.dtype == pl.String else values
     if number.dtype.is_numeric() and number.null_count() <= len(number) / 2:
-        return _counted(number, table, date_beside)
+        return _counted(number, table, with_date)
     try:
         times = clock.instants(values)
     except ShiplogError as error:
@@ -126,28 +125,27 @@ def _time(values: pl.Series, table: DelimitedTable, date_beside: bool) -> FoundC
     return FoundColumn(values.name, "time", None, ("taken as UTC",) if assumed else ())
 
 
-def _counted(number: pl.Series, table: DelimitedTable, date_beside: bool) -> FoundColumn:
+def _counted(number: pl.Series, table: DelimitedTable, with_date: bool) -> FoundColumn:
     """Times that are numbers: Unix time by their size, else what their name or their rate says."""
     name, number = number.name, number.cast(pl.Float64).fill_nan(None)
     most, step = clock.typical(number), clock.typical(number.diff())
     stated = _stated_unit(name, table)
-    unix = next(
-        (u for u, per in clock.UNIX if clock.YEAR_2000 <= most / per < clock.YEAR_2100), None
-    )
+    unix = units.unix_unit(most)
     if unix:
         same = stated in (None, unix)
         doubt = () if same else (f"called {stated}, and Unix time in {unix} by its size",)
         return FoundColumn(name, "time", stated if same else unix, doubt)
-    if _reads_as_clock(number, date_beside):
+    if _reads_as_clock(number, with_date):
         return FoundColumn(
             name, "time", stated, ("hours, minutes, seconds in one number (hhmmss)?",)
         )
     if stated:
         return FoundColumn(name, "time", stated, _of_rate(step * units.factor(stated)))
+    rates = {unit: units.SECOND_NS / ns / step for unit, ns in units.UNIX_NS.items() if step}
     distance = {
-        unit: max(USUAL_HZ[0] * step / per, per / step / USUAL_HZ[1], 1.0)
-        for unit, per in clock.UNIX
-        if step and RATES_HZ[0] <= per / step <= RATES_HZ[1]
+        unit: max(USUAL_HZ[0] / rate, rate / USUAL_HZ[1], 1.0)
+        for unit, rate in rates.items()
+        if RATES_HZ[0] <= rate <= RATES_HZ[1]
     }
     unit = min(distance, key=lambda u: distance[u], default="s")
     if unit != "s":
@@ -180,16 +178,9 @@ def _stated_unit(name: str, table: DelimitedTable) -> str | None:
     return "s" if plain == ["seconds"] else None
 
 
-def _reads_as_clock(number: pl.Series, date_beside: bool) -> bool:
-    """Whether numbers are times of day, 123450 for 12:34:50: none then has 60 to 99 in its last
-    two digits nor in the two before, which seconds soon have."""
-    whole = number.drop_nulls().floor()
-    if whole.is_empty() or not bool(((whole >= 0) & (whole < LATEST_OF_DAY)).all()):
-        return False
-    if not bool(((whole % 100 < 60) & (whole // 100 % 100 < 60)).all()):
-        return False
-    low, high = float(whole.min()), float(whole.max())  # type: ignore[arg-type]
-    steps = clock.typical(number.diff())
-    if high - low >= CROSSED:
-        return steps <= LONGEST_STEP
-    return high > DAY_S or (date_beside and high >= CROSSED)
+def _reads_as_clock(number: pl.Series, with_date: bool) -> bool:
+    """Whether numbers are, or may be, times of day as 123450 for 12:34:50."""
+    if clock.counts_minutes(number):
+        return True
+    high = float(number.fill_null(0.0).to_numpy().max(initial=0.0))
+    return clock.can_be_hhmmss(number) and (high > DAY_S or (with_date and high >= MINUTE))
