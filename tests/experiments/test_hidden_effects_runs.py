@@ -205,6 +205,22 @@ def test_a_kept_case_is_asked_again_into_another_folder(tmp_path, stubs, monkeyp
         replay.replay(new, tmp_path / "third", stubs())
 
 
+def test_another_program_makes_its_own_store_and_model_from_the_kept_logs(tmp_path, stubs):
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))
+    command = tmp_path / "shiplog.py"  # it would find this source, and not its own, from here
+    command.write_text(f"import os\nassert os.getcwd() != {str(ROOT)!r}\n{SHIPLOG}")
+    again = replay.replay(out, new, stubs(share=True), first=2, whole=True)
+    assert [p.label for p in again.cases] == ["5", "6"]
+    found = score.read(new).answers
+    assert [a.word for a in found] == ["none", "none"] and all(a.right for a in found)
+    assert [s["step"] for s in found[0].steps] == ["ingest", "train", "diagnose"]
+    assert (out / "cases" / "5" / "logs").is_dir() and not (new / "cases" / "5" / "logs").exists()
+    assert (new / "bases" / "5").is_dir()
+    replay.replay(out, new, stubs(share=True), whole=True)  # it grows by the third
+    assert len(score.read(new).answers) == 3
+
+
 def test_one_case_of_several_is_asked_again(tmp_path, stubs):
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))

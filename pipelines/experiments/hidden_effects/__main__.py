@@ -16,12 +16,15 @@ python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [-
     each with --rivals: what simpler methods say of the same trials, too; of cases that were run
     with --keep before, give the command again
 python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals] [--every N]
-    [--shiplog COMMAND]
-    the kept cases of DIR diagnosed again by the program as it is now, into another folder
+    [--first N] [--shiplog COMMAND] [--whole [--share]]
+    the kept cases of DIR diagnosed again by the program as it is now, into another folder; with
+    --whole from their logs on, for a program that cannot read their stores and models
 python -m pipelines.experiments.hidden_effects score DIR
     the tables again, of what is there by now
 python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown docs/validation.md]
     the validation page: misses first, then the scores of all methods, home and abroad apart
+python -m pipelines.experiments.hidden_effects compare FORMER PRESENT [--markdown PATH]
+    two programs on the cases that both answered; each a folder of tests or a packed file
 python -m pipelines.experiments.hidden_effects pack DIR [DIR ...] --into FILE.tar.xz
     their answers and keys in one file, which `scores` takes as well as folders; unpacked with
     `tar -xf`, a test goes on where it was
@@ -48,6 +51,7 @@ from pipelines.experiments.hidden_effects import (
     score,
     score_tables,
     suites,
+    two_programs,
     validation,
 )
 from pipelines.experiments.hidden_effects.run import Settings
@@ -62,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given.what == "scores":
             return _scores(given)
+        if given.what == "compare":
+            return _compare(given)
         if given.what == "pack":
             print(archive.pack(given.out, given.into))
             return 0
@@ -102,6 +108,17 @@ def _scores(given: argparse.Namespace) -> int:
     return 0
 
 
+def _compare(given: argparse.Namespace) -> int:
+    with archive.opened([given.former]) as former, archive.opened([given.present]) as present:
+        sides = [[score.read(folder) for folder in folders] for folders in (former, present)]
+        text = two_programs.page(*sides)
+    if given.markdown is None:
+        print(text)
+    else:
+        given.markdown.write_text(text + "\n", encoding="utf-8")
+    return 0
+
+
 def _run(given: argparse.Namespace) -> None:
     command = tuple(shlex.split(given.shiplog)) if given.shiplog else Settings().shiplog
     settings = Settings(
@@ -110,7 +127,7 @@ def _run(given: argparse.Namespace) -> None:
     )  # fmt: skip
     if given.what == "replay":
         given.out = given.out or replay.folder_of(given.source)
-        replay.replay(given.source, given.out, settings, given.every)
+        replay.replay(given.source, given.out, settings, given.every, given.first, given.whole)
         return
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
@@ -127,9 +144,6 @@ def _parser() -> argparse.ArgumentParser:
         suite = commands.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
         suite.add_argument("--out", type=Path, required=True, help="one folder, one test")
         _how(suite)
-        suite.add_argument(
-            "--share", action="store_true", help="train once a ship, not once a case"
-        )
         suite.add_argument("--oracle", action="store_true", help="what the truth would gain, too")
         suite.set_defaults(first_seed=None, count=None)
         if name not in ("fixed", "brief"):
@@ -142,8 +156,10 @@ def _parser() -> argparse.ArgumentParser:
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
     again.add_argument("--out", type=Path, help="another folder; next to DIR unless given")
     again.add_argument("--every", type=plan.positive, default=1, help="one case of so many")
+    again.add_argument("--first", type=plan.positive, metavar="N", help="of these, so many")
+    again.add_argument("--whole", action="store_true", help="from the logs on")
     _how(again)
-    again.set_defaults(share=False, oracle=False)
+    again.set_defaults(oracle=False)
     scored = commands.add_parser("score", help="the tables of what is there by now")
     scored.add_argument("out", type=Path)
     page = commands.add_parser("scores", help="the validation page of all cases found")
@@ -151,10 +167,16 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument(
         "--markdown", type=Path, metavar="PATH", help="write it there, with its picture"
     )
+    both = commands.add_parser("compare", help="two programs on the same cases")
+    both.add_argument("former", type=Path)
+    both.add_argument("present", type=Path)
+    both.add_argument("--markdown", type=Path, metavar="PATH")
     packed = commands.add_parser("pack", help="answers and keys in one file")
     packed.add_argument("out", type=Path, nargs="+", metavar="DIR")
     packed.add_argument("--into", type=Path, required=True, metavar="FILE.tar.xz")
-    for one in (one for n, one in commands.choices.items() if n not in ("scores", "pack")):
+    for one in (
+        one for n, one in commands.choices.items() if n not in ("scores", "compare", "pack")
+    ):
         one.add_argument("--least", type=int, default=0, metavar="N", help="exit code 4 unless N "
                          "are right and none is misnamed")  # fmt: skip
     return parser
@@ -163,6 +185,7 @@ def _parser() -> argparse.ArgumentParser:
 def _how(command: argparse.ArgumentParser) -> None:
     """What a suite and a replay have in common."""
     command.add_argument("--jobs", type=plan.positive, default=1, help="ships at a time")
+    command.add_argument("--share", action="store_true", help="train once a ship, not once a case")
     command.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
     command.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")

@@ -1,7 +1,8 @@
 """Cases that were kept, diagnosed again by the program as it is now, into a folder of their own.
 
-Logs, store and model stay those of the first run and are only read. Its keys are copied, unopened,
-once the new verdicts are sealed; nothing of its verdicts is used.
+Logs, store and model stay those of the first run and are only read. A program that cannot read that
+store or model starts from the logs, and makes its own. The keys are copied, unopened, once the new
+verdicts are sealed; nothing of the first verdicts is used.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import json
 import logging
 import shutil
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 
 from pipelines.experiments.hidden_effects import plan as plans
@@ -28,15 +31,23 @@ def folder_of(source: Path) -> Path:
     return source.with_name(f"{source.name}-{name(identity()).replace(' ', '-')}")
 
 
-def replay(source: Path, out: Path, settings: Settings, every: int = 1) -> Plan:
-    """The plan of what was replayed: of the kept cases the first of so many. Raises ShiplogError
-    where no case of `source` was kept."""
+def replay(
+    source: Path, out: Path, settings: Settings, every: int = 1, first: int | None = None,
+    whole: bool = False,
+) -> Plan:  # fmt: skip
+    """The plan of what was replayed.
+
+    every   one of so many of the kept cases; `first`: so many of these
+    whole   from the logs on: ingested and trained on as well
+
+    Raises ShiplogError where no case of `source` was kept.
+    """
     if source.resolve() == out.resolve():
         raise ShiplogError(
             f"{out} cannot hold its own replay.", hint="choose another folder with --out."
         )
     before = plans.load(source)
-    cases = tuple(one for one in before.cases if run.kept(source, one))[::every]
+    cases = tuple(one for one in before.cases if run.kept(source, one))[::every][:first]
     if not cases:
         raise ShiplogError(
             f"{source} has no case with store and base.", hint="run the suite with --keep first."
@@ -45,11 +56,23 @@ def replay(source: Path, out: Path, settings: Settings, every: int = 1) -> Plan:
     plan = plans.save(out, Plan(before.suite, before.first_seed, cases))
 
     def again(planned: Planned) -> str | None:
-        return _case(source, out, planned, settings)
+        one = _whole_case if whole else _case
+        return one(source, out, planned, settings)
 
-    todo = [[one] for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
-    run.in_turn(todo, again, settings.jobs)
+    todo = [one for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
+    # those that share a model come one after another
+    groups = [list(of) for _, of in groupby(todo, attrgetter("seed" if whole else "label"))]
+    run.in_turn(groups, again, settings.jobs)
     return plan
+
+
+def _whole_case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
+    """As `_case`, from the logs of the first run on."""
+    logs = plans.case_folder(source, planned).resolve() / "logs"
+    reported = run.run_case(out, planned, settings, logs)
+    if reported is not None:
+        shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
+    return reported
 
 
 def _left(out: Path, planned: Planned, settings: Settings) -> bool:

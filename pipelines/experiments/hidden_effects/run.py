@@ -118,13 +118,18 @@ def finished(folder: Path) -> bool:
     return content is None or content["verdict"] != FAILED
 
 
-def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
-    """What was reported, for the log; None where somebody stopped it, and nothing is sealed."""
+def run_case(
+    out: Path, planned: Planned, settings: Settings, made: Path | None = None
+) -> str | None:
+    """What was reported, for the log; None where somebody stopped it, and nothing is sealed.
+
+    made   logs of an earlier run of this case, to start from; its key is then not written here
+    """
     folder = plans.case_folder(out, planned).resolve()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     key = plans.key_path(out, planned).resolve()
-    logs, store = folder / "logs", folder / "store"
+    logs, store = made or folder / "logs", folder / "store"
     base = out.resolve() / "bases" / str(planned.seed) if settings.share else folder / "base"
     simulator = settings.abroad if planned.family else settings.case
     profile = str(logs / "ship.toml") if planned.family else "esso-vectwin"
@@ -141,7 +146,7 @@ def run_case(out: Path, planned: Planned, settings: Settings) -> str | None:
     }  # fmt: skip
     steps: list[dict[str, Any]] = []
     for name, command in commands.items():
-        if name == "train" and not _to_train(base, logs):
+        if (name == "logs" and made) or (name == "train" and not _to_train(base, logs)):
             continue
         done = step(name, command, folder, settings)
         if done["rc"] in STOPPED:
@@ -240,16 +245,21 @@ def step(name: str, command: Sequence[str], folder: Path, settings: Settings) ->
         settings.shiplog
     )
     known = program.other(settings.shiplog) if foreign else program.identity()
-    return _process(name, command, folder, settings.limit) | known
+    # in this checkout, another program written in Python would find this source and not its own
+    place = folder if foreign else ROOT
+    return _process(name, command, folder, place, settings.limit) | known
 
 
-def _process(name: str, command: Sequence[str], folder: Path, limit: float) -> dict[str, Any]:
-    """Wall and CPU time and peak memory of one process and those that it waited for."""
+def _process(
+    name: str, command: Sequence[str], folder: Path, place: Path, limit: float
+) -> dict[str, Any]:
+    """Wall and CPU time and peak memory of one process, which runs in `place`, and those that it
+    waited for."""
     path = folder / f"{name}.stderr"
     began = time.perf_counter()
     with path.open("wb") as stderr:
         child = subprocess.Popen(
-            command, cwd=ROOT, env=os.environ | ONE_CORE, stderr=stderr,
+            command, cwd=place, env=os.environ | ONE_CORE, stderr=stderr,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         )  # fmt: skip
         # not child.kill(): that polls, and would take the exit status away from wait4

@@ -14,9 +14,9 @@ JUDGEMENTS: dict[str, str] = {
         "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
         "position and velocity. The random tests alone say, too, that the wind force athwart is "
         "half of that published, as it is with a wind that is measured 1.49 times too strong. That "
-        "it is the anemometer and not the force, and the wind's clock, are unconfirmed. Nothing "
-        "else says that the compass is 3.25 deg off: coefficients of another pond may do that. "
-        "Half of the error is unexplained."
+        "it is the anemometer and not the force, and the wind's clock, are unconfirmed. So is the "
+        "antenna: position and velocity agree with each other wherever it is, and coefficients of "
+        "another pond may look the same. Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "
@@ -27,9 +27,10 @@ JUDGEMENTS: dict[str, str] = {
         "has less than 90 %."
     ),
     "blueboat": (
-        "Not believable. Sixteen runs of one afternoon, two thirds of them with neutral thrust: "
-        "nothing is known to have changed. On 5 of the 53 segments of the nominal runs the model "
-        "diverges, and the nominal process noise is that of the others."
+        "Believable as far as it goes. Sixteen runs of one afternoon, two thirds of them with "
+        "neutral thrust: nothing is known to have changed, and no cause is named. The model has a "
+        "fifth of the L of holding the velocity: with so poor a model, neither of the two answers "
+        "would be more than a guess."
     ),
     "milliampere": (
         "Believable. These are three runs at about 0.1 m/s; the answer says how much more is "
