@@ -119,6 +119,8 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     notes = []
     if before_effect and nominal is None:
         notes.append(answer.without_nominal(run, store.path))
+    if run.given:
+        notes.append(answer.of_given(run))
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
     decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking, reach)

@@ -154,6 +154,15 @@ def without_nominal(run: Run, store: Path) -> str:
     )
 
 
+def of_given(run: Run) -> str:
+    """A note on a model that was fitted to no voyage."""
+    return (
+        f"No voyage shows what {run.name} itself gets wrong of this ship. A named cause may stand "
+        "for an error of its coefficients: confirm it by a measurement that needs no model, or "
+        "identify the model from nominal voyages."
+    )
+
+
 def of_own_voyages(run: Run, decision: Decision) -> list[str]:
     """Notes on a verdict about a run's own training voyages."""
     notes = []

@@ -31,6 +31,7 @@ def test_without_wind_sensor_what_needs_it_is_not_tested(tmp_path):
     content = done.verdict.as_json()
     shaped(content)
     assert content["base"] == {"run": "r", "before_effect": False}
+    assert any("may stand for an error of its coefficients" in note for note in content["notes"])
     why = {one["name"]: one["reason"] for one in content["unavailable"]}
     for name in ("wind_force", "wind_direction_offset", "wind_speed_scale"):
         assert "no wind is recorded" in why[name]
