@@ -90,7 +90,7 @@ class Diagnosis(_Printed):
 
     verdict    named, none, undecided, unknown, coverage or external, with its sentence
     causes     one row per named cause: name, probability and sentence
-    ranking    one row per hypothesis: name and probability
+    ranking    one row per answer: name and probability
     report     the page, as Markdown; recording: its pictures, where there are any
     extended   the run with the causes in it, where `extend` was given and a cause is named
     """

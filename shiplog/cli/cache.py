@@ -15,7 +15,9 @@ def cache(
     clear: Annotated[bool, typer.Option("--clear", help="Remove every file of the cache.")] = False,
     json_to: JsonOption = None,
 ) -> None:
-    """Show what shiplog keeps on disk to run faster the next time, or remove it.
+    """Show or remove what shiplog keeps on disk.
+
+    With these files it runs faster the next time.
 
     Example: shiplog cache --clear
     """

@@ -8,8 +8,9 @@ from shiplog.cli.output import leave
 
 
 def check(logs: Logs, profile: ProfileOption = None, json_to: JsonOption = None) -> None:
-    """Health of logs without ingesting them: what is readable, lost, late, out of order, and
-    where a profile fits, which sensors disagree.
+    """What is readable, lost, late or out of order in logs.
+
+    Nothing is stored. Where a profile fits, it also reports which sensors disagree.
 
     Example: shiplog check sample_logs/voyage_1.mcap
     """

@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
 from shiplog.cli.output import answer, leave_lost, show
 from shiplog.exceptions import ShiplogError, UsageError
 
 
 def compare(
     runs: Annotated[list[Path], typer.Argument(help="One or more trained runs.")],
-    voyages: Voyages = None,
+    voyages: TestVoyages = None,
     store: StoreOption = STORE,
     save: Annotated[
         Path | None, typer.Option(help="Write the recording here and open nothing.")

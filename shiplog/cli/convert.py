@@ -28,7 +28,7 @@ def convert(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables, NMEA 0183 text and ROS bags to MCAP logs that shiplog reads.
+    """Tables, NMEA 0183 text and ROS bags to MCAP logs.
 
     Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """

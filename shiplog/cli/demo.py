@@ -16,11 +16,13 @@ def demo(
     out: Annotated[Path, typer.Option(help="Where store, run and recording go.")] = Path("demo"),
     view: Annotated[bool, typer.Option("--view/--no-view", help="Open the viewer.")] = True,
     logs: Annotated[
-        Path | None, typer.Option(help="Sample logs; those of the checkout unless given.")
+        Path | None, typer.Option(help="Sample logs; those of the clone unless given.")
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """The main job on sample_logs: ingest, train, evaluate, compare, diagnose.
+    """The main job on the sample logs, from MCAP to a verdict.
+
+    It ingests, trains, evaluates, compares and diagnoses.
 
     Example: shiplog demo --out demo --no-view
     """

@@ -8,24 +8,30 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TrialVoyages
 from shiplog.cli.output import LOST, answer
 
 
 def diagnose(
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/mmg.")],
-    voyages: Voyages = None,
+    voyages: TrialVoyages = None,
     store: StoreOption = STORE,
-    out: Annotated[Path, typer.Option(help="Folder for the report and its pictures.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for report, verdict and recording.")] = Path(
         "diagnosis"
     ),
     extend: Annotated[
-        Path | None, typer.Option(help="Write the model with the named causes as this run.")
+        Path | None,
+        typer.Option(
+            help="Write the model with the named causes as this run; without a named cause nothing "
+            "is written. An unrecorded thruster cannot be part of a model.",
+        ),
     ] = None,
     cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
-    """What the simulation gets wrong, why, the extended model, and the gain on held-out voyages.
+    """What the simulation gets wrong, and why.
+
+    The answer names causes with their sizes, and the gain on held-out voyages.
 
     Example: shiplog diagnose runs/mmg --voyages 'season2_*' --extend runs/mmg2
     """

@@ -8,18 +8,20 @@ from typing import Annotated
 import typer
 
 from shiplog.cli.inputs import check_runs
-from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, Voyages
+from shiplog.cli.options import STORE, Causes, JsonOption, StoreOption, TestVoyages
 from shiplog.cli.output import LOST, answer, leave_lost
 
 
 def evaluate(
     run: Annotated[Path, typer.Argument(help="A trained run, such as runs/ref.")],
-    voyages: Voyages = None,
+    voyages: TestVoyages = None,
     store: StoreOption = STORE,
     cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
-    """L, RMSE per channel, end errors and coverage, compared with two baselines.
+    """How far off a model is on measured voyages.
+
+    L, RMSE per channel, errors at the end of a window, and coverage; compared with two baselines.
 
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """

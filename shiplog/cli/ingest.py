@@ -23,8 +23,10 @@ def ingest(
     ] = False,
     json_to: JsonOption = None,
 ) -> None:
-    """Logs into the store: aligned, reduced to midship, faults marked. The same log again changes
-    nothing.
+    """Logs into the store: 10 Hz, at midship, faults marked.
+
+    The same log with the same profile again changes nothing; with another profile it replaces the
+    voyage.
 
     Example: shiplog ingest sample_logs --store store
     """

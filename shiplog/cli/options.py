@@ -31,15 +31,29 @@ JsonOption = Annotated[
     str | None,
     typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.", callback=_ask_json),
 ]
-Voyages = Annotated[
+CHOSEN = "Names or shell patterns, several times; unless given,"
+Voyages = Annotated[list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all.")]
+TrainingVoyages = Annotated[
+    list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all of the store, split.")
+]
+TestVoyages = Annotated[
     list[str] | None,
-    typer.Option("--voyages", help="Names or shell patterns; can be given several times."),
+    typer.Option(
+        "--voyages", help=f"{CHOSEN} the run's test voyages, else all that it was not fitted to."
+    ),
+]
+TrialVoyages = Annotated[
+    list[str] | None,
+    typer.Option("--voyages", help=f"{CHOSEN} all that the run was not trained on."),
 ]
 Causes = Annotated[
     list[Path] | None,
     typer.Option("--cause", help="A Python file with causes of your own; several times."),
 ]
-Window = Annotated[int, typer.Option(min=LEAST_WINDOW, help="Samples in a window, at 1 Hz.")]
+Seeds = Annotated[
+    int, typer.Option(min=1, help="Number of seeds; they are numbered from 0.")
+]
+Window = Annotated[int, typer.Option(min=LEAST_WINDOW, help="Length of a window in seconds.")]
 Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
 Epochs = Annotated[
     int | None, typer.Option(min=1, help="Cap the epochs (paper) or iterations (fast).")

@@ -13,9 +13,10 @@ from shiplog.cli.options import (
     Device,
     Epochs,
     JsonOption,
+    Seeds,
     StoreOption,
+    TrainingVoyages,
     Validation,
-    Voyages,
     Width,
     Window,
 )
@@ -29,9 +30,9 @@ def paper(
         list[str] | None,
         typer.Option("--data", help="Window sets, all eight unless given; several times."),
     ] = None,
-    voyages: Voyages = None,
+    voyages: TrainingVoyages = None,
     validation: Validation = None,
-    seeds: Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")] = 10,
+    seeds: Seeds = 10,
     recipe: Annotated[str, typer.Option(help="fast, or paper: the published one, days.")] = "fast",
     window: Window = 100,
     width: Width = 256,
@@ -46,9 +47,12 @@ def paper(
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
-    """The published experiment: eight window sets, ten seeds each, tables and figures.
+    """The published experiment: eight window sets, ten seeds each.
 
-    Interrupted, give the same command again. Example: shiplog paper --seeds 10 --out paper
+    It leaves tables, figures and a recording. If it was interrupted, give the same command again:
+    it goes on.
+
+    Example: shiplog paper --seeds 10 --out paper
     """
     from shiplog.paths import check_writable
     from shiplog.training.options import TrainOptions

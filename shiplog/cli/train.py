@@ -13,20 +13,20 @@ from shiplog.cli.options import (
     Device,
     Epochs,
     JsonOption,
+    Seeds,
     StoreOption,
+    TrainingVoyages,
     Validation,
-    Voyages,
     Width,
     Window,
 )
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
-from shiplog.models import MODELS
+from shiplog.models import FORCES, MODELS
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
 Data = Annotated[str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")]
-Seeds = Annotated[int, typer.Option(min=1, help="How many seeds: 0, 1, ...")]
 Recipe = Annotated[str, typer.Option(help="fast, or paper: the published one, hours.")]
 WindInput = Annotated[
     str | None,
@@ -44,17 +44,25 @@ Parameters = Annotated[
     Path | None, typer.Option(help="Physical models: TOML of coefficients to start from.")
 ]
 Without = Annotated[
-    list[str] | None, typer.Option(help="Physical models: a force to switch off, such as wind.")
+    list[str] | None,
+    typer.Option(
+        help=f"Physical models: a force to switch off: {', '.join(FORCES[:-1])} or {FORCES[-1]}; "
+        "several times.",
+    ),
 ]
 Free = Annotated[
-    list[str] | None, typer.Option(help="Physical models: parameters that may move: 'wind.*'.")
+    list[str] | None,
+    typer.Option(
+        help="Physical models: coefficients that are identified, such as 'wind.*'; all others "
+        "keep their values. Several times.",
+    ),
 ]
 Folds = Annotated[
     int | None,
     typer.Option(
         min=0,
-        help="Physical models: parts that voyages are held out in, 5 unless given; 0 holds "
-        "none out, and the gain is not tested.",
+        help="Physical models: parts in which voyages are held out in turn, 5 unless given; below "
+        "2 none is, and the fit is not tested on other voyages.",
     ),
 ]
 Again = Annotated[
@@ -70,7 +78,7 @@ def train(
     out: Out,
     model: Model = "feedforward",
     data: Data = "ref",
-    voyages: Voyages = None,
+    voyages: TrainingVoyages = None,
     validation: Validation = None,
     seeds: Seeds = 1,
     recipe: Recipe = "fast",
@@ -88,7 +96,9 @@ def train(
     store: StoreOption = STORE,
     json_to: JsonOption = None,
 ) -> None:
-    """Train a model; interrupted, give the same command again and it goes on.
+    """Train a network, or identify a physical model.
+
+    If it was interrupted, give the same command again: it goes on.
 
     Example: shiplog train --data ref --seeds 3 --out runs/ref
 

@@ -20,7 +20,9 @@ def voyages(
     voyages: Voyages = None,
     json_to: JsonOption = None,
 ) -> None:
-    """What is in the store; with --sensors, what several voyages together say of the instruments.
+    """What is in the store.
+
+    With --sensors, what several voyages together say of the instruments.
 
     Example: shiplog voyages --store store --voyages 'zigzag_*'
 

@@ -28,6 +28,9 @@ class ModelFamily:
     sections: tuple[str, ...]
 
 
+# Forces that `--without` leaves out of a physical model; the hull always stays.
+FORCES = ("propeller", "rudder", "thruster", "wind")
+
 NETWORK = ModelFamily(
     "network",
     "a network",

@@ -15,7 +15,7 @@ def markdown(verdict: Verdict) -> str:
         lines += _cause(cause)
     lines += _gain(verdict)
     if verdict.ranking:
-        lines += ["## Ranking", "", "| hypothesis | probability |", "| --- | ---: |"]
+        lines += ["## Ranking", "", "| answer | probability |", "| --- | ---: |"]
         lines += [f"| {r['name']} | {r['probability']:.3f} |" for r in verdict.ranking]
         lines.append("")
     for title, rows in (("Rejected", verdict.rejected), ("Traces", verdict.traces)):

@@ -113,8 +113,8 @@ def estimated(profile: Profile) -> list[str]:
         return []
     breadth = "; the hull is drawn a sixth as broad as long" if "breadth_m" in missing else ""
     return [
-        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}: a learned model "
-        f"does without{breadth}."
+        f"{profile.source or profile.ship.name} leaves out {', '.join(missing)}: `train --model "
+        f"mmg` estimates them; give those that you know{breadth}."
     ]
 
 

@@ -1,4 +1,4 @@
-"""The same trainings on a Ray cluster (extra `shiplog[ray]`), a core each.
+"""The same trainings on a Ray cluster (extra `ray`), a core each.
 
 The paper's recipe goes there in pieces, and what a piece came to is brought back: a node that dies
 costs a piece, which another node does again to the same bits.
@@ -74,7 +74,8 @@ def connected(address: str) -> Any:
     """Ray, joined to the cluster."""
     if find_spec("ray") is None:
         raise ShiplogError(
-            "--ray needs Ray, which is not installed.", hint="pip install 'shiplog[ray]'."
+            "--ray needs Ray, which is not installed.",
+            hint="in the clone of shiplog: pip install '.[ray]'.",
         )
     ray: Any = import_module("ray")
     try:

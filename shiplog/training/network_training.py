@@ -1,4 +1,4 @@
-"""Training: the paper's recipe to the letter, and a fast one that reaches it in seconds.
+"""Training: the paper's recipe, and a short one that takes seconds.
 
 Knows no disk: what must last is handed to `checkpoint`, and comes back as `resume`.
 """

@@ -9,7 +9,7 @@ from typing import Any
 
 from shiplog.channels import LEAST_WINDOW
 from shiplog.exceptions import UsageError, listed, nearest
-from shiplog.models import MODELS, PHYSICS, taking
+from shiplog.models import FORCES, MODELS, PHYSICS, taking
 from shiplog.training.run_config import DEVICES, RECIPES, WIND_INPUTS, Config
 from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.split_settings import Split
@@ -25,8 +25,8 @@ class TrainOptions:
     data         the paper's window set: ref, sli2, ..., d-ref
     voyages      names or shell patterns of the voyages to learn from; all where there are none
     validation   those to validate on
-    seeds        how many: 0, 1, ...
-    window       samples in a window, at 1 Hz
+    seeds        how many; they are numbered from 0
+    window       length of a window [s]: samples at 1 Hz
 
     Of networks:
     recipe       fast, or paper: the published one, which takes hours
@@ -38,9 +38,9 @@ class TrainOptions:
     Of physical models:
     fit          identify; else the coefficients as they are published or estimated
     parameters   TOML of coefficients to start from
-    without      forces to switch off, such as wind
-    free         patterns of the parameters that may move, such as wind.*; all where there are none
-    folds        parts that voyages are held out in, 5 unless given; 0 holds none out
+    without      forces to switch off: propeller, rudder, thruster or wind
+    free         patterns of the coefficients to identify, such as wind.*; all where there are none
+    folds        parts in which voyages are held out in turn, 5 unless given; below 2 none is
     """
 
     model: str = "feedforward"
@@ -96,6 +96,12 @@ class TrainOptions:
                 )
             if not kind.takes(name):
                 raise UsageError(f"{flag} says nothing to {kind.family.noun}.", hint=hint)
+        for name in self.without:
+            if name not in FORCES:
+                raise UsageError(
+                    f"There is no force {name!r} to leave out{nearest(name, FORCES)}.",
+                    hint=f"--without can be {listed(FORCES)}.",
+                )
         if kind.family is PHYSICS and AUGMENTATIONS[self.data].step < AUGMENTATIONS["ref"].step:
             raise UsageError(
                 f"--data {self.data} is of windows that overlap: an identification would count the "

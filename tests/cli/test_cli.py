@@ -176,6 +176,14 @@ def test_every_command_has_help_with_an_example(command):
     assert code == 0 and f"Example: shiplog {command}" in " ".join(reported.split())
 
 
+def test_the_list_of_commands_has_whole_sentences():
+    code, reported, _ = call("--help")
+    listed = reported.partition("Commands:")[2].split("\n")[1:]
+    lines = [line for line in listed if line.strip()]
+    assert code == 0 and len(lines) == 12
+    assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
 def test_versions_and_the_short_word_for_help():
     code, reported, _ = call("--version")
     assert code == 0 and reported.startswith("shiplog 0.") and "Rerun 0." in reported

@@ -196,7 +196,7 @@ def test_shipmmg_missing_is_reported(monkeypatch):
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ValueError, match=r"pip install .shiplog\[experiments\]"):
+    with pytest.raises(ValueError, match=r"pip install '\.\[experiments\]'"):
         cases.draw(1, family="shipmmg")
 
 

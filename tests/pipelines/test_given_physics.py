@@ -163,8 +163,6 @@ def test_a_force_left_out_is_reported_and_gone(store, tmp_path):
         (("--free", "wind.y_1"), ["No parameter is called 'wind.y_1'", "did you mean 'wind.y1'"]),
         (("--free", "nonsense"), ["No parameter is called 'nonsense'", "hull.y_v", "'wind.*'"]),
         (("--free", "rudder.*"), ["No parameter is called 'rudder.*'"]),  # it was left out
-        (("--without", "wing"), ["no force 'wing'", "did you mean 'wind'"]),
-        (("--without", "hull"), ["no force 'hull'"]),
         (("--parameters", "nowhere.toml"), ["nowhere.toml cannot be read"]),
     ],
 )
@@ -173,6 +171,23 @@ def test_a_wrong_choice_names_the_right_ones(store, tmp_path, arguments, words):
     assert code == 1
     for word in words:
         assert word in reported
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        ("wing", "no force 'wing' to leave out (did you mean 'wind'?)"),
+        ("hull", "no force 'hull' to leave out"),
+    ],
+)
+def test_a_force_that_cannot_be_left_out_is_wrong_usage(tmp_path, force, words):
+    """Answered before the store is read: here there is none."""
+    code, _, reported = train(
+        tmp_path / "none", tmp_path / "r", "--model", "mmg", "--without", force
+    )
+    assert code == 2 and words in reported
+    assert "--without can be propeller, rudder, thruster, wind." in reported
     assert not list(tmp_path.iterdir())
 
 

@@ -15,7 +15,7 @@ import sailing
 from commands import call
 from safetensors.numpy import load_file
 
-pytest.importorskip("ray", reason="needs Ray: pip install 'shiplog[ray]'")
+pytest.importorskip("ray", reason="needs Ray: pip install '.[ray]'")
 
 RAY = Path(sys.executable).with_name("ray")
 FEW = ("--window", 20, "--width", 8, "--seeds", 3, "--recipe", "paper", "--epochs", 1200,

@@ -4,7 +4,7 @@
 
 CPU time of one thread, implementations in turn, round by round. All must agree on loss and gradient
 before they are timed. Also printed: the share of this core's best matrix product, memory above
-rest, and what two trainings on two cores do against one. Peers: pip install 'shiplog[bench]'.
+rest, and what two trainings on two cores do against one. Peers: pip install '.[bench]'.
 """
 
 from __future__ import annotations

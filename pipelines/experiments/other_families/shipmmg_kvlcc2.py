@@ -4,7 +4,7 @@ Nothing of its equations is changed: MMG standard method, Yasukawa & Yoshimura (
 other numbers in its own parameters, and add accelerations from outside to the rates that it
 returns. It knows no screw turning astern, no wind, no bank and no shallow water: none is asked.
 
-    pip install "shiplog[experiments]"
+    pip install '.[experiments]'
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def package():
         from shipmmg import mmg_3dof  # pyright: ignore[reportMissingImports]  # an optional extra
     except ImportError as error:
         raise ValueError(
-            'The family shipmmg needs the package of that name: pip install "shiplog[experiments]".'
+            "The family shipmmg needs the package of that name: pip install '.[experiments]'."
         ) from error
     return mmg_3dof
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.models import FORCES
 from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
 from shiplog.profile import Actuator, Profile
 
 AIR = 1.225  # kg/m³
 WIDE_ANGLE = math.radians(45.0)
 UNITS = ("propellers", "rudders", "thrusters")
-PARTS = ("hull", "propeller", "rudder", "thruster", "wind")  # forces that can be asked for
+PARTS = ("hull", *FORCES)  # all forces that a ship may have
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,15 +119,15 @@ def geometry_of(
 ) -> tuple[Geometry, Particulars, tuple[str, ...]]:
     """A profile's geometry, its particulars, and a sentence for each that had to be estimated.
 
-    without   parts of PARTS that are switched off; the hull stays.
+    without   those of FORCES that are switched off
     Raises ProfileError where a term lacks what it needs, naming it.
     """
     off = set(without)
     for name in off:
-        if name not in PARTS[1:]:
+        if name not in FORCES:
             raise ProfileError(
-                f"There is no force {name!r} to leave out{nearest(name, PARTS[1:])}.",
-                hint=f"--without can be {listed(PARTS[1:])}.",
+                f"There is no force {name!r} to leave out{nearest(name, FORCES)}.",
+                hint=f"--without can be {listed(FORCES)}.",
             )
     main, notes = particulars(profile)
     propellers, rudders, thrusters, sizes = _units(profile, main, off)

@@ -1,6 +1,7 @@
 """Starting Rerun's own programs: the native viewer, the web server and the headless viewer.
 
-They listen on this machine only, and send no usage statistics.
+They listen on this machine only, and send no usage statistics. A browser loads Rerun's own page
+from the web server; nothing here decides what that page sends.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ def _program() -> Path:
     """The program inside rerun-sdk: its Python wrapper would stand between us and stopping it."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is None or not spec.submodule_search_locations:
-        raise ShiplogError("rerun-sdk is not installed.", hint="install shiplog again with pip.")
+        raise ShiplogError("rerun-sdk is not installed.", hint="in the clone of shiplog: pip install .")
     folder = Path(spec.submodule_search_locations[0])
     places = ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun")
     for place in places:
