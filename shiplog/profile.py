@@ -85,7 +85,9 @@ class Source(Section):
     )  # fmt: skip
     units: tuple[str, ...] = Field(default=(), description="one for each of `fields`")
     sign: float | tuple[float, ...] = Field(
-        default=1.0, description="-1 turns the values round; one number, or one for each field"
+        default=1.0,
+        description="-1 turns the values round, and any other number is a factor on "
+        "them; one number, or one for each field",
     )
     offset: Number | tuple[Number, ...] = Field(
         default=0.0, description="the raw value that stands for zero, in its unit"
@@ -179,7 +181,7 @@ TABLE_CHANNELS = {
     ("wind", "from_bow"): ("wind_speed", "wind_angle"),
 }
 TABLE_LABELS = {  # columns of a table that say whose row it is, and when
-    "time": "the row's time",
+    "time": "the row's time; one without a zone is taken as UTC",
     "date": "belongs to a `time` that is a time of day",
     "voyage": "cuts the table into one log per value",
     "vessel": "tells the ships of a table apart",
@@ -240,7 +242,8 @@ class Actuator(Source):
     )
     limits: tuple[Number, Number] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked. `mmg` "
-        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm"
+        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm. A rudder whose "
+        "limits exceed 45 deg starts in both as a fish-tail blade (Schilling, VecTwin)"
     )  # fmt: skip
     position_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"
@@ -286,10 +289,14 @@ class Site(Section):
     banks: tuple[tuple[tuple[Chart, Chart], ...], ...] = Field(
         default=(), description="vertical walls: lines of points [x0, y0], m"
     )
-    depth_m: float | None = Field(default=None, ge=0.01, le=12_000.0, description="of the water, m")
+    depth_m: float | None = Field(
+        default=None, ge=0.01, le=12_000.0, description="of the water, m; for a chart: no model "
+        "and no cause uses it"
+    )  # fmt: skip
     density: float | None = Field(
-        default=None, ge=900.0, le=1_300.0, description="of the water, kg/m³"
-    )
+        default=None, ge=900.0, le=1_300.0, description="of the water, kg/m³; where left out 998 "
+        "for a ship of up to 20 m, else 1025"
+    )  # fmt: skip
     datum: tuple[Latitude, Longitude] | None = Field(
         default=None, description="[latitude, longitude] of x0 = y0 = 0, deg; the first fix where "
         "left out"
@@ -316,7 +323,9 @@ class Column(Section):
         "time by its size, a time of day where it "
         "counts as hhmmss, or else seconds from any start"
     )  # fmt: skip
-    sign: float = Field(default=1.0, description="-1 turns the column round")
+    sign: float = Field(
+        default=1.0, description="-1 turns the column round, and any other number is a factor on it"
+    )
     offset: Number = Field(
         default=0.0, description="the value that stands for zero, in the column's unit"
     )

@@ -75,8 +75,8 @@ KINDS = {"environment": "Surroundings", "ship": "Ship", "sensor": "Instruments"}
 
 CATALOGUE_TAIL = """
 `side_thrust` is an unrecorded thruster: a lateral force at one place that is on or off. It is
-found among the remainders rather than tested as a cause. Its parameters are `force` (N) or
-`acceleration` (m/s²), and the times at which it is on.
+found among the remainders rather than tested as a cause. Its parameter is `force` (N); `times`
+lists when it is on.
 
 ## Causes that resemble each other
 
@@ -87,7 +87,7 @@ exclude.
 COEFFICIENTS_HEAD = """# The coefficients of the physics
 
 The keys of `<profile>.mmg.toml` (or `--parameters FILE`), of `seed0/parameters.toml` in a run, and
-the names that `--free` takes: `--free 'wind.*'` lets the wind's coefficients alone move.
+the names that `--free` takes: `--free 'wind.*'` identifies the wind's coefficients alone.
 [physics.md](physics.md) describes the forces.
 
     source = "model tests of 2024"
@@ -100,9 +100,9 @@ the names that `--free` takes: `--free 'wind.*'` lets the wind's coefficients al
     y1 = 1.058
 
 A file has a section for each force that the ship has. A force that it lacks is left out with
-`--without`, which takes hull, propeller, rudder, thruster and wind. A value that is missing is
-named; one outside its range is refused. Where a neutral value is given, a file may leave the key
-out. Without a file, all coefficients are estimated from the particulars.
+`--without`, which takes propeller, rudder, thruster and wind; the hull always stays. A value that
+is missing is named; one outside its range is refused. Where a neutral value is given, a file may
+leave the key out. Without a file, all coefficients are estimated from the particulars.
 
 Hull forces are non-dimensional by ½ρL_pp d U² (moments by ½ρL_pp² d U²), added masses by ½ρL_pp² d,
 inertia by ½ρL_pp⁴ d about the centre of gravity, and wind forces by the areas above water. The

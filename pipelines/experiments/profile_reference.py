@@ -56,10 +56,12 @@ is.
     unit = "deg"
     limits = [-35.0, 35.0]
 
-Position, velocity and heading are needed; yaw rate and wind are not. Without actuators a log can
-be ingested and its sensors checked, and no model can be trained. Axes: x0 to the north, y0 to the
-east, x ahead, y to starboard, angles clockwise; a positive rudder turns the bow to starboard; the
-wind's angle is where it blows from, clockwise from the bow.
+Position, velocity and heading are needed. Without a yaw rate sensor the heading is differentiated;
+without a wind sensor no model has the force of the wind. Without actuators a log can be ingested
+and its sensors checked, and no model can be trained.
+
+Axes: x0 to the north, y0 to the east, x ahead, y to starboard, angles clockwise; a positive rudder
+turns the bow to starboard; the wind's angle is where it blows from, clockwise from the bow.
 
 [catalogue.md](catalogue.md) lists what a cause of a diagnosis needs of a profile, and
 [coefficients.md](coefficients.md) the file `my-ship.mmg.toml` that may stand next to it.

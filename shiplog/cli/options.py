@@ -50,9 +50,7 @@ Causes = Annotated[
     list[Path] | None,
     typer.Option("--cause", help="A Python file with causes of your own; several times."),
 ]
-Seeds = Annotated[
-    int, typer.Option(min=1, help="Number of seeds; they are numbered from 0.")
-]
+Seeds = Annotated[int, typer.Option(min=1, help="Number of seeds; they are numbered from 0.")]
 Window = Annotated[int, typer.Option(min=LEAST_WINDOW, help="Length of a window in seconds.")]
 Width = Annotated[int, typer.Option(min=1, help="Units of each hidden layer.")]
 Epochs = Annotated[

@@ -58,13 +58,19 @@ def diagnosed(
 
 
 def parameters(reported: dict) -> str:
-    """A cause's numbers with their 90 % intervals and units, in a line."""
+    """A cause's numbers with their 90 % intervals and units, in a line. A ratio has three decimals:
+    an interval about 1 is often narrower than a hundredth."""
     return ", ".join(
-        f"{name} {p['value']:.3g} ({p['low']:.3g} to {p['high']:.3g}) {unit(p)}".strip()
+        f"{name} {_number(p, 'value')} ({_number(p, 'low')} to {_number(p, 'high')}) "
+        f"{unit(p)}".strip()
         if not isinstance(p["value"], str)
         else f"{name} {p['value']}"
         for name, p in reported.items()
     )
+
+
+def _number(parameter: dict, which: str) -> str:
+    return f"{parameter[which]:{'.3f' if parameter['unit'] == '1' else '.3g'}}"
 
 
 def unit(parameter: dict) -> str:

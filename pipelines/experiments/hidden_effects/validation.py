@@ -116,6 +116,13 @@ Words of the tables:
 - **An alarm** is any verdict other than `none`.
 - **Probability** is the one that the verdict gives to its answer: the first cause named, the
   remainder of `unknown`, or the first answer of its ranking. `undecided` often has two with 0.5.
+  It is 0.00 where that remainder is not in the ranking: by [rule 10](diagnosis.md#rules) a wrong
+  sign, or a model worse than constant velocities, is answered `unknown`, whatever the ranking is.
+- **Outside the catalogue**, with the right remainder: `tether`, a line to a fixed point (position);
+  `tow`, a force in one direction that grows during the trial (time); `propeller_side_force`, a
+  share of the thrust acts athwart (controls); `rudder_limit`, the rudders turn no farther than a
+  limit (controls); `cross_coupling`, a unit also follows a share of another one's command
+  (controls); `turbulence`, process noise 4 to 9 times as large (stochastic).
 - **Always none** always answers `none`. **Random answer** draws `none` or a cause of the catalogue,
   all equally likely.
 - **Isolation** (FIA) is the mean probability that a method gives to the truth, in the cases in
@@ -134,7 +141,11 @@ RIVALS = {
     "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
     "as white noise.",
 }
-COST = "Processor time, elapsed time and memory of `shiplog diagnose` on one core, a case."
+# The machine is that of docs/validation-answers.tar.xz: the answers do not record it.
+COST = (
+    "Processor time, elapsed time and memory of `shiplog diagnose`, a case, on one core of an AMD "
+    "EPYC\n(Zen 4); two cases ran at a time."
+)
 INTERVAL = (
     "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
     f"at {100 * LEVEL:.0f} %.\nA goal is what is asked of the program."

@@ -11,12 +11,12 @@ JUDGEMENTS: dict[str, str] = {
         "On tests that were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
-        "Believable in part. The position's clock is right: the sensors alone say 0.95 s between "
-        "position and velocity. The random tests alone say, too, that the wind force athwart is "
-        "half of that published, as it is with a wind that is measured 1.49 times too strong. That "
-        "it is the anemometer and not the force, and the wind's clock, are unconfirmed. So is the "
-        "antenna: position and velocity agree with each other wherever it is, and coefficients of "
-        "another pond may look the same. Half of the error is unexplained."
+        "Believable in part. The answer on the position's clock is right: the sensors alone give "
+        "0.95 s between position and velocity. The random tests alone say, too, that the wind "
+        "force athwart is half of that published, as it is with a wind that is measured 1.49 times "
+        "too strong. That it is the anemometer and not the force, and the wind's clock, are "
+        "unconfirmed. So is the antenna: position and velocity agree with each other wherever it "
+        "is, and coefficients of another pond may look the same. Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "

@@ -33,7 +33,7 @@ def text(ways: Sequence[Way]) -> str:
     """The page: a table, and each data set's answer below it."""
     head = (
         "ship", "voyages", "usable, s", "windows of 100 s", "window of L, s", "L", "L of hold",
-        "L of least squares", "verdict", "explained", "CPU, s",
+        "L of least squares", "verdict", "explained", "processor time of all commands, s",
     )  # fmt: skip
     lines = [
         HEAD,
@@ -74,5 +74,7 @@ def _number(value: float | None) -> str:
 
 
 def _answer(one: Way) -> str:
+    """As a quotation has it: a message and its hint are a paragraph each."""
     verdict = one.answers.get("diagnose")
-    return verdict["sentence"] if verdict and not one.stopped else one.stopped
+    given = verdict["sentence"] if verdict and not one.stopped else one.stopped
+    return "\n>\n> ".join(given.splitlines())

@@ -21,7 +21,8 @@ SETTINGS = Settings()
 class Way:
     """What became of a data set.
 
-    stopped   the sentence with which a command ended the way; empty where none did
+    stopped   the message with which a command ended the way, and its hint in a line of its own;
+              empty where none did
     answers   of `voyages`, `evaluate` and `diagnose`: their JSON, where they came to one
     cpu_s     of all commands together
     """
@@ -111,7 +112,7 @@ def _mend(draft: Path, one: DataSet) -> None:
 
 
 def _sentence(stderr: str) -> str:
-    """The last message and its hint, in one line."""
+    """The last message, and its hint in a line of its own."""
     lines = stderr.rstrip().splitlines()
     first = max((i for i, line in enumerate(lines) if not line.startswith(" ")), default=0)
-    return " ".join(line.strip() for line in lines[first:])
+    return "\n".join(line.strip() for line in lines[first:])

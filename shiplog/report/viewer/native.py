@@ -159,7 +159,9 @@ def _program() -> Path:
     """The program inside rerun-sdk: its Python wrapper would stand between us and stopping it."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is None or not spec.submodule_search_locations:
-        raise ShiplogError("rerun-sdk is not installed.", hint="in the clone of shiplog: pip install .")
+        raise ShiplogError(
+            "rerun-sdk is not installed.", hint="in the clone of shiplog: pip install ."
+        )
     folder = Path(spec.submodule_search_locations[0])
     places = ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun")
     for place in places:
