@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 PAPER_TRAINING = {"d-ref": 4}  # Table 4: voyages 1 to 4; every other dataset 1 and 2
 SAMPLE_VOYAGES = tuple(f"voyage_{i}" for i in range(1, 7))
-HELD_OUT_SHARE = 0.15  # of the seconds, for validation and for test each
+HELD_OUT_SHARE = 0.15  # of windows, or of one voyage's seconds; for validation and for test each
 # s, windows that may be proposed instead
 SHORTER_WINDOWS = (80, 60, 50, 40, 30, 20, 10, LEAST_WINDOW)
 
@@ -32,7 +32,7 @@ def choose_split(
     """Which voyages train, validate and test; what the user did not name is chosen, and reported.
 
     Six voyages in order, or the sample logs, are split as in the paper; else whole voyages are
-    dealt out in order of time, about 15 % of the seconds each to validation and test.
+    dealt out in order of time, about 15 % of the windows each to validation and test.
     """
     names = store.select(list(voyages) or None)
     if validation:
