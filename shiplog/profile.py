@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from shiplog import channels, units
 from shiplog.exceptions import ProfileError, listed, nearest
+from shiplog.profile_channels import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
 from shiplog.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
@@ -152,40 +153,6 @@ class Sensor(Source):
             if 0.0 < sigma < FINEST:
                 raise ValueError(f"`sigma` is {sigma:g}; it is 0 or at least {FINEST:g}")
         return self
-
-
-SENSOR_KINDS = {  # what each sensor may be, the first being meant where `kind` is left out
-    "position": ("geodetic", "local"),
-    "velocity": ("sog_cog", "body", "ned", "enu"),
-    "heading": ("angle", "quaternion_enu", "quaternion_ned"),
-    "yaw_rate": ("rate",),
-    "wind": ("from_bow",),
-}
-NEEDED = {  # sensors without which there is no table, and what records them
-    "position": "a GNSS fix or a local position",
-    "velocity": "speed and course over ground, or velocities",
-    "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
-}
-# What a table's column may hold, sensor by sensor and kind by kind, in the order of its fields.
-TABLE_CHANNELS = {
-    ("position", "geodetic"): ("latitude", "longitude"),
-    ("position", "local"): ("x0", "y0"),
-    ("velocity", "sog_cog"): ("sog", "cog"),
-    ("velocity", "body"): ("surge", "sway"),
-    ("velocity", "ned"): ("velocity_north", "velocity_east"),
-    ("velocity", "enu"): ("velocity_east", "velocity_north"),
-    ("heading", "angle"): ("heading",),
-    ("heading", "quaternion_enu"): ("quaternion_z", "quaternion_w"),
-    ("heading", "quaternion_ned"): ("quaternion_z", "quaternion_w"),
-    ("yaw_rate", "rate"): ("yaw_rate",),
-    ("wind", "from_bow"): ("wind_speed", "wind_angle"),
-}
-TABLE_LABELS = {  # columns of a table that say whose row it is, and when
-    "time": "the row's time; one without a zone is taken as UTC",
-    "date": "belongs to a `time` that is a time of day",
-    "voyage": "cuts the table into one log per value",
-    "vessel": "tells the ships of a table apart",
-}
 
 
 class Sensors(Section):

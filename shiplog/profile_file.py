@@ -14,7 +14,8 @@ from pydantic import ValidationError
 
 from shiplog import profile_units, units
 from shiplog.exceptions import ProfileError, listed, nearest
-from shiplog.profile import NEEDED, Actuator, Column, Profile, Sensor, Sensors, Ship, Site
+from shiplog.profile import Actuator, Column, Profile, Sensor, Sensors, Ship, Site
+from shiplog.profile_channels import NEEDED
 
 
 def shipped() -> tuple[str, ...]:

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from shiplog import units
 from shiplog.exceptions import ProfileError
-from shiplog.profile import TABLE_CHANNELS, Profile
+from shiplog.profile import Profile
+from shiplog.profile_channels import TABLE_CHANNELS
 
 MEASURE = {  # what each channel of a sensor measures
     "latitude": "angle", "longitude": "angle", "x0": "length", "y0": "length",

@@ -9,7 +9,7 @@ import sailing
 import tomli_w
 
 from pipelines.experiments import profile_reference
-from shiplog import profile, profile_file, units
+from shiplog import profile, profile_channels, profile_file, units
 from shiplog.exceptions import ProfileError
 
 ARM, SIGMA = "lever_arm_m = [0.7, -0.2]", "sigma = 0.01"
@@ -197,13 +197,13 @@ def test_the_reference_has_every_key_kind_channel_and_unit():
     page = profile_reference.text()
     sections = (profile.Ship, profile.Sensor, profile.Actuator, profile.Site, profile.Column)
     keys = {key for section in sections for key in section.model_fields}
-    kinds = {f'"{kind}"' for each in profile.SENSOR_KINDS.values() for kind in each}
-    channels = {name for names in profile.TABLE_CHANNELS.values() for name in names}
+    kinds = {f'"{kind}"' for each in profile_channels.SENSOR_KINDS.values() for kind in each}
+    channels = {name for names in profile_channels.TABLE_CHANNELS.values() for name in names}
     for word in (
         *keys,
         *kinds,
         *channels,
-        *profile.TABLE_LABELS,
+        *profile_channels.TABLE_LABELS,
         *units.TO_SI,
         *profile_file.shipped(),
     ):

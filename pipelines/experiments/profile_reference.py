@@ -14,7 +14,8 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 from shiplog import profile, profile_file, units
-from shiplog.profile import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS, Section
+from shiplog.profile import Section
+from shiplog.profile_channels import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
 from shiplog.profile_units import DRIVEN
 from shiplog.report import tables
 

@@ -17,7 +17,8 @@ from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.dates import UNDATED
 from shiplog.logs.write import SCHEMAS, Series
-from shiplog.profile import TABLE_CHANNELS, TABLE_LABELS, Column, Profile, Source
+from shiplog.profile import Column, Profile, Source
+from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS
 
 log = logging.getLogger(__name__)
 

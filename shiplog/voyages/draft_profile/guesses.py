@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from shiplog import profile_units
-from shiplog.profile import TABLE_CHANNELS
+from shiplog.profile_channels import TABLE_CHANNELS
 from shiplog.voyages.draft_profile import words
 
 

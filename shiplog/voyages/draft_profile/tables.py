@@ -13,7 +13,7 @@ from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import text_of
 from shiplog.logs.conversion.delimited import read_table
-from shiplog.profile import TABLE_CHANNELS
+from shiplog.profile_channels import TABLE_CHANNELS
 from shiplog.voyages.draft_profile import facts
 from shiplog.voyages.draft_profile.column_names import (
     CHANNEL_COLUMNS,
