@@ -199,6 +199,8 @@ def test_a_diagnosis_that_breaks_is_a_wrong_answer_and_is_tried_again(
     monkeypatch.setenv("BREAK", "nothing")
     run.run(out, planned, stubs())
     assert commands_given(tmp_path).count("diagnose") == 3
+    attempts = [score.attempt(one.steps) for one in score.read(out).answers]
+    assert attempts == [1, 2]  # the one that had failed was asked once more
     assert main(["score", str(out)]) == 0
     assert main(["score", str(out), "--least", "2"]) == 0
     assert main(["score", str(out), "--least", "3"]) == 4

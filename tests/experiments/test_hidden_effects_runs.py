@@ -284,7 +284,7 @@ def test_the_page_is_written_with_its_picture_or_refused(tmp_path, stubs, capsys
     page = tmp_path / "docs" / "validation.md"
     assert main(["scores", str(out), "--markdown", str(page)]) == 0
     text = page.read_text()
-    assert "![Share right over the reported probability](validation-reliability.svg)" in text
+    assert "![Share true over the reported probability](validation-reliability.svg)" in text
     assert ElementTree.parse(page.with_name("validation-reliability.svg")).getroot() is not None
     assert main(["scores", str(out)]) == 0 and "# Validation" in capsys.readouterr().out
     steps = out / "cases" / "6" / "steps.json"

@@ -95,8 +95,9 @@ def test_the_goals_table_counts_by_hand():
     }
     assert {what: (rows[what][1], rows[what][-1]) for what in counts} == counts
     assert rows["held-out gain over the oracle's: median"][0] == "not measured"
-    assert rows["diagnose 7000 s, mmg: CPU time, median (worst)"][0] == "7.5 s (7.5 s)"
-    assert rows["diagnose 7000 s, mmg: peak memory, median (worst)"][0] == "800 MB (800 MB)"
+    later = "diagnose 7000 s, mmg, later case of a ship: "
+    assert rows[f"{later}CPU time, median (worst)"][0] == "7.5 s (7.5 s)"
+    assert rows[f"{later}peak memory, median (worst)"][0] == "800 MB (800 MB)"
     assert "outside, size below 1" not in rows
 
 
@@ -114,7 +115,7 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
     ])  # fmt: skip
     sure = [{"name": "none", "probability": 0.6}]
     silent = learned(lost, NONE | {"ranking": sure})
-    assert silent.right and silent.belief == (0.6, True)
+    assert silent.right and silent.statements == ((0.6, True),)
     assert not learned(CURRENT, NONE | {"ranking": sure}).right
     assert not answer(lost, NONE).right and not learned(lost, named("current")).right
     of = "network on affected data: "
@@ -123,7 +124,32 @@ def test_a_network_that_learned_the_trial_has_goals_of_its_own():
     assert rows[f"{of}named but wrong"][1] == "1/5"
     assert "one cause, size 1, 7000 s: named right" not in rows
     assert "named but wrong, any size" not in rows
-    assert rows["diagnose 7000 s, feedforward: CPU time, median (worst)"][3] == "<= 60 s"
+    what = "diagnose 7000 s, feedforward, later case of a ship: CPU time, median (worst)"
+    assert rows[what][3] == "<= 60 s"
+
+
+def test_times_of_unlike_work_are_apart():
+    """A first case of 30 s, two later ones of 10 and 20 s, and a trial of 170 · 300/5 = 10200 s."""
+
+    def took(cpu, key, *before, family=""):
+        steps = [{"step": name, "rc": 0} for name in before] + [STEPS[0] | {"cpu_s": cpu}]
+        planned = Planned("1", 1, None, None, 7000, family=family)
+        return Answer(planned, NONE, key, steps)
+
+    large = hidden() | {"ship": {"length": {"value": 300.0}, "speed": {"value": 5.0}}}
+    small = hidden() | {"ship": {"length": {"value": 3.0}, "speed": {"value": 0.6}}}
+    rows = measured([
+        took(30.0, hidden(), "train"), took(10.0, hidden()), took(20.0, hidden()),
+        took(50.0, small, "train", family="catamaran"),
+        took(70.0, large, "train", family="abkowitz"),
+    ])  # fmt: skip
+    cpu = {what: row for what, row in rows.items() if "CPU" in what}
+    assert {what.partition(":")[0]: row[:2] for what, row in cpu.items()} == {
+        "diagnose 7000 s, mmg, first case of a ship": ("40.0 s (50.0 s)", "2"),
+        "diagnose 7000 s, mmg, later case of a ship": ("15.0 s (20.0 s)", "2"),
+        "diagnose of more, to 10200 s, mmg, first case of a ship": ("70.0 s (70.0 s)", "1"),
+    }
+    assert [row[-1] for row in cpu.values()] == ["no", "no", ""]  # a longer trial has no goal
 
 
 def test_the_gain_is_set_against_the_oracles_where_there_is_one():
@@ -275,47 +301,64 @@ def test_calibration_of_ten_bins_by_hand():
     assert calibration([(1.0, True)]) == 0.0
 
 
+def ranked(**shares):
+    names = {name: name.replace("unknown_", "unknown:") for name in shares}
+    return {"ranking": [{"name": names[name], "probability": p} for name, p in shares.items()]}
+
+
 @pytest.mark.parametrize(
-    ("key", "verdict", "belief"),
+    ("key", "verdict", "statements"),
     [
-        (CURRENT, named("current", "fouling"), (0.95, True)),
-        (CURRENT, named("fouling"), (0.95, False)),
-        (CURRENT, NONE | {"ranking": [{"name": "none", "probability": 0.6}]}, (0.6, False)),
-        (hidden(), NONE | {"ranking": [{"name": "none", "probability": 0.6}]}, (0.6, True)),
-        (hidden(), NONE | {"ranking": [{"name": "bank", "probability": 0.4}]}, (0.4, False)),
+        (CURRENT, named("current", "fouling"), [(0.95, True), (0.95, False)]),
+        (CURRENT, named("fouling"), [(0.95, False)]),
+        (BOTH, named("current"), [(0.95, True)]),  # true, and not all of it
+        (CURRENT, NONE | ranked(none=0.6), [(0.6, False)]),
+        (hidden(), NONE | ranked(none=0.6), [(0.6, True)]),
+        # what it says is `none`, whatever it finds more probable
+        (hidden(), NONE | ranked(bank=0.4, none=0.3), [(0.3, True)]),
+        (TETHER, UNKNOWN | ranked(unknown_position=1.0), [(1.0, True)]),
+        # a cause that is as probable together with the remainder is not the answer
+        (TETHER, UNKNOWN | ranked(payload=1.0, unknown_position=0.97), [(0.97, True)]),
+        (CURRENT, UNKNOWN | ranked(current=1.0, unknown_position=1.0), [(1.0, False)]),
+        (CURRENT, {"verdict": "undecided"} | ranked(current=0.6, bank=0.3), [(0.6, True)]),
+        (BOTH, {"verdict": "undecided"} | ranked(current=0.6, bank=0.3), [(0.6, True)]),
+        # equally probable: each is a statement, in whatever order they stand
         (
-            TETHER,
-            UNKNOWN | {"ranking": [{"name": "unknown:position", "probability": 1}]},
-            (1.0, True),
+            CURRENT, {"verdict": "undecided"} | ranked(bank=0.5, current=0.5),
+            [(0.5, False), (0.5, True)],
         ),
-        (  # a cause that is as probable together with the remainder is not the answer
-            TETHER,
-            UNKNOWN
-            | {
-                "ranking": [
-                    {"name": "payload", "probability": 1.0},
-                    {"name": "unknown:position", "probability": 0.97},
-                ]
-            },
-            (0.97, True),
-        ),
-        (
-            CURRENT,
-            UNKNOWN
-            | {
-                "ranking": [
-                    {"name": "current", "probability": 1.0},
-                    {"name": "unknown:position", "probability": 1.0},
-                ]
-            },
-            (1.0, False),
-        ),
-        (hidden(), NONE, None),
-        (hidden(), {"verdict": "failed"}, None),
+        (hidden(), {"verdict": "coverage"} | ranked(unknown_controls=1.0), [(1.0, False)]),
+        (hidden(), NONE, []),
+        (hidden(), {"verdict": "failed"}, []),
     ],
-)
-def test_the_probability_is_that_of_the_answer(key, verdict, belief):
-    assert answer(key, verdict).belief == belief
+)  # fmt: skip
+def test_what_a_verdict_states_with_a_probability(key, verdict, statements):
+    assert [*answer(key, verdict).statements] == statements
+
+
+def test_the_right_name_at_another_place_is_wrong():
+    """Thrust that the port screw has lost, and a wind clock that is late."""
+
+    def of(cause, **parameters):
+        verdict = named(cause)
+        verdict["causes"][0]["parameters"] = {k: {"value": v} for k, v in parameters.items()}
+        return verdict
+
+    lost = hidden(thrust_loss=(1.0, {"factor": (0.8, "1"), "unit": ("port", "")}))
+    late = hidden(clock_offset=(1.0, {"time": (0.5, "s"), "channel": ("wind", "")}))
+    both = hidden(clock_offset=(1.0, {"time": (0.5, "s"), "channel": ("gnss", "")}))
+    for key, verdict, right in (
+        (lost, of("thrust_loss", actuator="port"), True),
+        (lost, of("thrust_loss", actuator="starboard"), False),
+        (lost, of("thrust_loss"), True),  # it says of no other
+        (late, of("clock_offset", channel="wind"), True),
+        (late, of("clock_offset", channel="position"), False),
+        (both, of("clock_offset", channel="gnss"), True),
+        (both, of("clock_offset", channel="position"), False),  # the velocity is as late
+    ):
+        one = answer(key, verdict)
+        assert (one.right, one.misnamed, one.found) == (right, not right, right)
+        assert one.statements == ((0.95, right),)
 
 
 # --- mistakes -------------------------------------------------------------------------------------

@@ -14,16 +14,21 @@ from pipelines.experiments.hidden_effects.parameters import compare
 
 
 def test_bins_hold_what_was_reported_and_the_picture_shows_each():
-    beliefs = [(0.95, True), (1.0, True), (0.91, False), (0.55, False), (0.0, False)]
-    low, middle, high = reliability.bins(beliefs)
+    statements = [(0.95, True), (1.0, True), (0.91, False), (0.55, False), (0.0, False)]
+    low, middle, high = reliability.bins(statements)
     assert (high.low, high.high, len(high.hits)) == (0.9, 1.0, 3)
     assert high.mean == pytest.approx(2.86 / 3) and high.share == pytest.approx(2 / 3)
     assert (low.mean, middle.share) == (0.0, 0.0)
-    drawn = ElementTree.fromstring(reliability.svg({"home": beliefs, "abroad": beliefs[:1]}))
+    drawn = ElementTree.fromstring(reliability.svg({"home": statements, "abroad": statements[:1]}))
     circles = [e for e in drawn.iter() if e.tag.endswith("circle")]
     assert len(circles) == 4
     assert float(circles[2].attrib["cx"]) == pytest.approx(50 + 240 * 2.86 / 3, abs=0.06)
     assert float(circles[2].attrib["cy"]) == pytest.approx(50 + 240 / 3, abs=0.06)
+
+
+def test_a_rounding_error_below_a_half_is_in_the_bin_of_a_half():
+    (both,) = reliability.bins([(0.49999999999999994, True), (0.5, False)])
+    assert (both.low, both.hits) == (0.5, (True, False))
 
 
 # --- ranks and coverage ---------------------------------------------------------------------------

@@ -101,7 +101,12 @@ def test_the_ends_of_a_share_are_in_closed_form():
         (CURRENT, named("fouling", "bank", group=["current"]), False, True),
         (key("current", "bank"), named("bank", "fouling", group=["current"]), True, True),
         (key("current", "bank"), named("fouling", group=["current", "bank"]), False, True),
-        (key("current", "bank"), undecided(bank=0.6, current=0.3), True, False),
+        # each answer is one cause, and both are hidden
+        (key("current", "bank"), undecided(bank=0.6, current=0.3), False, False),
+        # of three that are as probable none is among the first two; of two both are
+        (CURRENT, undecided(current=0.3, bank=0.3, fouling=0.3), False, False),
+        (CURRENT, undecided(bank=0.5, current=0.25, fouling=0.25), False, False),
+        (CURRENT, undecided(bank=0.5, current=0.5), True, False),
         (TETHER, undecided(current=0.5, unknown_position=0.4), True, False),
         (TETHER, undecided(unknown_controls=0.5, current=0.4), False, False),
         (TETHER, unknown("position"), True, False),
@@ -123,7 +128,8 @@ def test_an_undecided_verdict_is_an_alarm_and_no_name():
         True
     ]
     assert not clean.right and not effect.right and not effect.named
-    assert effect.belief == (0.5, True) and "undecided current" in score_tables.reported(effect)
+    assert effect.statements == ((0.5, True),)
+    assert "undecided current" in score_tables.reported(effect)
 
 
 # --- the goals' table -----------------------------------------------------------------------------
@@ -154,8 +160,14 @@ def test_the_rows_of_the_goals_count_by_hand():
     assert found["outside, size 1: unknown or undecided, right remainder"] == pytest.approx(2 / 3)
     assert found["two at once, size 1: both, no third"] == 0.0
     assert found["traceback, or no verdict in time"] == pytest.approx(1 / 10)
-    # stated with 0.9 and more: current and one of two (right), fouling, and another family
+    # stated with 0.9 and more: current and one of two (both hidden), fouling, and another family
     assert found[goals.CERTAIN] == pytest.approx(2 / 4)
+    assert found["outside, size 1: position"] == pytest.approx(2 / 3)
+    assert "outside, size 1: wind" not in found  # an answer, and never the truth here
+    # 0.95 twice true and once not, 1.0 not; 0.8 and 0.7 true; of 0.5 to 0.6 one, of 0.6 one of two
+    apart = (2 - 3.85) + 0.0  # of 0.9 to 1.0, and the others one by one
+    others = abs(1 - 0.8) + abs(1 - 0.7) + abs(0 - 0.5) + abs(1 - 1.2)
+    assert found[goals.CALIBRATION] == pytest.approx((abs(apart) + others) / 9)
     assert goals.cell([True, False]) == "50 % (1/2) [2.5, 97.5]"  # 1 - √0.95 = 2.5 %
 
 
@@ -229,12 +241,14 @@ def test_isolation_is_the_mean_probability_of_the_truth_where_there_was_an_alarm
         answer(CURRENT, FAILED),  # nor this
         answer(key(), undecided(current=0.9)),  # nothing to isolate
         answer(TETHER, unknown("position", unknown_position=0.6, unknown_wind=0.4)),
+        # it says `motion`, so that what it ranks is not what it gives the truth
+        answer(TETHER, unknown("motion", unknown_position=1.0)),
         answer(key("current", "bank"), named("bank", p=0.8)),  # current has nothing
     ]
-    assert scores.isolation(given) == pytest.approx((0.9 + 0.2 + 0.6 + 0.4) / 4)
+    assert scores.isolation(given) == pytest.approx((0.9 + 0.2 + 0.6 + 0.0 + 0.4) / 5)
     assert scores.isolation(given[2:5]) is None
-    assert scores.alarms_on_effects(given) == [True, True, False, False, True, True]
-    assert scores.right_among_alarms(given) == [True, False, False, True, False]
+    assert scores.alarms_on_effects(given) == [True, True, False, False, True, True, True]
+    assert scores.right_among_alarms(given) == [True, False, False, True, False, False]
 
 
 def test_the_log_score_by_hand_and_at_its_floor():
@@ -263,7 +277,9 @@ def test_scores_in_nats_become_probabilities_over_none():
     ]}  # fmt: skip
     one = answer(CURRENT, none(), rivals={"regression": rival}).by("regression")
     total = math.e**2 + math.e + 1.0
-    assert one.belief == (pytest.approx((math.e**2 + math.e) / total), False)
+    assert one.statements == ((pytest.approx((math.e**2 + math.e) / total), False),)
+    silent = replace(one, rivals={"regression": rival | {"answer": None}}).by("regression")
+    assert silent.statements == ((pytest.approx(1.0 / total), False),)  # `none` is what it says
     assert one.probability("none") == pytest.approx(1.0 / total)
     assert one.probability("current") == pytest.approx(0.0, abs=1e-300)
 
@@ -320,6 +336,34 @@ def test_each_family_of_ships_is_held_against_its_own_goals():
     methods_table = text.partition("## All methods: other families of equations")[2]
     row = next(line for line in methods_table.splitlines() if "named but wrong, any" in line)
     assert [cell.strip() for cell in row.strip("|").split("|")][1] == "<= 3 %"
+
+
+def test_each_type_of_ship_has_a_line_and_those_without_shipmmg_one():
+    """Two of three right abroad, and one of two without the package's ship; one wrong name."""
+    found = [("shipmmg", "current"), ("abkowitz", "current"), ("abkowitz", "fouling")]
+    given = [answer(CURRENT, named(n), i, family) for i, (family, n) in enumerate(found)]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in validation.types(given).splitlines()[2:]
+    ]
+    assert [(row[0], row[1][:11], row[2][:11], row[3]) for row in rows] == [
+        ("abkowitz", "50 % (1/2) ", "50 % (1/2) ", "2"),
+        ("shipmmg", "100 % (1/1)", "0 % (0/1) [", "1"),
+        ("all but shipmmg", "50 % (1/2) ", "50 % (1/2) ", "2"),
+    ]
+    assert len(validation.types(given[1:]).splitlines()) == 3
+    text = validation.page(scored(*given)).text
+    assert "### Each type of ship" in text and "shipmmg` is an MMG too" in text
+    assert "### Each type of ship" not in validation.page(scored(*ANSWERS)).text
+
+
+def test_attempts_are_counted_where_they_were():
+    second = replace(ANSWERS[0], steps=[COMMIT | {"attempt": 2}])
+    first = replace(ANSWERS[1], steps=[COMMIT | {"attempt": 1}])
+    assert "a case that fails is run again: 1 of these were" in (
+        validation.page(scored(first, second)).text
+    )
+    assert "do not record how often" in validation.page(scored(first, ANSWERS[0])).text
 
 
 def test_two_programs_are_not_put_into_one_table():

@@ -1,5 +1,9 @@
 """10 Hz to 1 Hz: rows a second and peak memory, next to polars' `group_by_dynamic` as the peer.
 
+Both go file by file, a voyage each, whose rows are in order. shiplog's route, which calls
+`group_by_dynamic` too, does more: it leaves out unusable rows and the seconds around a jump or of
+too few rows, counts `elapsed`, and looks whether the rows are sorted.
+
     python -m pipelines.experiments.benchmarks.resample [--rows 1e7 1e8] [--ray ADDRESS]
 
 With --ray also as one task a voyage on that cluster. Each measurement runs in a process of its own,
@@ -54,13 +58,15 @@ def ours(paths: list[Path], out: Path) -> None:
 def peer(paths: list[Path], out: Path) -> None:
     """The same means by `group_by_dynamic`, what polars' own guide shows for resampling."""
     means = [one_hertz.mean_angle(c) if c in CIRCULAR else pl.col(c).mean() for c in COLUMNS]
-    (
-        pl.scan_parquet(paths)
-        .sort("voyage", "time")
-        .group_by_dynamic("time", every="1s", offset="-500ms", group_by="voyage")
-        .agg(*means, samples=pl.len())
-        .sink_parquet(out, engine="streaming")
-    )
+    out.mkdir()
+    for number, path in enumerate(paths):
+        (
+            pl.scan_parquet(path)
+            .set_sorted("time")
+            .group_by_dynamic("time", every="1s", offset="-500ms")
+            .agg(pl.col("voyage").first(), *means, samples=pl.len())
+            .sink_parquet(out / f"{number:06d}.parquet", engine="streaming")
+        )
 
 
 def on_ray(paths: list[Path], out: Path, address: str) -> None:
@@ -71,20 +77,20 @@ def on_ray(paths: list[Path], out: Path, address: str) -> None:
 
 
 def measure(job: Callable[[list[Path], Path], None], paths: list[Path], out: Path) -> tuple:
-    """Seconds and peak memory [MB] of a job in a process of its own."""
+    """Seconds, of these of a processor, and peak memory [MB] of a job in a process of its own."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     child = context.Process(target=_child, args=(job, paths, out, sender))
     child.start()
     child.join()
-    return receiver.recv() if receiver.poll() else (float("nan"), float("nan"))
+    return receiver.recv() if receiver.poll() else (float("nan"),) * 3
 
 
 def _child(job: Callable[[list[Path], Path], None], paths: list[Path], out: Path, sender) -> None:
-    began = time.perf_counter()
+    began, busy = time.perf_counter(), time.process_time()
     job(paths, out)
-    took = time.perf_counter() - began
-    sender.send((took, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0))
+    took, busy = time.perf_counter() - began, time.process_time() - busy
+    sender.send((took, busy, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0))
 
 
 def main() -> None:
@@ -93,7 +99,7 @@ def main() -> None:
     parser.add_argument("--no-peer", action="store_true")
     parser.add_argument("--ray", metavar="ADDRESS", help="a cluster that sees this disk")
     arguments = parser.parse_args()
-    print(f"{'rows':>12} {'route':<18} {'rows/s':>10} {'peak MB':>8}")
+    print(f"{'rows':>12} {'route':<18} {'rows/s':>10} {'rows/CPU s':>10} {'peak MB':>8}")
     for rows in map(int, arguments.rows):
         with tempfile.TemporaryDirectory() as scratch:
             paths = write_table(Path(scratch), rows)
@@ -101,8 +107,11 @@ def main() -> None:
             if arguments.ray:
                 jobs.append(("shiplog on Ray", functools.partial(on_ray, address=arguments.ray)))
             for name, job in jobs:
-                took, peak = measure(job, paths, Path(scratch) / f"out_{name}")
-                print(f"{rows:>12} {name:<18} {rows / took:>10.3g} {peak:>8.0f}", flush=True)
+                took, busy, peak = measure(job, paths, Path(scratch) / f"out_{name}")
+                print(
+                    f"{rows:>12} {name:<18} {rows / took:>10.3g} {rows / busy:>10.3g} {peak:>8.0f}",
+                    flush=True,
+                )
     print(f"goal: at least {GOAL_ROWS_PER_SECOND:.0e} rows/s, under 1 GB from 1e7 to 1e8 rows")
 
 

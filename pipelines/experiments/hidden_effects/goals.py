@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from itertools import chain
 
 from pipelines.experiments.hidden_effects.parameters import ABSORBED, OTHER_FORM, SURVIVE
-from pipelines.experiments.hidden_effects.score import FAILED, Answer, calibration, clopper_pearson
+from pipelines.experiments.hidden_effects.score import (
+    FAILED,
+    Answer,
+    Statement,
+    calibration,
+    clopper_pearson,
+)
 from shiplog.report import tables
 
 Test = Callable[[Answer], bool]
@@ -58,7 +64,7 @@ def alarmed(answer: Answer) -> bool:
 
 
 def outside_found(answer: Answer) -> bool:
-    """Unknown with the right family, or undecided with it first or second."""
+    """Unknown with the right family, or undecided with that as the first or second answer."""
     return answer.word in ("unknown", "undecided") and answer.found
 
 
@@ -83,7 +89,16 @@ class Rate:
         return [self.hit(answer) for answer in answers if self.among(answer)]
 
 
+def _remainder(family: str) -> Test:
+    """Outside the catalogue, of full size, with that family as the truth."""
+    return lambda answer: OUTSIDE(answer) and answer.truths == (f"unknown:{family}",)
+
+
 ONE = among("one", full)
+OUTSIDE = among("outside", full)
+FAMILIES = (  # of what is outside the catalogue
+    "position", "heading", "time", "motion", "controls", "wind", "stochastic", "intermittent",
+)  # fmt: skip
 RATES = (
     Rate("named but wrong, any size", physics, lambda answer: answer.misnamed,
          (None, 0.015), (None, 0.03)),
@@ -98,8 +113,9 @@ RATES = (
     Rate("one cause, size 0.3 to 1, 7000 s", among("one", small), right, (0.90, None)),
     Rate("one cause, size below 0.3, 7000 s", among("one", tiny), right),
     Rate("one cause, size 1, 500 s", among("one", full, 500), right, (0.88, None)),
-    Rate("outside, size 1: unknown or undecided, right remainder", among("outside", full),
+    Rate("outside, size 1: unknown or undecided, right remainder", OUTSIDE,
          outside_found, (0.95, None), (0.80, None)),
+    *(Rate(f"outside, size 1: {family}", _remainder(family), outside_found) for family in FAMILIES),
     Rate("outside, size below 1", among("outside", lambda answer: not full(answer)),
          outside_found),
     Rate("two at once, size 1: both, no third", among("two", full), right, (0.90, None)),
@@ -116,28 +132,31 @@ NETWORK = (
          lambda answer: answer.misnamed, (None, 0.02)),
 )  # fmt: skip
 INTERVALS = "90 % intervals that hold the truth"
+ALL_INTERVALS = "the same, with bank, shallow water and side thrust"
 CALIBRATION = "expected calibration error, 10 bins"
 CERTAIN = f"reported with {STATED} or more: right"
 LIMITS: dict[str, tuple[Limits, Limits]] = {  # what is not a share of cases: home, abroad
     INTERVALS: ((0.85, 0.95), (0.80, 0.95)),
+    ALL_INTERVALS: (FREE, FREE),
     CALIBRATION: ((None, 0.04), (None, 0.06)),
     CERTAIN: ((0.97, None), (0.95, None)),
 }
 
 
-def intervals(answers: Iterable[Answer]) -> list[bool]:
-    """Of causes that were named; those whose form differs in the simulator have no goal."""
+def intervals(answers: Iterable[Answer], every: bool = False) -> list[bool]:
+    """Of causes that were named; those whose form differs in the simulator have no goal, and are
+    there with `every` only."""
     compared = chain.from_iterable(answer.compared.items() for answer in answers)
-    return [hit for name, one in compared if name not in OTHER_FORM for hit in one.covered]
+    return [hit for name, one in compared if every or name not in OTHER_FORM for hit in one.covered]
 
 
-def beliefs(answers: Iterable[Answer]) -> list[tuple[float, bool]]:
-    """Probability of the answer and whether it is right, of those that give one."""
-    return [answer.belief for answer in answers if answer.belief is not None]
+def statements(answers: Iterable[Answer]) -> list[Statement]:
+    """All that is stated with a probability, and whether it is true."""
+    return [*chain.from_iterable(answer.statements for answer in answers)]
 
 
 def certain(answers: Iterable[Answer]) -> list[bool]:
-    return [hit for probability, hit in beliefs(answers) if probability >= STATED]
+    return [true for probability, true in statements(answers) if probability >= STATED]
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -178,8 +197,10 @@ def figures(answers: Sequence[Answer]) -> dict[str, Figure]:
     """Row of the goals' table → what was measured; rows without a case are left out."""
     shares = {rate.what: rate.hits(answers) for rate in RATES}
     shares |= {INTERVALS: intervals(answers), CERTAIN: certain(answers)}
+    if (every := intervals(answers, every=True)) != shares[INTERVALS]:
+        shares[ALL_INTERVALS] = every
     found = {what: (sum(h) / len(h), cell(h)) for what, h in shares.items() if h}
-    if pairs := beliefs(answers):
+    if pairs := statements(answers):
         error = calibration(pairs)
         found[CALIBRATION] = (error, f"{percent(error)} ({len(pairs)})")
     return found

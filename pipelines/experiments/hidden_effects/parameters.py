@@ -4,7 +4,7 @@ contain that. Names and units are the contract's, section 6."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,8 +61,7 @@ class Comparison:
 def compare(name: str, truth: Values, reported: Values) -> Comparison:
     """The error is that of the vector: |reported - true| over |true - none|. What a key says in
     words, such as which unit has lost thrust, is no number and is left out."""
-    unit = _value(truth, "unit", None)  # of several thrusters the one that has lost thrust
-    elsewhere = unit is not None and _value(reported, "actuator", unit) != unit
+    apart = name == "thrust_loss" and elsewhere(name, truth, (reported,))
     truth = {p: v for p, v in truth.items() if p == "channel" or _is_number(v["value"])}
     if not any(parameter in reported for parameter in truth):
         return Comparison(None, ())
@@ -71,13 +70,25 @@ def compare(name: str, truth: Values, reported: Values) -> Comparison:
     none = 1.0 if name in FACTORS else 0.0
     away, size = VECTORS.get(name, _plain)(truth, reported, none)
     intervals = list(_intervals(name, truth, reported))
-    if elsewhere:
+    if apart:
         return Comparison(1.0, (False,) * len(intervals), (math.inf,) * len(intervals))
     return Comparison(
         away / size if size > 0.0 else None,
         tuple(within for within, _ in intervals),
         tuple(standing for _, standing in intervals),
     )
+
+
+def elsewhere(name: str, truth: Values, reported: Sequence[Values]) -> bool:
+    """Whether a cause is named of another thruster, or of other clocks, than it is hidden in. What
+    key or verdict does not say is not held against it."""
+    if name == "thrust_loss":
+        unit = _value(truth, "unit", None)  # of several thrusters the one that has lost thrust
+        return unit is not None and any(_value(one, "actuator", unit) != unit for one in reported)
+    if name == "clock_offset" and _value(truth, "channel", None):
+        found = {channel for one in reported for channel in _channels(one, truth)}
+        return found != set(_channels(truth, truth))
+    return False
 
 
 def _plain(truth: Values, reported: Values, none: float) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""The reliability diagram: how often an answer stated with a probability is right.
+"""The reliability diagram: how often what is stated with a probability is true.
 
 Murphy & Winkler 1977. Drawn as SVG, which a browser and a repository's page show as it is.
 """
@@ -9,16 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pipelines.experiments.hidden_effects.goals import cell
-from pipelines.experiments.hidden_effects.score import BINS, clopper_pearson
+from pipelines.experiments.hidden_effects.score import BINS, Statement, bin_of, clopper_pearson
 from shiplog.report import tables
 
-Belief = tuple[float, bool]  # probability of the answer, and whether it is right
 SIDE, MARGIN, GAP = 240, 50, 40  # px of a panel, around it, and between two
 
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """Answers stated with nearly the same probability."""
+    """Statements of nearly the same probability."""
 
     low: float
     high: float
@@ -30,29 +29,29 @@ class Bin:
         return sum(self.hits) / len(self.hits)
 
 
-def bins(beliefs: Iterable[Belief]) -> list[Bin]:
+def bins(statements: Iterable[Statement]) -> list[Bin]:
     """Ten of equal width, as the expected calibration error has them; empty ones are left out."""
-    within: dict[int, list[Belief]] = {}
-    for probability, right in beliefs:
-        within.setdefault(min(int(probability * BINS), BINS - 1), []).append((probability, right))
+    within: dict[int, list[Statement]] = {}
+    for probability, right in statements:
+        within.setdefault(bin_of(probability), []).append((probability, right))
     return [
         Bin(at / BINS, (at + 1) / BINS, sum(p for p, _ in one) / len(one), tuple(r for _, r in one))
         for at, one in sorted(within.items())
     ]
 
 
-def table(places: Mapping[str, Sequence[Belief]]) -> str:
+def table(places: Mapping[str, Sequence[Statement]]) -> str:
     """The same bins in words."""
     rows = [
         (place, f"{one.low:.1f} to {one.high:.1f}", f"{one.mean:.3f}", cell(one.hits))
-        for place, beliefs in places.items()
-        for one in bins(beliefs)
+        for place, statements in places.items()
+        for one in bins(statements)
     ]
-    return tables.table(("", "reported with", "mean", "right"), rows)
+    return tables.table(("", "reported with", "mean", "true"), rows)
 
 
-def svg(places: Mapping[str, Sequence[Belief]]) -> str:
-    """A panel a place: share right over mean probability, with 90 % intervals and counts."""
+def svg(places: Mapping[str, Sequence[Statement]]) -> str:
+    """A panel a place: share true over mean probability, with 90 % intervals and counts."""
     width = 2 * MARGIN + len(places) * SIDE + (len(places) - 1) * GAP
     height = 2 * MARGIN + SIDE
     parts = [
@@ -60,8 +59,8 @@ def svg(places: Mapping[str, Sequence[Belief]]) -> str:
         f'width="{width}" height="{height}" font-family="sans-serif" font-size="11">',
         f'<rect width="{width}" height="{height}" fill="white"/>',
     ]
-    for number, (place, beliefs) in enumerate(places.items()):
-        parts += _panel(MARGIN + number * (SIDE + GAP), place, bins(beliefs))
+    for number, (place, statements) in enumerate(places.items()):
+        parts += _panel(MARGIN + number * (SIDE + GAP), place, bins(statements))
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -84,10 +83,10 @@ def _panel(left: float, title: str, found: Sequence[Bin]) -> list[str]:
     parts = [
         f'<rect x="{x(0)}" y="{y(1)}" width="{SIDE}" height="{SIDE}" fill="none" stroke="#444"/>',
         line((0, 0), (1, 1), 'stroke="#999" stroke-dasharray="4 3"'),
-        text((x(0.5), above), f"{title}: {sum(len(one.hits) for one in found)} answers"),
+        text((x(0.5), above), f"{title}: {sum(len(one.hits) for one in found)} statements"),
         text((x(0.5), f"{MARGIN + SIDE + 32:.1f}"), "reported probability"),
         f'<g transform="translate({left - 26:.1f} {y(0.25)}) rotate(-90)">'
-        f"{text(('0', '0'), 'share right')}</g>",
+        f"{text(('0', '0'), 'share true')}</g>",
     ]
     for tick in (0.0, 0.5, 1.0):
         parts.append(text((x(tick), below), f"{tick:g}"))

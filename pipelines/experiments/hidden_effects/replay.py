@@ -88,11 +88,13 @@ def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str 
     store, base = first / "store", run.base_of(source, planned)
     reported = []
     if not run.finished(folder):
+        number = run.attempts(folder) + 1
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         done = run.step("diagnose", run.diagnosing(settings, base, store, folder), folder, settings)
         if done["rc"] in run.STOPPED:
             return None
+        done |= {"attempt": number}
         steps = json.loads((first / "steps.json").read_text(encoding="utf-8"))
         made = [one for one in steps if one["step"] in MADE]
         reported.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")

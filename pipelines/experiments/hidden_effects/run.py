@@ -26,7 +26,7 @@ from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import program
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
 from pipelines.experiments.hidden_effects.program import ROOT
-from pipelines.experiments.hidden_effects.score import FAILED
+from pipelines.experiments.hidden_effects.score import FAILED, attempt
 from shiplog import files
 
 log = logging.getLogger(__name__)
@@ -126,6 +126,7 @@ def run_case(
     made   logs of an earlier run of this case, to start from; its key is then not written here
     """
     folder = plans.case_folder(out, planned).resolve()
+    number = attempts(folder) + 1
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     key = plans.key_path(out, planned).resolve()
@@ -151,7 +152,7 @@ def run_case(
         done = step(name, command, folder, settings)
         if done["rc"] in STOPPED:
             return None
-        steps.append(done)
+        steps.append(done | {"attempt": number})
         if done["rc"] not in (DONE, LOST):
             break
         if name == "train" and settings.share:
@@ -169,6 +170,16 @@ def run_case(
             shutil.rmtree(folder / name, ignore_errors=True)
     reported = f"{reported} after {sum(done['wall_s'] for done in steps):.0f} s"
     return f"{reported}; {compared}" if compared else reported
+
+
+def attempts(folder: Path) -> int:
+    """How often this case came to a verdict, or failed, until now: one that failed is run again,
+    and each of its steps has the number of the attempt."""
+    try:
+        steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return 0
+    return attempt(steps)
 
 
 def diagnosing(settings: Settings, base: Path, store: Path, folder: Path) -> list[str]:

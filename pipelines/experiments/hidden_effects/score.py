@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,15 +16,20 @@ from typing import Any
 from scipy.special import betaincinv  # scipy.stats takes a second to load
 
 from pipelines.experiments.hidden_effects import parameters, plan
+from pipelines.experiments.hidden_effects.open_answers import Open, open_answers
 from pipelines.experiments.hidden_effects.parameters import Comparison
 from pipelines.experiments.hidden_effects.plan import Planned
 from shiplog.exceptions import ShiplogError
 
 LEVEL = 0.9  # of the intervals of shares
 FAILED = "failed"  # the verdict that stands for "no verdict came"
-FIRST = 2  # places of a ranking that an undecided verdict asks to be looked at
+FIRST = 2  # answers that an undecided verdict asks to be looked at
+ALIKE = 1e-6  # two probabilities no farther apart are the same
 BINS = 10
 LEAST_GAIN = 0.05  # of the oracle's, for a share of it to mean anything
+
+
+Statement = tuple[float, bool]  # the probability that is given, and whether what it is of is true
 
 
 class Sealed(ShiplogError):
@@ -143,23 +148,39 @@ class Answer:
 
     @property
     def right(self) -> bool:
-        """All of it and nothing else; of what no cause has a name for, its family."""
+        """All of it and nothing else, each at its place; of what no cause has a name for, its
+        family."""
         if self.kind == "outside":
             return self.word == "unknown" and self.family == self.key["structure"]["family"]
-        return set(self.named) == set(self.sought) if self.sought else self.word == "none"
+        if not self.sought:
+            return self.word == "none"
+        return set(self.named) == set(self.sought) and not self.misplaced
+
+    @cached_property
+    def misplaced(self) -> frozenset[str]:
+        """Hidden causes that are named of another thruster, or of another channel's clock."""
+        truth = {_name(cause["name"]): cause["parameters"] for cause in self.key["causes"]}
+        return frozenset(
+            name for name in self.named
+            if name in truth and parameters.elsewhere(name, truth[name], [
+                one.get("parameters") or {} for one in self.reported if _name(one["name"]) == name
+            ])
+        )  # fmt: skip
 
     @property
     def misnamed(self) -> bool:
-        """A cause is named that is not there."""
-        return not set(self.named) <= set(self.hidden)
+        """A cause is named that is not there, or not at its place."""
+        return not set(self.named) <= set(self.hidden) or bool(self.misplaced)
 
     @property
     def groups(self) -> tuple[frozenset[str], ...]:
-        """Of every name, with the names that the verdict cannot tell from it."""
+        """Of every name, with the names that the verdict cannot tell from it; without one that is
+        misplaced."""
         if self.word != "named":
             return ()
         return tuple(
             frozenset(map(_name, (c["name"], *(c.get("indistinguishable_from") or ()))))
+            - self.misplaced
             for c in self.reported
         )
 
@@ -170,21 +191,29 @@ class Answer:
             return (f"unknown:{self.key['structure']['family']}",)
         return self.sought or ("none",)
 
+    @cached_property
+    def open(self) -> tuple[Open, ...]:
+        """The answers that are left open, with their probabilities."""
+        return open_answers(self.verdict)
+
     @property
-    def likely(self) -> tuple[str, ...]:
-        """The first two of the ranking."""
-        names = (one["name"] for one in self.verdict.get("ranking") or ())
-        labels = (n if n.startswith("unknown") else _name(n) for n in names)
-        return tuple(dict.fromkeys(labels))[:FIRST]
+    def likely(self) -> tuple[frozenset[str], ...]:
+        """The first two of the answers left open. Of equally probable ones each has the last of
+        their places: the order in which they stand decides nothing."""
+        return tuple(
+            labels
+            for labels, p in self.open
+            if sum(other >= p - ALIKE for _, other in self.open) <= FIRST
+        )
 
     @property
     def found(self) -> bool:
         """Right; or every truth is in a group of its own that is reported, and no group is left; or
-        `undecided`, with all that is true first or second in the ranking."""
+        `undecided`, and all that is true is the first or second answer."""
         if self.right:
             return True
         if self.word == "undecided":
-            return set(self.truths) <= set(self.likely)
+            return frozenset(self.truths) in self.likely
         return len(self.groups) == len(self.truths) and any(
             all(true in group for true, group in zip(order, self.groups, strict=True))
             for order in itertools.permutations(self.truths)
@@ -192,12 +221,14 @@ class Answer:
 
     def probability(self, label: str) -> float | None:
         """What the verdict gives a cause, `none` or `unknown:family`; None where it gives no
-        probability at all."""
+        probability at all. `unknown` is sure of its own family, whatever else is ranked."""
         reported = [one for one in self.reported if self.word == "named"]
         ranking = self.verdict.get("ranking") or ()
         given = [one for one in (*reported, *ranking) if one.get("probability") is not None]
         if not given:
             return None
+        if self.word == "unknown" and label.startswith("unknown:") and label[8:] != self.family:
+            return 0.0
         if label in self.named:
             reported = [one for one in reported if one.get("probability") is not None]
             if own := [
@@ -223,26 +254,24 @@ class Answer:
             if name in self.named
         }
 
-    @property
-    def belief(self) -> tuple[float, bool] | None:
-        """The probability of the answer given, and whether that is right.
+    @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        """What the verdict states with a probability, and whether it is true.
 
-        Of a named verdict its first cause, of `unknown` its family, which may stand behind causes
-        that are as probable together with it; otherwise the first of the ranking. None where no
-        probability was given.
+        `named` states each of its causes: that it is hidden. `unknown` states its family, `none`
+        that nothing is hidden; any other verdict the first answer that it leaves open, true where
+        all of that is hidden. Of several first answers, equally probable, it states each.
         """
-        if self.word == "unknown" and self.family:
-            probability = self.probability(f"unknown:{self.family}")
-            return None if probability is None else (probability, self.right)
-        first = next(iter(self.reported if self.named else self.verdict.get("ranking") or ()), {})
-        if first.get("probability") is None:
-            return None
-        name = first["name"]
-        if self.kind == "outside" and name == "unknown":
-            right = self.family == self.key["structure"]["family"]
+        if self.word == "named":
+            there = set(self.hidden) - self.misplaced
+            stated = [(self.probability(name), name in there) for name in self.named]
+        elif self.word == "none" or (self.word == "unknown" and self.family):
+            label = "none" if self.word == "none" else f"unknown:{self.family}"
+            stated = [(self.probability(label), self.right)]
         else:
-            right = (name if name.startswith("unknown") else _name(name)) in self.truths
-        return float(first["probability"]), right
+            most = max((p for _, p in self.open), default=0.0)
+            stated = [(p, a <= set(self.truths)) for a, p in self.open if p >= most - ALIKE]
+        return tuple((p, true) for p, true in stated if p is not None)
 
     @property
     def recovered(self) -> float | None:
@@ -256,6 +285,12 @@ class Answer:
     def step(self, name: str) -> dict[str, Any] | None:
         """One that went to its end."""
         return next((s for s in self.steps if s["step"] == name and s["rc"] in (0, 3)), None)
+
+
+def attempt(steps: Sequence[Mapping[str, Any]]) -> int:
+    """Which attempt this is, by the last step of the case itself; 1 where none was counted."""
+    own = [step for step in steps if step["step"] != "rivals"]
+    return int(own[-1].get("attempt", 1)) if own else 0
 
 
 def _name(label: str) -> str:
@@ -319,10 +354,15 @@ def weights(ranking: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
-def calibration(beliefs: Iterable[tuple[float, bool]]) -> float:
-    """Expected calibration error: |mean probability - share right|, a bin weighs what it holds."""
-    bins: list[list[tuple[float, bool]]] = [[] for _ in range(BINS)]
-    for probability, right in beliefs:
-        bins[min(int(probability * BINS), BINS - 1)].append((probability, right))
+def bin_of(probability: float) -> int:
+    """Of ten equal ones; 0.5 less a rounding error is in the same as 0.5."""
+    return min(int(probability * BINS + ALIKE), BINS - 1)
+
+
+def calibration(statements: Iterable[Statement]) -> float:
+    """Expected calibration error: |mean probability - share true|, a bin weighs what it holds."""
+    bins: list[list[Statement]] = [[] for _ in range(BINS)]
+    for probability, right in statements:
+        bins[bin_of(probability)].append((probability, right))
     apart = sum(abs(sum(p - right for p, right in one)) for one in bins)
     return apart / sum(map(len, bins))

@@ -21,19 +21,28 @@ from pipelines.experiments.hidden_effects.goals import (
     Test,
     among,
     asked,
-    beliefs,
     certain,
     full,
     met,
     percent,
     right,
     small,
+    statements,
     tiny,
 )
+from pipelines.experiments.hidden_effects.open_answers import Open
 from pipelines.experiments.hidden_effects.parameters import OTHER_FORM, PRECISE, Comparison
-from pipelines.experiments.hidden_effects.score import Answer, Score, calibration, clopper_pearson
+from pipelines.experiments.hidden_effects.score import (
+    ALIKE,
+    FIRST,
+    Answer,
+    Score,
+    calibration,
+    clopper_pearson,
+)
 from shiplog.report import tables
 
+LENGTHS = 170.0  # as in `other_families.cases`, which needs a simulator to be imported
 Row = tuple[str, str, str, str, str, str]  # what, measured, of, 90 % interval, goal, met
 HEAD = ("", "measured", "of", "90 % interval", "goal", "met")
 RIVALS = {  # as `rivals` calls them → as a table does
@@ -136,7 +145,7 @@ def _tenth(shares: Sequence[float]) -> float:
 
 
 def _calibration(answers: Sequence[Answer], away: bool) -> list[Row]:
-    pairs, limits = beliefs(answers), LIMITS[CALIBRATION][away]
+    pairs, limits = statements(answers), LIMITS[CALIBRATION][away]
     if not pairs:
         return [(CALIBRATION, NOT_MEASURED, "0", "", asked(limits), "")]
     error = calibration(pairs)
@@ -149,33 +158,57 @@ def _calibration(answers: Sequence[Answer], away: bool) -> list[Row]:
 
 
 def times(answers: Sequence[Answer]) -> list[Row]:
-    """Of diagnoses of whole trials that came to an end. CPU time is what one core would take."""
+    """Of diagnoses of whole trials that came to an end. CPU time is what one core would take.
+
+    What is not the same work has rows of its own: trials that are longer, and the first case of a
+    ship, which fits its nominal campaign. The program keeps that fit for the later ones.
+    """
     rows: list[Row] = []
     for model, limit in (("mmg", 10.0), ("feedforward", 60.0)):
-        steps = [
-            a.step("diagnose") for a in answers
-            if a.planned.seconds == 7000 and a.planned.model == model
-        ]  # fmt: skip
-        done = [step for step in steps if step]
-        if not done:
-            continue
-        cpu, wall, peak = ([step[k] for step in done] for k in ("cpu_s", "wall_s", "peak_mb"))
-        middle, count, of = statistics.median(cpu), str(len(done)), f"diagnose 7000 s, {model}: "
-        rows += [
-            (
-                f"{of}CPU time, median (worst)", f"{middle:.1f} s ({max(cpu):.1f} s)", count, "",
-                f"<= {limit:.0f} s", "yes" if middle <= limit else "no",
-            ),
-            (
-                f"{of}wall time, median (worst)",
-                f"{statistics.median(wall):.1f} s ({max(wall):.1f} s)", count, "", "", "",
-            ),
-            (
-                f"{of}peak memory, median (worst)",
-                f"{statistics.median(peak):.0f} MB ({max(peak):.0f} MB)", count, "", "", "",
-            ),
-        ]  # fmt: skip
+        mine = [a for a in answers if a.planned.seconds == 7000 and a.planned.model == model]
+        groups: dict[tuple[bool, bool], list[Answer]] = {}
+        for answer in mine:
+            if answer.step("diagnose"):
+                long = trial_seconds(answer) > answer.planned.seconds
+                groups.setdefault((long, not answer.step("train")), []).append(answer)
+        for (long, later), given in sorted(groups.items()):
+            longest = max(map(trial_seconds, given))
+            length = f"of more, to {longest:.0f} s" if long else "7000 s"
+            case = "later case of a ship" if later else "first case of a ship"
+            rows += _times(f"diagnose {length}, {model}, {case}", given, None if long else limit)
     return rows
+
+
+def _times(what: str, answers: Sequence[Answer], limit: float | None) -> list[Row]:
+    steps = [step for answer in answers if (step := answer.step("diagnose"))]
+    cpu, wall, peak = ([step[k] for step in steps] for k in ("cpu_s", "wall_s", "peak_mb"))
+    middle, count = statistics.median(cpu), str(len(steps))
+    goal = "" if limit is None else f"<= {limit:.0f} s"
+    reached = "" if limit is None else "yes" if middle <= limit else "no"
+    return [
+        (
+            f"{what}: CPU time, median (worst)", f"{middle:.1f} s ({max(cpu):.1f} s)", count, "",
+            goal, reached,
+        ),
+        (
+            f"{what}: wall time, median (worst)",
+            f"{statistics.median(wall):.1f} s ({max(wall):.1f} s)", count, "", "", "",
+        ),
+        (
+            f"{what}: peak memory, median (worst)",
+            f"{statistics.median(peak):.0f} MB ({max(peak):.0f} MB)", count, "", "", "",
+        ),
+    ]  # fmt: skip
+
+
+def trial_seconds(answer: Answer) -> float:
+    """How long a trial of 7000 s is: a large ship's takes 170 times its L/U
+    (`other_families.cases.LENGTHS`), where that is more."""
+    ship = answer.key.get("ship") or {}
+    if not answer.abroad or "length" not in ship:
+        return float(answer.planned.seconds)
+    unit = ship["length"]["value"] / ship["speed"]["value"]
+    return max(float(answer.planned.seconds), LENGTHS * unit)
 
 
 # --- simpler methods ------------------------------------------------------------------------------
@@ -281,10 +314,21 @@ def reported(answer: Answer) -> str:
     if alike:
         words.append(f"or {', '.join(alike)}")
     if answer.word == "undecided":
-        words.append(" or ".join(answer.likely))
+        words.append(" or ".join(_together(labels) for labels in _first(answer.open)))
     if traces := [one["name"] for one in answer.verdict.get("traces") or ()]:
         words.append(f"[trace: {', '.join(traces)}]")
     return " ".join(word for word in words if word)
+
+
+def _first(answers: Sequence[Open]) -> list[frozenset[str]]:
+    """The first two answers, and what is as probable as the second."""
+    return [
+        labels for labels, p in answers if sum(other > p + ALIKE for _, other in answers) < FIRST
+    ]
+
+
+def _together(labels: frozenset[str]) -> str:
+    return " + ".join(sorted(labels))
 
 
 def _margin(answer: Answer) -> str:

@@ -100,7 +100,7 @@ def group_utility(one: Answer) -> float:
     """m_utl of a verdict: the weighted mean over the diagnoses that it leaves open.
 
     A named verdict leaves one of {name + indistinguishable_from} for each of its names, all equally
-    likely; `undecided` leaves its ranking, as likely as that says; `none`, `coverage` and
+    likely; `undecided` leaves its answers, as likely as it says; `none`, `coverage` and
     `external` say that no component is at fault; a case without a verdict has no utility.
     """
     if one.word == FAILED:
@@ -117,9 +117,9 @@ def candidates(one: Answer) -> dict[frozenset[str], float]:
         return {frozenset({OUTSIDE}): 1.0}
     if one.word == "undecided":
         found: dict[frozenset[str], float] = {}
-        for entry in one.verdict.get("ranking") or ():
-            reported = _component(entry["name"])
-            found[reported] = found.get(reported, 0.0) + float(entry.get("probability") or 0.0)
+        for labels, probability in one.open:
+            reported = frozenset().union(*map(_component, labels))
+            found[reported] = found.get(reported, 0.0) + probability
         return found if sum(found.values()) > 0.0 else {frozenset(): 1.0}
     return {frozenset(reported): 1.0 for reported in itertools.product(*one.groups)}
 

@@ -20,10 +20,11 @@ from pipelines.experiments.hidden_effects import (
     score_tables,
     scores,
 )
-from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Score
+from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Score, attempt
 from shiplog.exceptions import ShiplogError
 from shiplog.report import tables
 
+SHIPMMG = "shipmmg"  # a type of ship of another package, and an MMG too
 PLACES = (goals.SAME, goals.OTHER)
 SUITES = {"goals": goals.SAME, "abroad": goals.OTHER}  # which ships a suite is of
 
@@ -60,7 +61,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         goals.OTHER: [answer for answer in answers if answer.abroad],
     }
     there = {place: by_place[place] for place in PLACES if by_place[place]}
-    beliefs = {place: goals.beliefs(given) for place, given in there.items()}
+    stated = {place: goals.statements(given) for place, given in there.items()}
     standing = {place: ranks.standings(given) for place, given in there.items()}
     picture = picture_of(path).name if path else ""
     parts = [
@@ -72,17 +73,18 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         "## Goals, this program",
         INTERVAL,
         goals.table(by_place[goals.SAME], by_place[goals.OTHER]),
+        *(["### Each type of ship", types(by_place[goals.OTHER])] if by_place[goals.OTHER] else []),
         *(part for place, given in there.items() for part in _methods(place, given)),
         "## Reliability",
-        *([f"![Share right over the reported probability]({picture})"] if picture else []),
-        reliability.table(beliefs),
+        *([f"![Share true over the reported probability]({picture})"] if picture else []),
+        reliability.table(stated),
         "## Parameters: intervals and ranks",
         PARAMETERS,
         ranks.coverage_table(standing),
         ranks.rank_table(standing),
         *(part for place, given in there.items() for part in _cost(place, given)),
     ]  # fmt: skip
-    return Page("\n\n".join(parts), reliability.svg(beliefs))
+    return Page("\n\n".join(parts), reliability.svg(stated))
 
 
 COMMAND = """\
@@ -97,10 +99,18 @@ stored with its hash before the hidden answer was read. The [glossary](glossary.
 terms of a verdict.
 
 *Same family of equations*: a ship of MMG form, as the model is. The simulator shares no code with
-shiplog, its propeller and rudder formulas differ, and all coefficients have to be identified.
+shiplog but the writer of the logs, and all coefficients have to be identified. Its hull, wind, wake
+and inflow to the rudders have formulas of their own, of the same published families. Two forms are
+the model's: thrust is a parabola of the advance ratio, and the force of a rudder over its angle is
+a balance of momentum in both.
+
 *Other families of equations*: a merchant ship with Abkowitz's polynomials (`abkowitz`), a supply
 vessel with linear damping (`linear_dp`), a catamaran with two fixed thrusters (`catamaran`), a
 ferry with azimuth thrusters (`azimuth_ferry`), and the KVLCC2 of the package shipmmg (`shipmmg`).
+Of these, `shipmmg` is an MMG too: its equations of motion, propeller and rudder are those of the
+model, written by another author; its hull polynomials and its wake are not. It has no wind, no bank
+and no shallow water. A [table](#each-type-of-ship) has the figures of each type, and those without
+`shipmmg`.
 
 Cases that were run:"""
 LEGEND = """\
@@ -114,45 +124,64 @@ Words of the tables:
 - **Named but wrong**: the verdict names a cause that is not hidden in the case. Its *alternatives*
   are the causes that the verdict lists after "or it is".
 - **An alarm** is any verdict other than `none`.
-- **Probability** is the one that the verdict gives to its answer: the first cause named, the
-  remainder of `unknown`, or the first answer of its ranking. `undecided` often has two with 0.5.
-  It is 0.00 where that remainder is not in the ranking: by [rule 10](diagnosis.md#rules) a wrong
-  sign, or a model worse than constant velocities, is answered `unknown`, whatever the ranking is.
+- **Undecided** leaves answers open, which its sentence lists; causes that it joins are one answer.
+  *Among the first two*: all that is hidden, and nothing else, is one of the two most probable
+  answers. Equally probable answers share the last of their places.
+- **A statement** is what a verdict gives a probability to. `named` makes one for each cause: that
+  it is hidden. `unknown` makes one, its remainder; `none` one, that nothing is hidden; any other
+  verdict one, that all of its most probable answer is hidden, or one for each of several equally
+  probable ones. Calibration error, *reported with 0.9 or more* and the reliability diagram are over
+  statements. A statement can be true in a case whose verdict is not right.
+- **Probability** in the lists of what went wrong is that of the first statement. It is 0.00 where
+  the remainder is not in the ranking: by [rule 10](diagnosis.md#rules) a wrong sign, or a model
+  worse than constant velocities, is answered `unknown`, whatever the ranking is.
 - **Outside the catalogue**, with the right remainder: `tether`, a line to a fixed point (position);
   `tow`, a force in one direction that grows during the trial (time); `propeller_side_force`, a
   share of the thrust acts athwart (controls); `rudder_limit`, the rudders turn no farther than a
   limit (controls); `cross_coupling`, a unit also follows a share of another one's command
-  (controls); `turbulence`, process noise 4 to 9 times as large (stochastic).
+  (controls); `turbulence`, process noise 4 to 9 times as large (stochastic). Each of these four
+  remainders has a row of the goals' table. The other four (heading, motion, wind, intermittent) are
+  answers of the program, and nothing that is hidden here has them.
 - **Always none** always answers `none`. **Random answer** draws `none` or a cause of the catalogue,
   all equally likely.
 - **Isolation** (FIA) is the mean probability that a method gives to the truth, in the cases in
-  which something is hidden and that it answers with an alarm.
+  which something is hidden and that it answers with an alarm. Of remainders, `unknown` gives a
+  probability to its own alone.
 - **Repair utility** (m_utl, Feldman et al. 2010) is 1 less the share of all components that a
   repair tests in vain if it follows the answer. Each cause is a component; what is outside the
   catalogue is one more.
 - **Log score** is the mean logarithm of the probability that is given to the truth; 0 is perfect.
-- **Expected calibration error** is the mean difference between reported probability and share
-  right.
+- **Expected calibration error** is the mean difference between the probability of statements and
+  the share of them that are true.
 - Cases with the same number before the hyphen have the same ship, weather and noise: intervals
   over them are too narrow."""
 RIVALS = {
     "regression": "- **Regression + BIC** regresses the accelerations on each cause's term and "
-    "chooses by Schwarz's criterion.",
+    "chooses by Schwarz's criterion. It names one cause or none: two at once and what is outside "
+    "the catalogue are beyond it.",
     "glr": "- **Likelihood ratio** compares rollouts with and without each cause, the errors taken "
-    "as white noise.",
+    "as white noise. It, too, names one cause or none.",
 }
 # The machine is that of docs/validation-answers.tar.xz: the answers do not record it.
-COST = (
-    "Processor time, elapsed time and memory of `shiplog diagnose`, a case, on one core of an AMD "
-    "EPYC\n(Zen 4); two cases ran at a time."
-)
+COST = """\
+Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an AMD EPYC (Zen 4), each
+case on one core. Two cases ran at a time on two cores that also had other work: elapsed time is
+longer than on a free machine. The first case of a ship includes the fit of its nominal campaign,
+which is kept for the later ones; what is hidden differs, too."""
+AGAIN_UNKNOWN = """\
+- a case that fails is run again when the command is repeated; these answers do not record how often
+  that happened"""
 INTERVAL = (
     "Shares with counts and, in brackets, their Clopper-Pearson interval in %, "
-    f"at {100 * LEVEL:.0f} %.\nA goal is what is asked of the program."
+    f"at {100 * LEVEL:.0f} %.\nA goal is what is asked of the program. "
+    "*Met* compares the share itself, and the intervals\nare wide: most rows have too few cases to "
+    "say on which side of its goal the program is."
 )
 PARAMETERS = """\
 Intervals of causes that are hidden and named, taken as Gaussians on each side of the value; those
-of one case are not independent. The first table has the share of them that contain the truth;
+of one case are not independent. Bank, shallow water and side thrust are left out: the simulators
+have other forms of them, so that numbers of one name are not the same quantity. A row of the goals'
+table counts their intervals as well. The first table has the share of them that contain the truth;
 levels other than 90 % are implied. A rank is the quantile of the truth in its interval
 (simulation-based calibration, Talts et al. 2018)."""
 
@@ -206,11 +235,20 @@ def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
     trained = program.names((s for a in answers for s in a.steps), ("train",))
     if trained and trained != (of,):
         lines.append("- models identified by another version than that which diagnosed")
+    lines.append(_attempts(answers))
     if of == program.UNRECORDED:
         lines.append("- which version of the program it was is not recorded")
     elif of.endswith("+changes"):
         lines.append("- the program held changes that no version has")
     return "\n".join(lines)
+
+
+def _attempts(answers: Sequence[Answer]) -> str:
+    """How often a case was run again since it had failed."""
+    if not all(any("attempt" in step for step in answer.steps) for answer in answers):
+        return AGAIN_UNKNOWN
+    again = sum(attempt(answer.steps) > 1 for answer in answers)
+    return f"- a case that fails is run again: {again} of these were"
 
 
 def _methods(place: str, given: Sequence[Answer]) -> list[str]:
@@ -230,6 +268,20 @@ def _cost(place: str, given: Sequence[Answer]) -> list[str]:
     if not rows:
         return []
     return [f"## Cost: {place} of equations", COST, tables.table(score_tables.HEAD, rows)]
+
+
+def types(answers: Sequence[Answer]) -> str:
+    """A line a type of ship, and one of all but those of the package shipmmg."""
+    by = {family: [a for a in answers if a.planned.family == family]
+          for family in sorted({a.planned.family for a in answers})}  # fmt: skip
+    if (others := [a for a in answers if a.planned.family != SHIPMMG]) != answers and others:
+        by[f"all but {SHIPMMG}"] = others
+    rows = [
+        (family, goals.cell([a.right for a in given]), goals.cell([a.misnamed for a in given]),
+         len(given))
+        for family, given in by.items()
+    ]  # fmt: skip
+    return tables.table(("type of ship", "right", "named but wrong", "cases"), rows)
 
 
 # --- misses ---------------------------------------------------------------------------------------
@@ -276,4 +328,4 @@ def how(answer: Answer) -> str:
 
 
 def _probability(answer: Answer) -> str:
-    return "" if answer.belief is None else f"{answer.belief[0]:.2f}"
+    return f"{answer.statements[0][0]:.2f}" if answer.statements else ""

@@ -28,6 +28,11 @@ class DataSet:
     train: tuple[str, ...] = ()
     trial: tuple[str, ...] = ()
 
+    @property
+    def in_sample(self) -> bool:
+        """The voyages in question hold those that a baseline is fitted to."""
+        return "*" in self.trial
+
 
 HEADING = """[sensors.heading]
 topic = "/gyro"

@@ -8,6 +8,9 @@
     instruments profiles      the log and the ship.toml that belongs to it
     cases      nominal and trial campaign, and the key
 
+`shipmmg_kvlcc2` is an MMG, as the model is, of another package: its motion, propeller and rudder
+are the model's.
+
 Two families of forms must not win because one pen wrote both: laws, exponents and noise times here
 are taken from other sources than those of `shiplog.models.causes`, and a test compares them.
 """

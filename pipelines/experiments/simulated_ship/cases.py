@@ -2,7 +2,8 @@
 
 All of a case follows from its seed. What is hidden is drawn apart from ship, laws, weather, helm
 and noise: the same seed with another cause is the same campaign with it. Only the key, which lies
-elsewhere, says which. The laws are the seed's own, and share no form with the catalogue of causes.
+elsewhere, says which. The laws of water, air and shore are the seed's own: their numbers are
+drawn, and some of their forms too. A bank may fade by a power of its distance, as the catalogue's.
 """
 
 from __future__ import annotations

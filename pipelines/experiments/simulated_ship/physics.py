@@ -3,7 +3,9 @@
 Axes as in MMG: x₀ north, y₀ east, heading ψ clockwise; body x ahead, y to starboard, origin at
 midship. Forces are those of Yasukawa & Yoshimura (2015) in their division into hull, propeller,
 rudder and wind; each part's own source stands at the part. Forms and numbers are chosen apart
-from `shiplog.models`: a fit must not win because both sides were written with one pen. Exponents
+from `shiplog.models`: a fit must not win because both sides were written with one pen. Two forms
+are those of `shiplog.models.mmg` all the same: thrust as a parabola of the advance ratio, and the
+force of a rudder over its angle, which both take from the momentum of the slipstream. Exponents
 and shares that a blind case draws come from `laws`.
 
 Compiled by numba in about 2 s a process. Not cached: its cache would not notice that a field of
