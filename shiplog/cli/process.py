@@ -51,7 +51,7 @@ def _open_missing() -> None:
     and no file that it opens takes their place."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            nowhere = open(os.devnull, mode)  # noqa: SIM115  stays open, as it is
+            nowhere = open(os.devnull, mode)  # noqa: SIM115  stays open: it stands in for a stream
             os.set_inheritable(nowhere.fileno(), True)
             setattr(sys, name, nowhere)
 

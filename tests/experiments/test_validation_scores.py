@@ -19,6 +19,7 @@ from pipelines.experiments.hidden_effects import (
 )
 from pipelines.experiments.hidden_effects.plan import Planned
 from pipelines.experiments.hidden_effects.score import Answer, clopper_pearson
+from pipelines.experiments.other_families import cases as other_cases
 from pipelines.experiments.simulated_ship.cases import CATALOGUE
 
 COMMIT = {"step": "diagnose", "rc": 0, "commit": "a" * 40, "dirty": False,
@@ -384,3 +385,7 @@ def test_two_programs_are_not_put_into_one_table():
         )
     ]
     assert "is not recorded" in validation.page(scored(*old)).text
+
+
+def test_a_large_ships_trial_is_as_long_as_its_simulator_makes_it():
+    assert score_tables.LENGTHS == other_cases.LENGTHS

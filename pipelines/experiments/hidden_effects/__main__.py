@@ -24,7 +24,7 @@ python -m pipelines.experiments.hidden_effects score DIR
 python -m pipelines.experiments.hidden_effects scores DIR [DIR ...] [--markdown docs/validation.md]
     the validation page: misses first, then the scores of all methods, home and abroad apart
 python -m pipelines.experiments.hidden_effects compare FORMER PRESENT [--markdown PATH]
-    two programs on the cases that both answered; each a folder of tests or a packed file
+    two programs on the cases that both answered; each the folder of one test, or a packed file
 python -m pipelines.experiments.hidden_effects pack DIR [DIR ...] --into FILE.tar.xz
     their answers and keys in one file, which `scores` takes as well as folders; unpacked with
     `tar -xf`, a test goes on where it was

@@ -96,7 +96,7 @@ def _remainder(family: str) -> Test:
 
 ONE = among("one", full)
 OUTSIDE = among("outside", full)
-FAMILIES = (  # of what is outside the catalogue
+REMAINDERS = (  # of what is outside the catalogue
     "position", "heading", "time", "motion", "controls", "wind", "stochastic", "intermittent",
 )  # fmt: skip
 RATES = (
@@ -115,7 +115,7 @@ RATES = (
     Rate("one cause, size 1, 500 s", among("one", full, 500), right, (0.88, None)),
     Rate("outside, size 1: unknown or undecided, right remainder", OUTSIDE,
          outside_found, (0.95, None), (0.80, None)),
-    *(Rate(f"outside, size 1: {family}", _remainder(family), outside_found) for family in FAMILIES),
+    *(Rate(f"outside, size 1: {name}", _remainder(name), outside_found) for name in REMAINDERS),
     Rate("outside, size below 1", among("outside", lambda answer: not full(answer)),
          outside_found),
     Rate("two at once, size 1: both, no third", among("two", full), right, (0.90, None)),

@@ -43,13 +43,13 @@ def open_answers(verdict: Mapping[str, Any]) -> tuple[Open, ...]:
     no sentence says any, the labels of the ranking, each an answer. Raises ValueError where the
     sentence has an answer that is not of the catalogue."""
     likely = marginals(verdict)
-    said = _said(str(verdict.get("sentence") or ""))
-    if said is None:
+    stated = _stated(str(verdict.get("sentence") or ""))
+    if stated is None:
         return tuple((frozenset({label}), p) for label, p in likely.items())
-    return tuple((labels, min(likely.get(label, 0.0) for label in labels)) for labels in said)
+    return tuple((labels, min(likely.get(label, 0.0) for label in labels)) for labels in stated)
 
 
-def _said(sentence: str) -> list[frozenset[str]] | None:
+def _stated(sentence: str) -> list[frozenset[str]] | None:
     found = WHOLE.match(sentence)
     if found is None:
         return None

@@ -10,8 +10,6 @@ from __future__ import annotations
 import json
 import logging
 import shutil
-from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
 
 from pipelines.experiments.hidden_effects import plan as plans
@@ -55,24 +53,30 @@ def replay(
     log.info("%d of %d cases are asked again", len(cases), len(before.cases))
     plan = plans.save(out, Plan(before.suite, before.first_seed, cases))
 
-    def again(planned: Planned) -> str | None:
-        one = _whole_case if whole else _case
-        return one(source, out, planned, settings)
+    if whole:
+        _from_the_logs(source, out, plan, settings)
+        return plan
 
-    todo = [one for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
-    # those that share a model come one after another
-    groups = [list(of) for _, of in groupby(todo, attrgetter("seed" if whole else "label"))]
-    run.in_turn(groups, again, settings.jobs)
+    def again(planned: Planned) -> str | None:
+        return _case(source, out, planned, settings)
+
+    todo = [[one] for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
+    run.in_turn(todo, again, settings.jobs)
     return plan
 
 
-def _whole_case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
-    """As `_case`, from the logs of the first run on."""
-    logs = plans.case_folder(source, planned).resolve() / "logs"
-    reported = run.run_case(out, planned, settings, logs)
-    if reported is not None:
-        shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
-    return reported
+def _from_the_logs(source: Path, out: Path, plan: Plan, settings: Settings) -> None:
+    """Each case the whole way, but that its logs are those of the first run."""
+
+    def logs(planned: Planned) -> Path:
+        return plans.case_folder(source, planned).resolve() / "logs"
+
+    try:
+        run.run(out, plan, settings, logs)
+    finally:  # those that are done have a key, whatever ended the others
+        for one in plan.cases:
+            if (plans.case_folder(out, one) / "verdict.sha256").exists():
+                shutil.copyfile(plans.key_path(source, one), plans.key_path(out, one))
 
 
 def _left(out: Path, planned: Planned, settings: Settings) -> bool:

@@ -62,9 +62,12 @@ class Settings:
     truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.hidden_effects.oracle")
 
 
-def run(out: Path, plan: Plan, settings: Settings) -> None:
+def run(
+    out: Path, plan: Plan, settings: Settings, made: Callable[[Planned], Path] | None = None
+) -> None:
     """Every case of the plan that has no sealed verdict yet; one that failed is tried again. Where
-    rivals are wanted, finished cases whose store and base were kept are asked, too."""
+    rivals are wanted, finished cases whose store and base were kept are asked, too. `made` as
+    `run_case` has it, of each case."""
     ships: dict[int, list[Planned]] = {}
     for planned in plan.cases:
         if not finished(plans.case_folder(out, planned)) or _to_ask(out, planned, settings):
@@ -74,7 +77,7 @@ def run(out: Path, plan: Plan, settings: Settings) -> None:
     def case(planned: Planned) -> str | None:
         folder = plans.case_folder(out, planned)
         if not finished(folder):
-            return run_case(out, planned, settings)
+            return run_case(out, planned, settings, made(planned) if made else None)
         folder = folder.resolve()
         return ask_rivals(folder, base_of(out, planned), folder / "store", settings)
 

@@ -12,7 +12,7 @@ from math import comb
 
 from pipelines.experiments.hidden_effects import goals, score_tables
 from pipelines.experiments.hidden_effects.score import Answer, Score
-from pipelines.experiments.hidden_effects.validation import PLACES, one_program
+from pipelines.experiments.hidden_effects.validation import PLACES, heading, one_program
 from shiplog.exceptions import ShiplogError
 from shiplog.report import tables
 
@@ -86,7 +86,7 @@ def _of_place(place: str, pairs: Sequence[Pair]) -> list[str]:
     }
     different = [pair for pair in pairs if pair.differ]
     return [
-        f"## {place.capitalize()} of equations: {_cases(pairs)}",
+        f"## {heading(place)}: {_cases(pairs)}",
         goals.by_method(by, place == goals.OTHER),
         split_table(pairs),
         f"### Where the answers differ: {_cases(different)}",

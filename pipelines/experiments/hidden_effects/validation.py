@@ -69,7 +69,7 @@ def page(found: Sequence[Score], path: Path | None = None) -> Page:
         _head(found, answers, of),
         _legend(answers),
         "## What went wrong",
-        *(part for place, given in there.items() for part in (f"### {_of(place)}", misses(given))),
+        *(part for place, one in there.items() for part in (f"### {heading(place)}", misses(one))),
         "## Goals, this program",
         INTERVAL,
         goals.table(by_place[goals.SAME], by_place[goals.OTHER]),
@@ -186,7 +186,7 @@ levels other than 90 % are implied. A rank is the quantile of the truth in its i
 (simulation-based calibration, Talts et al. 2018)."""
 
 
-def _of(place: str) -> str:
+def heading(place: str) -> str:
     """As a heading: "Same family of equations". Suites that have no such name keep their own."""
     return f"{place.capitalize()} of equations" if place in PLACES else place
 
@@ -227,7 +227,7 @@ def _head(found: Sequence[Score], answers: Sequence[Answer], of: str) -> str:
     ]
     for score in sorted(found, key=lambda one: SUITES.get(one.suite) != goals.SAME):
         done = len(score.answers)
-        place = _of(SUITES.get(score.suite, score.suite))
+        place = heading(SUITES.get(score.suite, score.suite))
         line = f"- {place}: {done} of {done + len(score.pending) + len(score.unmade)} cases"
         line += f"; {len(score.pending)} not run" if score.pending else ""
         line += f"; {len(score.unmade)} whose logs could not be written" if score.unmade else ""
