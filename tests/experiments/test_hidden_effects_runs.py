@@ -19,6 +19,7 @@ from pipelines.experiments.hidden_effects import (
     methods,
     plan,
     program,
+    remake,
     replay,
     run,
     score,
@@ -318,6 +319,44 @@ def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path
     assert (out / "cases" / "5" / "verdict.json").read_bytes() == (
         tmp_path / "elsewhere" / "out" / "cases" / "5" / "verdict.json"
     ).read_bytes()
+
+
+def test_unpacked_answers_become_a_test_that_can_be_asked_again(tmp_path, stubs):
+    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
+    archive.pack([out], packed)
+    with tarfile.open(packed) as content:
+        content.extractall(tmp_path / "elsewhere", filter="data")
+    there = tmp_path / "elsewhere" / "out"
+    answer = (there / "cases" / "5" / "verdict.json").read_bytes()
+    planned = remake.remake(there, stubs())
+    assert {"logs", "store", "base"} <= names_in(there) and run.kept(there, planned.cases[1])
+    assert (there / "cases" / "5" / "verdict.json").read_bytes() == answer
+    run.run(there, planned, stubs(rivals=True))
+    assert all(one.rivals for one in score.read(there).answers)
+    (there / "cases" / "5" / "store" / "mark").write_text("")
+    remake.remake(there, stubs())  # it is there already
+    assert (there / "cases" / "5" / "store" / "mark").exists()
+
+
+@pytest.mark.parametrize(
+    ("what", "reported"), [("key", "hides something else"), ("ingest", "ingest ended with 1")]
+)
+def test_a_case_that_is_not_the_same_again_is_not_kept(tmp_path, stubs, what, reported):
+    out = tmp_path / "out"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs())
+    if what == "key":
+        key = out / "keys" / "5.json"
+        key.write_text(key.read_text().replace("none", "named"))
+        settings = stubs()
+    else:
+        broken = tmp_path / "broken.py"
+        broken.write_text("import sys\nsys.exit(1)")
+        settings = replace(stubs(), shiplog=(sys.executable, str(broken)))
+    with pytest.raises(ShiplogError, match=reported):
+        remake.remake(out, settings)
+    assert not names_in(out) & set(run.LARGE)
+    assert "verdict.json" in names_in(out)
 
 
 def test_what_cannot_be_packed_or_unpacked_is_reported(tmp_path, capsys):

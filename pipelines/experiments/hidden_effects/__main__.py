@@ -15,6 +15,8 @@ python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [-
     ships whose equations are not the home ship's, from pipelines.experiments.other_families
     each with --rivals: what simpler methods say of the same trials, too; of cases that were run
     with --keep before, give the command again
+python -m pipelines.experiments.hidden_effects remake DIR [--share]
+    logs, stores and models of cases whose answers alone are here, such as those that were unpacked
 python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals] [--every N]
     [--first N] [--shiplog COMMAND] [--whole [--share]]
     the kept cases of DIR diagnosed again by the program as it is now, into another folder; with
@@ -46,6 +48,7 @@ from pathlib import Path
 from pipelines.experiments.hidden_effects import (
     archive,
     plan,
+    remake,
     replay,
     run,
     score,
@@ -129,6 +132,9 @@ def _run(given: argparse.Namespace) -> None:
         given.out = given.out or replay.folder_of(given.source)
         replay.replay(given.source, given.out, settings, given.every, given.first, given.whole)
         return
+    if given.what == "remake":
+        remake.remake(given.out, settings)
+        return
     planned = suites.plan(given.what, given.first_seed, given.count)
     run.run(given.out, plan.save(given.out, planned), settings)
 
@@ -152,6 +158,10 @@ def _parser() -> argparse.ArgumentParser:
             suite.add_argument(
                 "--count", type=plan.positive, default=count, help="cases, or a row's"
             )
+    made = commands.add_parser("remake", help="logs, stores and models of unpacked cases")
+    made.add_argument("out", type=Path, metavar="DIR")
+    _processes(made)
+    made.set_defaults(keep=True, rivals=False, oracle=False)
     again = commands.add_parser("replay", help="kept cases, diagnosed again")
     again.add_argument("source", type=Path, metavar="DIR", help="with cases run with --keep")
     again.add_argument("--out", type=Path, help="another folder; next to DIR unless given")
@@ -184,10 +194,15 @@ def _parser() -> argparse.ArgumentParser:
 
 def _how(command: argparse.ArgumentParser) -> None:
     """What a suite and a replay have in common."""
-    command.add_argument("--jobs", type=plan.positive, default=1, help="ships at a time")
-    command.add_argument("--share", action="store_true", help="train once a ship, not once a case")
+    _processes(command)
     command.add_argument("--keep", action="store_true", help="keep logs, store, base, report")
     command.add_argument("--rivals", action="store_true", help="ask simpler methods, too")
+
+
+def _processes(command: argparse.ArgumentParser) -> None:
+    """What all that run the steps of a case have in common."""
+    command.add_argument("--jobs", type=plan.positive, default=1, help="ships at a time")
+    command.add_argument("--share", action="store_true", help="train once a ship, not once a case")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
     command.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
 

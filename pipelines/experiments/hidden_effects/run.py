@@ -62,6 +62,16 @@ class Settings:
     truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.hidden_effects.oracle")
 
 
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What a diagnosis stands on, and the key to it."""
+
+    logs: Path
+    store: Path
+    base: Path
+    key: Path
+
+
 def run(
     out: Path, plan: Plan, settings: Settings, made: Callable[[Planned], Path] | None = None
 ) -> None:
@@ -134,23 +144,13 @@ def run_case(
     folder.mkdir(parents=True)
     key = plans.key_path(out, planned).resolve()
     logs, store = made or folder / "logs", folder / "store"
-    base = out.resolve() / "bases" / str(planned.seed) if settings.share else folder / "base"
-    simulator = settings.abroad if planned.family else settings.case
-    profile = str(logs / "ship.toml") if planned.family else "esso-vectwin"
-    commands: dict[str, list[str]] = {
-        "logs": [*simulator, str(planned.seed), str(logs), "--key", str(key), *planned.options],
-        "ingest": [
-            *settings.shiplog, "ingest", str(logs), "--profile", profile, "--store", str(store),
-        ],
-        "train": [
-            *settings.shiplog, "train", *_training(planned.model),
-            "--store", str(store), "--out", str(base),
-        ],
-        "diagnose": diagnosing(settings, base, store, folder),
-    }  # fmt: skip
+    base = base_to_make(out, planned, settings)
+    commands = making(planned, settings, Made(logs, store, base, key)) | {
+        "diagnose": diagnosing(settings, base, store, folder)
+    }
     steps: list[dict[str, Any]] = []
     for name, command in commands.items():
-        if (name == "logs" and made) or (name == "train" and not _to_train(base, logs)):
+        if (name == "logs" and made) or (name == "train" and not to_train(base, logs)):
             continue
         done = step(name, command, folder, settings)
         if done["rc"] in STOPPED:
@@ -159,7 +159,7 @@ def run_case(
         if done["rc"] not in (DONE, LOST):
             break
         if name == "train" and settings.share:
-            _mark(base, logs)
+            mark(base, logs)
     reported = seal(folder, steps)
     compared = None
     if steps[-1]["step"] == "diagnose" and settings.rivals:  # where it failed they may not
@@ -173,6 +173,21 @@ def run_case(
             shutil.rmtree(folder / name, ignore_errors=True)
     reported = f"{reported} after {sum(done['wall_s'] for done in steps):.0f} s"
     return f"{reported}; {compared}" if compared else reported
+
+
+def making(planned: Planned, settings: Settings, made: Made) -> dict[str, list[str]]:
+    """The commands that a diagnosis stands on."""
+    simulator = settings.abroad if planned.family else settings.case
+    profile = str(made.logs / "ship.toml") if planned.family else "esso-vectwin"
+    logs, store = str(made.logs), str(made.store)
+    return {
+        "logs": [*simulator, str(planned.seed), logs, "--key", str(made.key), *planned.options],
+        "ingest": [*settings.shiplog, "ingest", logs, "--profile", profile, "--store", store],
+        "train": [
+            *settings.shiplog, "train", *_training(planned.model),
+            "--store", store, "--out", str(made.base),
+        ],
+    }  # fmt: skip
 
 
 def attempts(folder: Path) -> int:
@@ -232,6 +247,13 @@ def _ask_oracle(folder: Path, base: Path, key: Path, settings: Settings) -> None
     if done["rc"] != DONE:
         log.info("no oracle: %s", done["stderr"])
         answer.unlink(missing_ok=True)
+
+
+def base_to_make(out: Path, planned: Planned, settings: Settings) -> Path:
+    """One for each case, or one for each ship."""
+    if settings.share:
+        return out.resolve() / "bases" / str(planned.seed)
+    return plans.case_folder(out, planned).resolve() / "base"
 
 
 def base_of(out: Path, planned: Planned) -> Path:
@@ -297,7 +319,7 @@ def _process(
     }
 
 
-def _to_train(base: Path, logs: Path) -> bool:
+def to_train(base: Path, logs: Path) -> bool:
     """Unless there is a whole base of exactly these nominal logs; a part of one is removed."""
     marked = _object(_trained_on(base), "nominal_1.mcap")
     if marked is not None and marked == _nominal(logs):
@@ -307,7 +329,8 @@ def _to_train(base: Path, logs: Path) -> bool:
     return True
 
 
-def _mark(base: Path, logs: Path) -> None:
+def mark(base: Path, logs: Path) -> None:
+    """Which nominal logs a shared base was identified from."""
     _trained_on(base).write_text(json.dumps(_nominal(logs), indent=1), encoding="utf-8")
 
 
