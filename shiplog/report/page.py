@@ -8,7 +8,8 @@ from shiplog.report.verdict_sentence import less
 
 
 def markdown(verdict: Verdict) -> str:
-    """Markdown: the causes with numbers and gain, what was rejected and why, where errors are."""
+    """Markdown: the causes with numbers and gain, what was rejected or could not be tested and why,
+    where errors are."""
     lines = ["# Diagnosis", "", f"**{verdict.sentence}**", ""]
     lines += [f"Model: {verdict.run}, {verdict.made}.", ""]
     for cause in verdict.causes:
@@ -18,7 +19,11 @@ def markdown(verdict: Verdict) -> str:
         lines += ["## Ranking", "", "| answer | probability |", "| --- | ---: |"]
         lines += [f"| {r['name']} | {r['probability']:.3f} |" for r in verdict.ranking]
         lines.append("")
-    for title, rows in (("Rejected", verdict.rejected), ("Traces", verdict.traces)):
+    for title, rows in (
+        ("Rejected", verdict.rejected),
+        ("Not testable", verdict.unavailable),
+        ("Traces", verdict.traces),
+    ):
         if rows:
             lines += [f"## {title}", ""]
             lines += [f"- {r['name']}: {r.get('reason') or r.get('sentence')}" for r in rows]

@@ -1,4 +1,4 @@
-"""What a verdict says of too little data, and of causes of one unit or channel."""
+"""What a verdict says of too little data, of untested causes, and of one unit or channel."""
 
 from types import SimpleNamespace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shiplog.report import answer, page
+from shiplog.report.verdict import Verdict
 
 
 @pytest.mark.parametrize(
@@ -30,3 +31,11 @@ def test_each_unit_and_channel_has_a_row_of_its_own():
     assert [row.split("|")[1].strip() for row in rows[6:9]] == [
         "thrust_loss (port)", "clock_offset (wind)", "fouling",
     ]  # fmt: skip
+
+
+def test_the_report_says_what_was_not_tested_and_why():
+    """A cause that no sensor shows is not one that these data exclude."""
+    unavailable = ({"name": "bank", "reason": "the profile's [site] shows no bank"},)
+    text = page.markdown(Verdict("none", "No change.", "run", True, unavailable=unavailable))
+    assert "## Not testable\n\n- bank: the profile's [site] shows no bank\n" in text
+    assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True))
