@@ -147,10 +147,11 @@ def none_named(lost: str) -> str:
 
 
 def without_nominal(run: Run, store: Path) -> str:
-    """A note where the store has no voyage that the run was trained on."""
+    """A note where the store has no voyage that the run was trained on, or too little of them."""
     return (
-        f"The training voyages of {run.name} are not in {store}. Without a nominal campaign, "
-        "causes that a new fit would absorb are not tested."
+        f"{store} has none of the training voyages of {run.name}, or too little of them for a "
+        "nominal campaign. Without one, causes that a new fit would absorb are not tested. Ingest "
+        "these voyages, or record more of them and identify the model again."
     )
 
 
