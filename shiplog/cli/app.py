@@ -71,7 +71,7 @@ def _every(
             "--version",
             callback=_version,
             is_eager=True,
-            help="Versions and engine.",
+            help="Versions, and what trains networks.",
         ),
     ] = False,
 ) -> None:

@@ -20,11 +20,16 @@ def compare(
     save: Annotated[
         Path | None, typer.Option(help="Write the recording here and open nothing.")
     ] = None,
-    web: Annotated[bool, typer.Option("--web", help="Serve it on 127.0.0.1.")] = False,
+    web: Annotated[
+        bool,
+        typer.Option("--web", help="Show it in a browser, at 127.0.0.1, instead of the viewer."),
+    ] = False,
     cause: Causes = None,
     json_to: JsonOption = None,
 ) -> None:
     """Measured against simulated in Rerun.
+
+    It opens the viewer, unless --save or --web is given.
 
     Example: shiplog compare runs/ref runs/d-ref --save compare.rrd
     """

@@ -13,7 +13,9 @@ from shiplog.exceptions import ShiplogError
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Where store, run and recording go.")] = Path("demo"),
+    out: Annotated[
+        Path, typer.Option(help="Where store, runs, recordings and diagnosis go.")
+    ] = Path("demo"),
     view: Annotated[bool, typer.Option("--view/--no-view", help="Open the viewer.")] = True,
     logs: Annotated[
         Path | None, typer.Option(help="Sample logs; those of the clone unless given.")

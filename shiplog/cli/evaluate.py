@@ -21,7 +21,7 @@ def evaluate(
 ) -> None:
     """How far off a model is on measured voyages.
 
-    L, RMSE per channel, errors at the end of a window, and coverage; compared with two baselines.
+    L, RMSE per channel, errors at the end of a window, and coverage, next to two baselines.
 
     Example: shiplog evaluate runs/ref --voyages voyage_6
     """

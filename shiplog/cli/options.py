@@ -25,11 +25,21 @@ def _ask_json(json_to: str | None) -> str | None:
 Logs = Annotated[list[Path], typer.Argument(help="MCAP logs, or folders of them.")]
 StoreOption = Annotated[Path, typer.Option("--store", help="Folder of ingested voyages.")]
 ProfileOption = Annotated[
-    str | None, typer.Option("--profile", help="A shipped profile's name, or a TOML's path.")
+    str | None,
+    typer.Option(
+        "--profile",
+        help="A shipped profile's name, or a TOML's path; unless given, the shipped one that the "
+        "log's topics fit.",
+    ),
 ]
 JsonOption = Annotated[
     str | None,
-    typer.Option("--json", metavar="PATH|-", help="Write the answer as JSON.", callback=_ask_json),
+    typer.Option(
+        "--json",
+        metavar="PATH|-",
+        help="Write the answer as JSON into this file; - is stdout.",
+        callback=_ask_json,
+    ),
 ]
 CHOSEN = "Names or shell patterns, several times; unless given,"
 Voyages = Annotated[list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all.")]
@@ -60,6 +70,7 @@ Device = Annotated[
     str, typer.Option(help="cpu, or cuda: the paper's recipe on an NVIDIA GPU, all seeds at once.")
 ]
 Validation = Annotated[
-    list[str] | None, typer.Option(help="Voyages to validate on; can be given several times.")
+    list[str] | None,
+    typer.Option(help="Voyages to validate on: names or shell patterns, several times."),
 ]
 STORE = Path("store")

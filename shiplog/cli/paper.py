@@ -33,7 +33,9 @@ def paper(
     voyages: TrainingVoyages = None,
     validation: Validation = None,
     seeds: Seeds = 10,
-    recipe: Annotated[str, typer.Option(help="fast, or paper: the published one, days.")] = "fast",
+    recipe: Annotated[
+        str, typer.Option(help="fast, or paper: the published one, which takes days.")
+    ] = "fast",
     window: Window = 100,
     width: Width = 256,
     epochs: Epochs = None,

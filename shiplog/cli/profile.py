@@ -23,6 +23,8 @@ def profile(
 ) -> None:
     """Draft a ship profile from a log's topics, or a table's columns.
 
+    Look over every line of it that says CHECK.
+
     Example: shiplog profile unknown.mcap --out my-ship.toml
     """
     from shiplog import files

@@ -23,11 +23,12 @@ from shiplog.cli.options import (
 from shiplog.cli.output import answer
 from shiplog.exceptions import UsageError, listed
 from shiplog.models import FORCES, MODELS
+from shiplog.voyages.augmentation import AUGMENTATIONS
 
 Out = Annotated[Path, typer.Option(help="The run folder to make.")]
 Model = Annotated[str, typer.Option(help=f"Which dynamic model: {', '.join(MODELS)}.")]
-Data = Annotated[str, typer.Option(help="The paper's window set: ref, sli2, ..., d-ref.")]
-Recipe = Annotated[str, typer.Option(help="fast, or paper: the published one, hours.")]
+Data = Annotated[str, typer.Option(help=f"The paper's window set: {', '.join(AUGMENTATIONS)}.")]
+Recipe = Annotated[str, typer.Option(help="fast, or paper: the published one, which takes hours.")]
 WindInput = Annotated[
     str | None,
     typer.Option(help="angle (default of the paper's recipe) or components (of the fast one)."),

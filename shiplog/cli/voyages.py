@@ -15,14 +15,17 @@ from shiplog.exceptions import ShiplogError
 def voyages(
     store: StoreOption = STORE,
     sensors: Annotated[
-        bool, typer.Option("--sensors", help="What the sensors say of each other, all voyages.")
+        bool,
+        typer.Option(
+            "--sensors", help="Compare the sensors with each other, over all voyages together."
+        ),
     ] = False,
     voyages: Voyages = None,
     json_to: JsonOption = None,
 ) -> None:
     """What is in the store.
 
-    With --sensors, what several voyages together say of the instruments.
+    With --sensors, faults of the instruments that several voyages together show.
 
     Example: shiplog voyages --store store --voyages 'zigzag_*'
 
