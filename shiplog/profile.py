@@ -209,8 +209,8 @@ class Actuator(Source):
     )
     limits: tuple[Number, Number] | None = Field(
         default=None, description="[least, most], in `unit`; values beyond them are marked. `mmg` "
-        "and `hybrid` need them of a thruster that is commanded in rev/s or rpm. A rudder whose "
-        "limits exceed 45 deg starts in both as a fish-tail blade (Schilling, VecTwin)"
+        "and `hybrid` need them of a thruster that is commanded in rpm, rev/s, deg or rad. A "
+        "rudder whose limits exceed 45 deg starts in both as a fish-tail blade (Schilling, VecTwin)"
     )  # fmt: skip
     position_m: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="[ahead, starboard] of midship, m"

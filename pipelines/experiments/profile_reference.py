@@ -23,8 +23,8 @@ HEAD = """# The ship profile
 
 A profile is a TOML file. It says which topic and field of a log is which channel of the ship, in
 which unit, and where it is measured. `shiplog profile LOG` drafts one from a log or a table; look
-over every line that says CHECK. A key that is not listed here is refused, with the nearest one that
-is.
+over every line that says CHECK. A key that is not listed here is refused, and the message names the
+nearest one that is.
 
     [ship]
     name = "my ship"
@@ -94,7 +94,7 @@ ACTUATORS = {  # kind → what its value is, in which units, and what `mmg` and 
     ),
     "thruster": (
         "command of a fixed thruster, or of an azimuth's: -1 to 1, positive ahead or along "
-        "`direction_deg`", "1, %, pwm; rpm, rev/s with `limits`",
+        "`direction_deg`", "1, %, pwm; rpm, rev/s, deg, rad with `limits`",
         "full thrust is at the larger of its limits, else at 1",
     ),
 }  # fmt: skip
@@ -137,11 +137,15 @@ def text() -> str:
             "neutral pulse, and\n400 µs more or less is full command, 1 or -1.\n",
             _units(),
             "\nA unit that measures something else than its channel is refused. An actuator may be "
-            "given as its\nvalue, or as what commands it:\n",
+            "given as its\nvalue, or as the share or servo pulse that commands it:\n",
             _driven(),
-            "\n## Shipped profiles\n",
-            ", ".join(f"`{name}`" for name in profile_file.shipped())
-            + ": in `shiplog/profiles/`, to start from.",
+            "\n`mmg` and `hybrid` compute with angles and revolutions. They take a command of 1 of "
+            "a rudder or azimuth\nas 1 rad, and of a propeller as 1 rev/s. Give another size of "
+            "full command as a factor in `sign`: 0.61 for a\nrudder that stands at 35 deg (0.61 "
+            "rad) then, 12.5 for a shaft that turns at 12.5 rev/s.\n",
+            "## Shipped profiles\n",
+            "These are in `shiplog/profiles/`, to start from:\n",
+            *(f"- `{name}`" for name in profile_file.shipped()),
             "",
         )
     )
@@ -200,7 +204,9 @@ def _actuators() -> str:
         (f"`{_toml(kind)}`", *ACTUATORS[kind])
         for kind in typing.get_args(profile.Actuator.model_fields["kind"].annotation)
     ]
-    return tables.table(("kind", "what its value is", "units", "in `mmg` and `hybrid`"), rows)
+    return tables.table(
+        ("kind", "what its value is", "units of this value", "in `mmg` and `hybrid`"), rows
+    )
 
 
 def _channels() -> str:
