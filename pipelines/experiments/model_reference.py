@@ -81,13 +81,13 @@ lists when it is on.
 ## Causes that resemble each other
 
 A report proposes the test that separates a named cause from another one that these data cannot
-exclude.
+exclude. If the verdict is undecided, look here for the test that separates its candidates.
 """
 
 COEFFICIENTS_HEAD = """# The coefficients of the physics
 
-The keys of `<profile>.mmg.toml` (or `--parameters FILE`), of `seed0/parameters.toml` in a run, and
-the names that `--free` takes: `--free 'wind.*'` identifies the wind's coefficients alone.
+These are the keys of `<profile>.mmg.toml` (or `--parameters FILE`), and of `seed0/parameters.toml`
+in a run. `--free` takes the same names: `--free 'wind.*'` identifies the wind's coefficients alone.
 [physics.md](physics.md) describes the forces.
 
     source = "model tests of 2024"
@@ -104,11 +104,12 @@ A file has a section for each force that the ship has. A force that it lacks is 
 is missing is named; one outside its range is refused. Where a neutral value is given, a file may
 leave the key out. Without a file, all coefficients are estimated from the particulars.
 
-Hull forces are non-dimensional by ½ρL_pp d U² (moments by ½ρL_pp² d U²), added masses by ½ρL_pp² d,
-inertia by ½ρL_pp⁴ d about the centre of gravity, and wind forces by the areas above water. The
-*plausible spread* is the share of a coefficient's own value by which it may differ from a published
-one, or the least amount if that is more; for estimated coefficients it is twice as large.
-Identification penalises differences from the starting value by it, and stays inside the range."""
+Hull forces are made non-dimensional by ½ρL_pp d U², and moments by ½ρL_pp² d U², with the draught
+d. Added masses are made so by ½ρL_pp² d, inertia by ½ρL_pp⁴ d about the centre of gravity, and wind
+forces by the areas above water. The *spread* below is the standard deviation by which a coefficient
+may plausibly differ from a published value. It is a share of that value, or the least amount if
+that is more. For estimated coefficients it is twice as large. Identification penalises differences
+from the starting value in units of the spread, and stays inside the range."""
 
 
 def catalogue() -> str:
