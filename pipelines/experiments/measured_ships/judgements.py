@@ -12,11 +12,12 @@ JUDGEMENTS: dict[str, str] = {
     ),
     "esso-osaka, published": (
         "Believable in part. The answer on the position's clock is right: the sensors alone give "
-        "0.95 s between position and velocity. The random tests alone say, too, that the wind "
-        "force athwart is half of that published, as it is with a wind that is measured 1.49 times "
-        "too strong. That it is the anemometer and not the force, and the wind's clock, are "
-        "unconfirmed. So is the antenna: position and velocity agree with each other wherever it "
-        "is, and coefficients of another pond may look the same. Half of the error is unexplained."
+        "0.95 s between position and velocity. By themselves, the random tests also give a wind "
+        "force athwart of half the published one; a wind that is measured 1.49 times too strong "
+        "has the same effect. It is not confirmed that the anemometer is wrong and not the force, "
+        "nor that the wind's clock is late. The antenna is not confirmed either: position and "
+        "velocity agree with each other wherever it is, and coefficients of another pond may look "
+        "the same. Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "

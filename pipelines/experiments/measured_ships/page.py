@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 from pipelines.experiments.measured_ships.judgements import JUDGEMENTS
@@ -10,6 +11,7 @@ from pipelines.experiments.measured_ships.way import Way
 from shiplog.report import tables
 from shiplog.voyages.one_hertz import WINDOW
 
+WIDTH = 100  # letters of a line
 HEAD = """# Measured ships, from their files to a verdict
 
     python -m pipelines.experiments.measured_ships DATA --out measured \\
@@ -42,8 +44,8 @@ def text(ways: Sequence[Way]) -> str:
         "",
     ]
     for one in ways:
-        lines += [f"## {DATA_SETS[one.name].ship}\n", f"> {_answer(one)}\n"]
-        lines += [f"{JUDGEMENTS[one.name]}\n"] if one.name in JUDGEMENTS else []
+        lines += [f"## {DATA_SETS[one.name].ship}\n", f"{_answer(one)}\n"]
+        lines += [f"{_filled(JUDGEMENTS[one.name])}\n"] if one.name in JUDGEMENTS else []
     return "\n".join(lines)
 
 
@@ -77,7 +79,15 @@ def _number(value: float | None) -> str:
 
 
 def _answer(one: Way) -> str:
-    """As a quotation has it: a message and its hint are a paragraph each."""
+    """A quotation: a message and its hint are a paragraph each."""
     verdict = one.answers.get("diagnose")
     given = verdict["sentence"] if verdict and not one.stopped else one.stopped
-    return "\n>\n> ".join(given.splitlines())
+    return "\n>\n".join(_filled(paragraph, "> ") for paragraph in given.splitlines())
+
+
+def _filled(paragraph: str, before: str = "") -> str:
+    """In lines of a page's width, each with `before` in front."""
+    return textwrap.fill(
+        paragraph, WIDTH, initial_indent=before, subsequent_indent=before, break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
