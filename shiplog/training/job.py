@@ -71,7 +71,8 @@ class Training:
         if not math.isfinite(progress.best):
             raise RunError(
                 f"Every rollout of seed {self.seed} diverged: no weights have a finite loss.",
-                hint="look at the voyages' velocities and actuators with `shiplog voyages`.",
+                hint="check the units and signs of velocities and actuators in the profile; "
+                "`shiplog voyages --sensors` compares the sensors with each other.",
             )
 
     def refuse_not_finite(self) -> None:

@@ -115,7 +115,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} usable heading sample(s) on "
             f"{profile.sensors.heading.topic}.",
-            hint="check the topic and the `clock` in the profile; `shiplog check` lists topics.",
+            hint="check topic, field and `clock` of the heading in the profile; `shiplog profile "
+            "LOG` drafts one from the topics of the log.",
         )
     driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
     every = {**sampled, **driven}
@@ -318,7 +319,8 @@ def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> 
         raise LogUnreadable(
             f"{reading.contents.path.name} holds no usable position on "
             f"{profile.sensors.position.topic}.",
-            hint="check the fields in the profile; `shiplog check` lists the topics.",
+            hint="check topic and fields of the position in the profile; `shiplog profile LOG` "
+            "drafts one from the topics of the log.",
         )
     away = np.abs(position.value - np.median(position.value, axis=0)).max(axis=1)
     first = int(np.argmax(away < NEAR_DEG))  # 0 where none is near

@@ -98,7 +98,8 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     if not groups:
         raise StoreError(
             f"No voyage has a window of {size} s without a gap.",
-            hint=proposed(rows, size) or "see `shiplog check` for why.",
+            hint=proposed(rows, size)
+            or "ingest the logs again: `shiplog ingest` reports what makes rows unusable.",
         )
     sides: dict[str, list[str]] = {"training": [], "validation": [], "test": []}
     taken = dict.fromkeys(sides, 0)

@@ -123,7 +123,10 @@ def cut(
 def _too_long(seconds: pl.DataFrame, size: int) -> tuple[str, str]:
     lengths = seconds.group_by("voyage", "segment").len().sort("len", descending=True)
     if lengths.height == 0:
-        return "No usable second is left in these voyages.", "see `shiplog check` for why."
+        return (
+            "No usable second is left in these voyages.",
+            "ingest their logs again: `shiplog ingest` reports what makes rows unusable.",
+        )
     voyage, _, longest = lengths.row(0)
     shorter = f"choose --window {max(longest // 2, channels.LEAST_WINDOW)} or shorter, or "
     return (
