@@ -81,7 +81,7 @@ lists when it is on.
 ## Causes that resemble each other
 
 A report proposes the test that separates a named cause from another one that these data cannot
-exclude. If the verdict is undecided, look here for the test that separates its candidates.
+exclude. The notes of an undecided verdict propose it for each two of its candidates.
 """
 
 COEFFICIENTS_HEAD = """# The coefficients of the physics

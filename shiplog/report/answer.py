@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 
 from shiplog.diagnosis import error_location, next_manoeuvre, segments, thresholds
@@ -13,6 +14,7 @@ from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
+from shiplog.models.causes import Cause
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.report.verdict_sentence import less, sentence
@@ -27,6 +29,7 @@ FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
 INPUTS = ("wind", "motion", "controls", "stochastic")
 OPEN = ("unknown", "undecided")  # what may be such an error
+LEAST_CANDIDATE = 0.1  # probability of an answer that is worth a test of its own
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,8 @@ def verdict(
             ranking, context.wrong, decision.one_of, decision.either, decision.why,
         )  # fmt: skip
     setting, catalogue = trial.reference.setting, trial.reference.model.causes
+    if word == "undecided":
+        notes += tests_of_open(decision.ranking, catalogue)
     return Verdict(
         verdict=word,
         sentence=text,
@@ -153,6 +158,25 @@ def without_nominal(run: Run, store: Path) -> str:
         "nominal campaign. Without one, causes that a new fit would absorb are not tested. Ingest "
         "these voyages, or record more of them and identify the model again."
     )
+
+
+def tests_of_open(ranking: Mapping[str, float], causes: Sequence[Cause]) -> list[str]:
+    """Notes on an undecided verdict: the test of each two candidates that the catalogue knows how
+    to separate.
+
+    ranking   label → probability
+    """
+    by = {c.label: c for c in causes}
+    candidates = [
+        by[label] for label, p in ranking.items()
+        if label in by and LEAST_CANDIDATE <= p < thresholds.STATED
+    ]  # fmt: skip
+    tests = {}
+    for one, other in combinations(candidates, 2):
+        test = one.separated_by.get(other.name) or other.separated_by.get(one.name)
+        if test:
+            tests[f"A test that separates {one.name} from {other.name}: {test}."] = None
+    return list(tests)
 
 
 def of_given(run: Run) -> str:

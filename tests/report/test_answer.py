@@ -5,6 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shiplog.models.causes.environment import Current
+from shiplog.models.causes.sensors import HeadingOffset
+from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
 from shiplog.report import answer, page
 from shiplog.report.verdict import Verdict
 
@@ -39,3 +42,17 @@ def test_the_report_says_what_was_not_tested_and_why():
     text = page.markdown(Verdict("none", "No change.", "run", True, unavailable=unavailable))
     assert "## Not testable\n\n- bank: the profile's [site] shows no bank\n" in text
     assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True))
+
+
+def test_an_undecided_verdict_says_which_test_separates_its_candidates():
+    """A lag and a delay of the rudders are alternatives; what is certain, or improbable, is none."""
+    causes = [cls() for cls in (RudderLag, RudderDelay, Current, Fouling, HeadingOffset)]
+    ranking = {
+        "rudder_lag": 0.63, "rudder_delay": 0.35, "current": 0.99, "heading_offset": 0.02,
+        "fouling": 0.3, "unknown:controls": 0.5,
+    }  # fmt: skip
+    assert answer.tests_of_open(ranking, causes) == [
+        "A test that separates rudder_lag from rudder_delay: rudder doublets of 2 to 4 s at "
+        "constant revolutions."
+    ]
+    assert not answer.tests_of_open({"rudder_lag": 0.95, "rudder_delay": 0.2}, causes)
