@@ -60,6 +60,22 @@ def test_a_blade_is_as_wide_whichever_way_its_sensor_counts():
     assert blades(limits=None) == [False, False]
 
 
+def test_a_command_without_a_unit_is_reported_with_what_it_is_taken_as():
+    """Half of a servo's travel, 400 µs, is a command of 1."""
+    ship = profiles.load("esso-osaka")
+    units = {"rudder": "%", "propeller": "pwm"}
+    raw = tuple(
+        a.model_copy(update={"unit": units[a.kind]}) if a.kind in units else a
+        for a in ship.actuators
+    )
+    notes = geometry_of(ship.model_copy(update={"actuators": raw}))[2]
+    assert [n for n in notes if "rudder" in n and "100 % is taken as 1 rad" in n]
+    assert [n for n in notes if "propeller" in n and "400 pwm is taken as 1 rev/s" in n]
+    assert not [n for n in geometry_of(ship)[2] if "is taken as" in n]
+    without = geometry_of(ship.model_copy(update={"actuators": raw}), ("rudder",))[2]
+    assert ["rudder" in n for n in without if "is taken as" in n] == [False]
+
+
 @pytest.mark.parametrize(
     ("key", "actuator", "part"),
     [

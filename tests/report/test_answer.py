@@ -45,7 +45,7 @@ def test_the_report_says_what_was_not_tested_and_why():
 
 
 def test_an_undecided_verdict_says_which_test_separates_its_candidates():
-    """A lag and a delay of the rudders are alternatives; what is certain, or improbable, is none."""
+    """A lag and a delay are alternatives; what is certain, or improbable, is none."""
     causes = [cls() for cls in (RudderLag, RudderDelay, Current, Fouling, HeadingOffset)]
     ranking = {
         "rudder_lag": 0.63, "rudder_delay": 0.35, "current": 0.99, "heading_offset": 0.02,

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from shiplog import units
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.models import FORCES
 from shiplog.models.mmg.estimate import Particulars, particulars, rudder_size
@@ -16,6 +17,8 @@ AIR = 1.225  # kg/m³
 WIDE_ANGLE = math.radians(45.0)
 UNITS = ("propellers", "rudders", "thrusters")
 PARTS = ("hull", *FORCES)  # all forces that a ship may have
+# What a command of 1 without a unit is taken as, and the unit to record it in instead.
+OF_ONE = {"rudder": ("1 rad", "deg"), "propeller": ("1 rev/s", "rpm")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +158,7 @@ def _units(
     profile: Profile, main: Particulars, off: set[str]
 ) -> tuple[tuple[Propeller, ...], tuple[Rudder, ...], tuple[Thruster, ...], tuple[str, ...]]:
     """What drives and steers, without the kinds that are `off`, and a sentence for each rudder
-    whose size had to be estimated."""
+    whose size had to be estimated and for each command without a unit."""
     column = {actuator.name: i for i, actuator in enumerate(profile.actuators)}
     propellers = tuple(
         Propeller(
@@ -185,8 +188,12 @@ def _units(
         for a in profile.actuators
         if a.kind == "thruster" and "thruster" not in off
     )
-    notes = tuple(sentence for *_, sentence in sizes if sentence)
-    return propellers, rudders, thrusters, notes
+    notes = [sentence for *_, sentence in sizes if sentence]
+    notes += [
+        _without_unit(a) for a in profile.actuators
+        if a.kind in OF_ONE and a.kind not in off and a.si_unit == "1"
+    ]  # fmt: skip
+    return propellers, rudders, thrusters, tuple(notes)
 
 
 def _needed(actuator: Actuator, key: str, part: str) -> float:
@@ -198,6 +205,16 @@ def _needed(actuator: Actuator, key: str, part: str) -> float:
             hint=f"add {key} to that actuator, or leave the force out with --without {part}.",
         )
     return value
+
+
+def _without_unit(actuator: Actuator) -> str:
+    """What its physics make of a command that is a share."""
+    unit, (one, other) = actuator.unit or "1", OF_ONE[actuator.kind]
+    full = f"{1.0 / units.factor(unit):g}" + ("" if unit == "1" else f" {unit}")
+    return (
+        f"The command of the {actuator.kind} {actuator.name!r} has no unit of its own: {full} is "
+        f"taken as {one}. If that is wrong, record it in {other}."
+    )
 
 
 def _slipstream(rudder: Actuator, propellers: tuple[Propeller, ...]) -> int | None:
