@@ -15,7 +15,9 @@ from pipelines import gpu as on_gpu
 from pipelines.paper import _halved, choose_voyages
 from shiplog.exceptions import RunError, StoreError
 from shiplog.report.paper import figures, sets
+from shiplog.report.paper.style import COLOURS
 from shiplog.training import gpu, network_files
+from shiplog.voyages.augmentation import AUGMENTATIONS
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.store import Store
 
@@ -244,3 +246,9 @@ def test_wind_bins_are_the_papers():
     assert sets.wind(rows).rows() == [
         ("ref", 1.0, 340.0, 2, 0.25), ("ref", 1.25, 0.0, 1, 0.25),
     ]  # fmt: skip
+
+
+def test_every_window_set_has_a_colour_of_its_own():
+    """A set without one would end the experiment in its figures, after all trainings."""
+    assert set(AUGMENTATIONS) <= set(COLOURS)
+    assert len({COLOURS[name] for name in AUGMENTATIONS}) == len(AUGMENTATIONS)
