@@ -231,3 +231,12 @@ def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kin
             np.abs(found[0, 0] / products.total(point, 1.5, trial.weight, remainder)[0][0, 0] - 1)
             > 0.01
         )
+
+
+def test_stretches_of_one_segment_have_nothing_between_their_segments(made):
+    """Four voyages of 30 s and one row: the pass is that of their own segments."""
+    nominal, _, _ = made
+    record = straight.sailed(4, voyages=4, seed=5)
+    given = straight.passed(record, nominal.reference.columns)
+    trial = straight.trial(nominal, record, given)
+    assert trial.covering(trial.first) is trial.first.linear
