@@ -35,7 +35,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, converged={}, first=None), asked
+    return SimpleNamespace(at=at, converged={}, first=None, fixed=()), asked
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -72,3 +72,31 @@ def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
     _, found = converge(trial, ("x",), {"x": np.array([3.0])}, None)
     assert abs(found.numbers["x"][0]) < relinearisation.LEFT * NOISE
     assert asked[:3] == pytest.approx([3.0, 1.0, 1.0 / 3.0])
+
+
+def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
+    """Where the model diverges with them alone there is no fit; where it diverges with another
+    cause too, that one is halved until it holds: 4, 2, 1."""
+    trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
+    trial.fixed = ("held",)
+    seen, plain = [], trial.at
+
+    def at(numbers, *more):
+        seen.append(float(numbers["held"][0]))
+        if numbers.get("x", np.full(1, 9.0))[0] > 1.0:
+            raise np.linalg.LinAlgError
+        return plain(numbers, *more)
+
+    def fit(_trial, point, *_):
+        numbers = {"held": point.numbers["held"], "x": np.zeros(1)}
+        return Found("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
+
+    trial.at = at
+    monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    held = {"held": np.array([3.0])}
+    trial.first = SimpleNamespace()
+    _, alone = converge(trial, ("held",), held, None)
+    assert alone.evidence == -np.inf and alone.numbers["held"] == [3.0]
+    _, both = converge(trial, ("held", "x"), {**held, "x": np.array([4.0])}, None)
+    assert both.evidence == 0.0
+    assert asked == [1.0] and set(seen) == {3.0}
