@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -73,6 +74,11 @@ class Fit:
     def included(self) -> tuple[str, ...]:
         """Labels of the causes that it holds, those of the model with them."""
         return tuple(self.found.numbers)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the fit found numbers: one that diverged has no evidence."""
+        return math.isfinite(self.found.evidence)
 
     @property
     def noise_factor(self) -> float:
