@@ -234,7 +234,8 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
 
 
 def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
-    """Standard deviation of the logarithm of the process noise over the parts."""
+    """Root mean square, over the parts, of the logarithm of the process noise over its estimate for
+    the whole campaign."""
     found = []
     for part in rows:
         own = picked(modes, part)

@@ -232,7 +232,8 @@ def _free(
 
 
 def _deviation(covariance: np.ndarray) -> np.ndarray:
-    """[Q] standard deviations; of a covariance that is none, as of numbers that are known."""
+    """[Q] standard deviations. Rounding may leave a variance of nearly known numbers below zero:
+    these count as known."""
     return np.sqrt(np.maximum(np.diagonal(covariance), 1e-30))
 
 

@@ -90,12 +90,13 @@ class Fit:
 class Level:
     """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
 
-    The base hypothesis holds the named causes, free, and all nominal numbers.
+    The base hypothesis holds N numbers: all nominal ones, then those of the included causes, then
+    the weights of its remainder's family.
     """
 
     noise_factor: float
-    gram: np.ndarray  # [1 + C, 1 + C]
-    inverse: np.ndarray  # of information and data together, base's own numbers last
-    solution: np.ndarray
+    gram: np.ndarray  # [1 + N, 1 + N] products of [e | J]
+    inverse: np.ndarray  # [N, N] of information and data together
+    solution: np.ndarray  # [N]
     value: float  # log evidence of the base
     share: float = 0.0  # of it, what the bounds of numbers add

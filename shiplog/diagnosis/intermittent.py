@@ -99,7 +99,8 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
 
     A force that merely varies is between its extremes for much of the time: a Gaussian one is 1.13
     times as long between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever
-    between.
+    between, and is on for less than COMES_AND_GOES of the time.
+
     `deviation` [S, J] is the standard deviation of the estimate.
     """
     size = np.abs(force)

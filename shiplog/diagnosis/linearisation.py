@@ -268,8 +268,8 @@ def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) 
 
 
 def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
-    """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
-    up: one compilation serves all."""
+    """SEGMENTS_AT_A_TIME of so many segments after the other, and how each chunk's values are
+    picked and filled up: one compilation serves all."""
     for at in range(0, count, SEGMENTS_AT_A_TIME):
         part = slice(at, min(at + SEGMENTS_AT_A_TIME, count))
 
