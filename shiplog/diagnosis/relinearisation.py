@@ -53,8 +53,10 @@ class _Iterate:
         return little or self.step * rate / (1.0 - rate) < LEFT
 
     def at_point(self) -> Found:
-        """The fit with the point's own numbers, without the gain that the step promises."""
-        return replace(self.base, numbers=self.point.numbers,
+        """The fit with the point's own numbers, in the order of its covariance, without the gain
+        that the step promises."""
+        stood = {name: self.point.numbers[name] for name in self.base.numbers}
+        return replace(self.base, numbers=stood,
                        evidence=self.base.evidence - 0.5 * self.step**2)  # fmt: skip
 
 

@@ -66,6 +66,28 @@ def test_a_fit_without_end_has_the_evidence_of_the_best_numbers_that_it_met(monk
     assert found.evidence == pytest.approx(-0.5 * best ** (2.0 / 3.0) / NOISE**2 - np.log(by))
 
 
+def test_numbers_of_a_fit_without_end_are_in_the_order_of_their_covariance(monkeypatch):
+    """A set begins with the cause that was added last, and its covariance is in alphabetical
+    order: a tenth of the spread of b is not that of a."""
+    trial, _ = fits(monkeypatch, np.cbrt, lambda x: np.abs(x) ** (-2.0 / 3.0) / 3.0)
+
+    def at(numbers, *_):
+        if numbers["b"][0] != 1.0:
+            raise np.linalg.LinAlgError
+        return SimpleNamespace(numbers=numbers, path=None, linear=SimpleNamespace(e=np.zeros(1)))
+
+    def fit(*_):
+        numbers = {"a": np.array([9.0]), "b": np.array([9.0])}
+        return Found("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
+
+    trial.at = at
+    monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    _, found = converge(trial, ("a", "b"), {"b": np.array([1.0]), "a": np.array([2.0])}, None)
+    spread = dict(zip(found.numbers, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert spread == pytest.approx({"a": 1.0, "b": 0.1})
+    assert found.numbers == {"a": [2.0], "b": [1.0]}
+
+
 def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
     """A slope that is a half too steep leaves a third of the way at each step: 30, 10, 3.3 ..."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.5)
