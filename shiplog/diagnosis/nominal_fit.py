@@ -63,6 +63,8 @@ def converged(
     Without its discrepancy a model that describes the ship badly would be moved to coefficients,
     and the noise to sizes, that make up for it. A move after which the campaign is far less
     probable is halved. A fit that does not converge is where the campaign was most probable.
+
+    Raises np.linalg.LinAlgError where the model diverges on every segment from the start.
     """
     campaign = _Campaign.of(model, setting, start, record, seen)
     here = best = campaign.first()
@@ -203,10 +205,13 @@ class _Campaign:
         self, theta: np.ndarray, whole: np.ndarray, path: Path, process_noise: ProcessNoise,
         sizes: Mapping[str, float],
     ) -> _Iterate:  # fmt: skip
-        """Noise, then all numbers, of the campaign about a path."""
+        """Noise, then all numbers, of the campaign about a path. Raises np.linalg.LinAlgError where
+        the model diverges on every segment."""
         linear = linearisation.linear(
             self.model, whole, self.cut, self.grid, path, self.moved, self.observed
         )
+        if linear.lost.all():
+            raise np.linalg.LinAlgError("the model diverges on every segment of the campaign")
         held = anchored(self.start, theta, self.columns)
         joint = _Joint(
             linear, self.accelerations, self.columns, held, self.families, self._room(theta)
