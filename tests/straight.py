@@ -179,7 +179,7 @@ def campaign(
     made = Reference(
         model, SETTING, np.zeros(COEFFICIENTS), columns, PROCESS_NOISE,  # type: ignore[arg-type]
         linear_segments.Wide(NOISE, PROCESS_NOISE.start, PROCESS_NOISE.acceleration),
-        information, pull, anchor, 1.0 / share, given, modes, nominal_reference.freedom(parts),
+        information, pull, anchor, given, nominal_reference.freedom(parts),
         misfit=of_own if of_own.families else None,  # type: ignore[arg-type]
         counts=share,
     )  # fmt: skip

@@ -19,13 +19,13 @@ WORDS = ("surge", "sway", "yaw")
 def lacking(run: Run, store: Store, profile: Profile) -> str:
     """Why the run's model cannot identify causes that change forces; empty where it can.
 
-    Quadratic least squares is fitted to all nominal voyages but one in turn, and rolled out on
-    that one. The physical model was fitted to all of them, so the comparison favours it. Windows
+    Quadratic least squares is fitted to all stored nominal voyages but one in turn, and rolled out
+    on that one. The physical model was fitted to all of them, so the comparison favours it. Windows
     in which either diverges are left out.
     """
     if run.lacks or not run.judges_itself:
         return run.lacks
-    cut = windows_of(run, store, run.trained_on, profile)
+    cut = windows_of(run, store, store.there(run.trained_on), profile)
     voyages = [] if cut is None else cut.plan["voyage"].to_list()
     names = list(dict.fromkeys(voyages))
     if cut is None or len(names) < 2:

@@ -40,6 +40,7 @@ from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 LEARNING_ROUNDS = 3  # of deviations, noise and paths in turn
+NOISE_LEVELS = np.exp(np.linspace(-0.6, 0.6, 7))  # of one part, times the process noise of all
 NOISE_TIMES = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the process noise, times the first guess
 
 
@@ -234,16 +235,16 @@ def groups_of(model: Extended, columns: Columns, families: Discrepancy) -> dict[
 
 
 def _noise(modes, rows, columns, effects, information, pull, weight) -> float:
-    """Standard deviation of the logarithm of the process noise over the parts."""
+    """Root mean square, over the parts, of the logarithm of the process noise over its estimate for
+    the whole campaign."""
     found = []
     for part in rows:
         own = picked(modes, part)
         scores = []
-        tried = np.exp(np.linspace(-0.6, 0.6, 7))
-        for factor in tried:
+        for factor in NOISE_LEVELS:
             gram = products(own, [np.arange(len(part))], columns.unit, weight[part], factor)[0]
             gram, logdet = reduced(gram, effects.deviation)
             volume = float(weight[part] @ np.log1p(factor**2 * own.felt).sum(-1)) + logdet
             scores.append(marginal(gram, information, pull) - 0.5 * volume)
-        found.append(math.log(tried[int(np.argmax(scores))]))
+        found.append(math.log(NOISE_LEVELS[int(np.argmax(scores))]))
     return float(np.sqrt(np.mean(np.square(found))))

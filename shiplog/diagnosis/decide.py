@@ -28,6 +28,7 @@ from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 # A cause that is at most 100 times less probable than a named one may stand in its place.
 INSTEAD_NATS = -2.0 * math.log(1.0 - thresholds.STATED)
+MOST_REASONS = 8  # of the likeliest causes by themselves that are not named
 EVERYWHERE = ("surge", "sway", "yaw_rate")
 
 
@@ -189,7 +190,7 @@ def _reasons(
     """Label → why it is not named."""
     table, kept = search.table, {n.cause.name for n in named}
     reasons = {name: why for name, why in refuted.items() if name not in kept}
-    for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:8]:
+    for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:MOST_REASONS]:
         name = name_of(label)
         if name in kept or name in reasons:
             continue

@@ -36,7 +36,11 @@ WAVES = {"motion": 10, "controls": 10, "wind": 4, "position": 14, "heading": 6, 
 
 @dataclass(frozen=True)
 class Waves:
-    """Smooth features of z [..., n]: √(2/F) cos(z·frequency + phase), less their mean."""
+    """Smooth features of inputs z [..., n], standardised: √(2/F) cos(z·frequency + phase).
+
+    middle, width  [n] mean and standard deviation over the campaigns
+    frequency      [n, F]; phase [F]
+    """
 
     middle: np.ndarray
     width: np.ndarray
@@ -52,7 +56,8 @@ class Waves:
 class Family:
     """One family: `columns` of the discrepancy's weights, and its features at the knots.
 
-    level   [F] taken off, and scale [F] of each feature, both over the campaigns
+    level    [F] subtracted from each feature, and scale [F] by which it is divided, both over the
+             campaigns; F with the features of an even force
     """
 
     name: str
@@ -198,9 +203,9 @@ def _of_motion(profile: Profile, knots: Knots) -> list[np.ndarray]:
 
 
 def _of_controls(profile: Profile, knots: Knots) -> list[np.ndarray]:
-    """Of every unit that drives its thrust n|n| and n u, of every blade sin δ in the stream of
-    the ship and of the first screw; of what turns all the way round the thrust's parts. A rudder's
-    force need not go on with its angle (stall, play, a stop): sin(πδ/δ_max) in the same streams."""
+    """Of every unit that drives n|n| and |n|u; of every angle δ sin δ u|u|, 1 - cos δ, and both in
+    the stream of each unit of `driven_by`. A rudder's force need not go on with its angle (stall,
+    play, a stop): sin(πδ/δ_max), times u|u| and in the same streams."""
     u = knots.state[..., [1]]
     driving = [i for i, a in enumerate(profile.actuators) if a.kind in ("propeller", "thruster")]
     found = []
@@ -229,7 +234,7 @@ def hard_over(rudder: Actuator) -> float:
 
 
 def driven_by(profile: Profile, angle: int, driving: list[int]) -> list[int]:
-    """Units whose jet an angle turns: those at the same place; of a rudder the first two."""
+    """Units whose jet an angle turns: those at the same place, or else the first two."""
     place = profile.actuators[angle].position_m
     same = [j for j in driving if profile.actuators[j].position_m == place]
     return same or driving[:2]
@@ -247,9 +252,10 @@ PRODUCTS: dict[str, Callable[[Profile, Knots], list[np.ndarray]]] = {
 
 
 def _turned(out: np.ndarray, knots: Knots) -> np.ndarray:
-    """What pulls towards a place pulls along the earth's axes: turned into the body's."""
-    c, s = np.cos(knots.state[..., 4]), np.sin(knots.state[..., 4])
+    """What pulls towards a place pulls along the earth's axes: turned into the body's, in place."""
+    heading = knots.state[..., [4]]
     north, east = out[..., 0, :].copy(), out[..., 1, :].copy()
-    out[..., 0, :] = c[..., None] * north + s[..., None] * east
-    out[..., 1, :] = c[..., None] * east - s[..., None] * north
+    out[..., 0, :], out[..., 1, :] = frames.in_body_axes(
+        north, east, np.cos(heading), np.sin(heading)
+    )
     return out

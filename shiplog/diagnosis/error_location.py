@@ -35,8 +35,9 @@ from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
 
+STRONGEST = 0.98  # quantile of a force's size that counts as its strongest: a knot may be off
 ACTIVE_FROM = 0.5  # of the strongest: where the thruster counts as on
-PAUSE_NODES = 2.5  # nodes that an intermittent force may pause for
+PAUSE_KNOTS = 2.5  # times between two knots that an intermittent force may pause for
 
 
 def external(
@@ -133,7 +134,7 @@ def uncovered(
 def active_intervals(trial: Trial, decision: Decision, found: SideForce) -> list[dict]:
     """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
     force, sd = intermittent.force_at_nodes(trial, decision.fit, found)
-    strongest = float(np.quantile(np.abs(force), 0.98))
+    strongest = float(np.quantile(np.abs(force), STRONGEST))
     times: list[dict] = []
     for i, row in enumerate(trial.rows):
         name = trial.record.names[trial.record.voyage[row]]
@@ -142,7 +143,7 @@ def active_intervals(trial: Trial, decision: Decision, found: SideForce) -> list
             at, value = begin + trial.grid.knot * float(k), float(force[i, k])
             one = {"voyage": name, "start_s": at, "end_s": at, "force_N": value,
                    "sd_N": float(sd[i, k])}  # fmt: skip
-            if times and _joined(times[-1], one, PAUSE_NODES * trial.grid.knot):
+            if times and _joined(times[-1], one, PAUSE_KNOTS * trial.grid.knot):
                 last = times[-1]
                 last["end_s"] = at
                 if abs(value) > abs(last["force_N"]):

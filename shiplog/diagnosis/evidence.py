@@ -30,7 +30,7 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
     """The trial with weights of its segments, and the model as it stands, its path held as firmly
     as the process noise then found allows, and linearised again until the evidence stays: causes
     must not gain by a path that converges with them. Segments on which the model diverges carry no
-    information."""
+    information. Raises np.linalg.LinAlgError where it diverges on all."""
     first = trial.at(numbers)
     trial = replace(trial.leaving_out(first.linear.lost), first=first)
     trial = replace(trial, weight=robust(trial, first))
@@ -40,7 +40,10 @@ def begin(trial: Trial, numbers: Numbers) -> tuple[Trial, Point]:
         if abs(base.evidence - last) < LITTLE_NATS:
             break
         point, last = trial.at(numbers, point, base.noise_factor), base.evidence
-    return replace(trial.leaving_out(point.linear.lost), begun=True), point
+    trial = trial.leaving_out(point.linear.lost)
+    if not trial.weight.any():  # a prior without data would name nothing, as if nothing had changed
+        raise np.linalg.LinAlgError("the model diverges on every segment of the trial")
+    return replace(trial, begun=True), point
 
 
 def robust(trial: Trial, point: Point) -> np.ndarray:
@@ -232,7 +235,8 @@ def _free(
 
 
 def _deviation(covariance: np.ndarray) -> np.ndarray:
-    """[Q] standard deviations; of a covariance that is none, as of numbers that are known."""
+    """[Q] standard deviations. Rounding may leave a variance of nearly known numbers below zero:
+    these count as known."""
     return np.sqrt(np.maximum(np.diagonal(covariance), 1e-30))
 
 

@@ -47,7 +47,8 @@ class Stretch:
     """One event, in the channel where it exceeds the ship's own forces most.
 
     peak     the largest force [N], or moment [N m] where the channel is yaw_rate
-    percent  of full thrust; of its full turning moment where the channel is yaw_rate
+    percent  of full thrust; of its full turning moment where the channel is yaw_rate; infinite
+             where the ship has none, such as a ship in tow whose screws never turned
     """
 
     voyage: str
@@ -66,8 +67,9 @@ class Stretch:
             if turning
             else ("force", "N", "full thrust")
         )
+        share = f" ({self.percent:.0f} % of {full})" if math.isfinite(self.percent) else ""
         return (
-            f"A {what} of {abs(self.peak):.3g} {unit} {towards} ({self.percent:.0f} % of {full}) "
+            f"A {what} of {abs(self.peak):.3g} {unit} {towards}{share} "
             f"for {self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of its own "
             "does that."
         )
@@ -307,13 +309,14 @@ def _event(
         way = (share[inside] - EDGE) / (share[inside] - share[outside])
         return float(time[inside] + max(way, 0.0) * (time[outside] - time[inside]))
 
+    full = float(weighed.full[2 if channel == 2 else 0])
     found = Stretch(
         voyage=record.names[record.voyage[rows[0]]],
         start_s=crossing(low[-1] + 1, low[-1]) if len(low) else float(time[0]),
         end_s=crossing(high[0] - 1, high[0]) if len(high) else float(time[-1]),
         channel=CHANNELS[channel],
         peak=float(weighed.force[part, channel][at]),
-        percent=float(100.0 * force[at] / weighed.full[2 if channel == 2 else 0]),
+        percent=100.0 * float(force[at]) / full if full > 0.0 else math.inf,
     )
     return float((force / limit)[first : last + 1].max()), found
 

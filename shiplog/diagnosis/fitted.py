@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -75,6 +76,11 @@ class Fit:
         return tuple(self.found.numbers)
 
     @property
+    def holds(self) -> bool:
+        """Whether the fit found numbers: one that diverged has no evidence."""
+        return math.isfinite(self.found.evidence)
+
+    @property
     def noise_factor(self) -> float:
         """Of the process noise on its nominal one, a geometric mean over the channels."""
         return self.remainder.overall(self.found.noise_factor)
@@ -84,12 +90,13 @@ class Fit:
 class Level:
     """One λ: the trial's products in units, robustly weighted, and the base hypothesis' solution.
 
-    The base hypothesis holds the named causes, free, and all nominal numbers.
+    The base hypothesis holds N numbers: all nominal ones, then those of the included causes, then
+    the weights of its remainder's family.
     """
 
     noise_factor: float
-    gram: np.ndarray  # [1 + C, 1 + C]
-    inverse: np.ndarray  # of information and data together, base's own numbers last
-    solution: np.ndarray
+    gram: np.ndarray  # [1 + N, 1 + N] products of [e | J]
+    inverse: np.ndarray  # [N, N] of information and data together
+    solution: np.ndarray  # [N]
     value: float  # log evidence of the base
     share: float = 0.0  # of it, what the bounds of numbers add

@@ -50,7 +50,8 @@ class Rollouts:
         """[N] bool: the windows of every figure, in which the model as it stands does not diverge.
 
         One window in which the model diverges says nothing of a cause, and would outweigh all
-        others. A model that diverges in most windows does not simulate this ship: all are counted.
+        others. A model that diverges in half of them or more does not simulate this ship: all are
+        counted.
         """
         counted = ~diverged(self.losses_before)
         return counted if 2 * counted.sum() > len(counted) else np.ones_like(counted)

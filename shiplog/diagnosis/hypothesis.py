@@ -29,7 +29,8 @@ class Hypothesis:
     """Causes by label, in alphabetical order, and a remainder.
 
     evidence   log marginal likelihood [nats], the trial counting for its share
-    score      log evidence + log prior - placebo: log posterior up to a constant
+    score      log evidence + log prior - placebo - allowance for form errors: log posterior up to
+               a constant
     point      the trial linearised at the causes' numbers; of a hypothesis far behind, the point
                without relinearisation
     found      their numbers and covariance there

@@ -23,6 +23,7 @@ STRONGEST = 0.95
 ON, OFF = 0.5, 0.2  # shares of the strongest, above which it is on, and below which it is off
 KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no pattern
 COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
+NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by itself
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
 
 
@@ -79,9 +80,8 @@ def force_at_nodes(trial: Trial, fit: Fit, side_force: SideForce) -> tuple[np.nd
     z, covariance = likelihood.starts_and_knots(*left, process_noise)
     knots = trial.grid.knots
     kernel = process_noise.kernel(knots)
-    intermittent = replace(process_noise, acceleration=1e-9 * process_noise.acceleration).kernel(
-        knots
-    )
+    alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
+    intermittent = alone.kernel(knots)
     share = intermittent @ np.linalg.inv(kernel)
     accelerations = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
     sway = slice(knots, 2 * knots)
@@ -99,7 +99,8 @@ def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
 
     A force that merely varies is between its extremes for much of the time: a Gaussian one is 1.13
     times as long between 0.2 and 0.5 of its 95 % quantile as above. A device is hardly ever
-    between.
+    between, and is on for less than COMES_AND_GOES of the time.
+
     `deviation` [S, J] is the standard deviation of the estimate.
     """
     size = np.abs(force)

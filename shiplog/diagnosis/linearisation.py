@@ -209,8 +209,8 @@ def _closer(
     turned = np.swapaxes(scaled, 1, 2)
     normal = turned @ scaled + np.diag(prior**-2.0)
     pull = (turned @ (gap * weight).reshape(count, -1, 1))[..., 0] - known * prior**-2.0
+    pull[away] = 0.0  # else an acceleration that is not finite would be the gain of all
     step = np.linalg.solve(normal, pull[..., None])[..., 0]
-    step[away] = 0.0
     closer = Path(
         path.start + step[:, :6], path.acceleration + step[:, 6:].reshape(path.acceleration.shape)
     )
@@ -246,6 +246,7 @@ def linear(
     z, j = columns[..., :size].copy(), columns[..., size:].copy()
     j[..., len(theta) - read :] -= observed
     e = segments.y - y + np.einsum("sbcz,sz->sbc", z, path.known)
+    e[lost] = 0.0  # columns of zeros times a path that is not finite are not zero
     return Linear(segments, path, e, z, j, lost)
 
 
@@ -267,8 +268,8 @@ def _lost(segments: Cut, y: np.ndarray, columns: np.ndarray, wide: Wide | None) 
 
 
 def chunks(count: int) -> Iterator[tuple[slice, Callable[[np.ndarray], np.ndarray]]]:
-    """CHUNK of so many segments after the other, and how each chunk's values are picked and filled
-    up: one compilation serves all."""
+    """SEGMENTS_AT_A_TIME of so many segments after the other, and how each chunk's values are
+    picked and filled up: one compilation serves all."""
     for at in range(0, count, SEGMENTS_AT_A_TIME):
         part = slice(at, min(at + SEGMENTS_AT_A_TIME, count))
 

@@ -1,6 +1,7 @@
 """Disk cache of the nominal campaign: its converged fit, computed once for a model.
 
-The key holds all that the fit depends on, the program's source included: no entry is ever stale.
+The key holds all that the fit depends on, this program's source and the versions of the libraries
+that compute it included: no entry is ever stale.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from dataclasses import astuple
 from pathlib import Path as File
 
 import jax
+import numba
 import numpy as np
+import scipy
 
 from shiplog import disk_cache, files
 from shiplog.diagnosis import campaign_characteristics, discrepancy, nominal_fit
@@ -28,6 +31,7 @@ from shiplog.voyages.recording import Record
 
 PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
 TIME_FIELDS = ("time", "bin", "knot")
+LIBRARIES = (jax, numba, np, scipy)
 
 log = logging.getLogger(__name__)
 
@@ -115,7 +119,9 @@ def _keep(kept: File, arrays: dict) -> None:
 def _key(model: Extended, setting: Setting, start: Start, record: Record) -> str:
     leaves, shape = jax.tree.flatten(model)
     digest = hashlib.sha256(disk_cache.source())
+    versions = [(library.__name__, library.__version__) for library in LIBRARIES]
     for word in (
+        versions,
         shape,
         setting.scale,
         setting.profile,

@@ -150,7 +150,7 @@ def learn(
     information, pull = prior(voyages, size**-2.0, held, own, found.share)
     reference_made = Reference(
         model, setting, at.theta, columns, process_noise, nominal_fit.wide_of(setting),
-        information, pull, held, 1.0 / found.share, made.linear, modes,
+        information, pull, held, made.linear,
         nominal_reference.freedom(len(voyages)),
         misfit=families,  # type: ignore[arg-type]  # it acts as a network's Misfit does
         counts=found.share,
@@ -215,7 +215,7 @@ def assumed(
         known[: columns.base] = nominal_reference.GIVEN**-2.0
     made = replace(
         whole.reference, information=np.diag(known), pull=known * whole.reference.anchor,
-        nominal=None, modes=None, adapts=not given,
+        nominal=None, adapts=not given,
     )  # fmt: skip
     return replace(
         whole,

@@ -30,10 +30,12 @@ from shiplog.voyages.recording import Record
 LINEARISATIONS = 20  # of moving the coefficients to where they are linearised, at most
 LONGEST_MOVE = 2.0  # plausible spreads that a coefficient moves in one round
 NEAR, CLOSE = 5.0, 0.7  # nats and plausible spreads, for which they are not moved on
+EDGE = 1e-6  # of a coefficient's range, by which it stays inside its bounds
 NO_ROOM = 1e-9  # plausible spreads beyond a bound: bounded least squares needs some room
 LOST_NATS = 50.0  # of the campaign's log density: a move that loses more is halved
 MOST_HALVINGS = 3  # of one move, at most
 ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are estimated
+FIRST_NOISE = 0.04  # of the acceleration that a path may have: process noise before it is estimated
 FREE = 2.0  # times the process noise: the allowed acceleration at a path's nodes
 PROCESS_NOISE_TIME_S = 4.0  # s, of a three-metre ship
 FIRST_SIZE = 1.0  # of a family's weights, in units of the process noise
@@ -63,6 +65,8 @@ def converged(
     Without its discrepancy a model that describes the ship badly would be moved to coefficients,
     and the noise to sizes, that make up for it. A move after which the campaign is far less
     probable is halved. A fit that does not converge is where the campaign was most probable.
+
+    Raises np.linalg.LinAlgError where the model diverges on every segment from the start.
     """
     campaign = _Campaign.of(model, setting, start, record, seen)
     here = best = campaign.first()
@@ -149,8 +153,8 @@ class _Campaign:
         wide, grid, of = wide_of(setting), segments.grid(record), record.timescale
         cut, moved, observed = read(model, setting, record, segments.begins(record))
         begin = ProcessNoise(
-            wide.noise, 0.04 * wide.acceleration, PROCESS_NOISE_TIME_S * of.factor, wide.start,
-            bin=of.bin, knot=of.knot,
+            wide.noise, FIRST_NOISE * wide.acceleration, PROCESS_NOISE_TIME_S * of.factor,
+            wide.start, bin=of.bin, knot=of.knot,
         )  # fmt: skip
         found = discrepancy.of(
             record.profile, begin.acceleration, columns.linearised, seen,
@@ -190,7 +194,7 @@ class _Campaign:
 
     def _room(self, theta: np.ndarray) -> np.ndarray:
         """[2, P] how far each coefficient may move, in units: to just inside its bounds."""
-        edge = 1e-6 * (self.start.high - self.start.low)
+        edge = EDGE * (self.start.high - self.start.low)
         edge = np.where(np.isfinite(edge), edge, 0.0)
         ends = np.stack((self.start.low + edge, self.start.high - edge)) - theta
         room = ends / self.columns.unit[: len(theta)]
@@ -203,10 +207,13 @@ class _Campaign:
         self, theta: np.ndarray, whole: np.ndarray, path: Path, process_noise: ProcessNoise,
         sizes: Mapping[str, float],
     ) -> _Iterate:  # fmt: skip
-        """Noise, then all numbers, of the campaign about a path."""
+        """Noise, then all numbers, of the campaign about a path. Raises np.linalg.LinAlgError where
+        the model diverges on every segment."""
         linear = linearisation.linear(
             self.model, whole, self.cut, self.grid, path, self.moved, self.observed
         )
+        if linear.lost.all():
+            raise np.linalg.LinAlgError("the model diverges on every segment of the campaign")
         held = anchored(self.start, theta, self.columns)
         joint = _Joint(
             linear, self.accelerations, self.columns, held, self.families, self._room(theta)

@@ -1,9 +1,9 @@
-"""The nominal reference: the posterior of coefficients and causes after the training voyages.
+"""The nominal reference: what is known of coefficients and causes before a trial.
 
-Coefficients and the numbers of every cause are estimated together, each with its plausible spread
-as prior. An error that the model has everywhere is then part of them; the diagnosis tests changes
-only. Coefficients fitted to one campaign are over-confident for the next. Their information matrix
-is divided by κ (a power prior, Ibrahim & Chen 2000).
+An error that the model has everywhere is part of it; the diagnosis tests changes only. What is
+fitted to some voyages is over-confident for others: their products count for 1/κ of themselves (a
+power prior, Ibrahim & Chen 2000). `nominal_campaign` makes it of the training voyages, and `assume`
+of a network that is diagnosed on these very voyages.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ import numpy as np
 from shiplog.diagnosis import input_misfit, likelihood, linearisation, nominal_fit, segments
 from shiplog.diagnosis.campaign_parts import marginal
 from shiplog.diagnosis.input_misfit import Misfit
-from shiplog.diagnosis.likelihood import Modes, ProcessNoise
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Wide
 from shiplog.diagnosis.measurement_correction import read
-from shiplog.diagnosis.nominal_fit import Converged, anchored, columns_of, converged, hold, wide_of
+from shiplog.diagnosis.nominal_fit import anchored, columns_of, converged, hold, wide_of
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION, Columns
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.models.causes import Cause, Setting, constants_of
@@ -29,10 +29,9 @@ from shiplog.models.extended import Extended
 from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
-KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)
-CAMPAIGN = 4.0  # least κ between campaigns: voyages of one are more alike
-VOYAGES = 2.0  # and between voyages, together with the error of a network on all of them
-CAREFUL_KAPPA = 11.0  # of too few voyages
+KAPPAS = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 32.0)  # that are tried
+CAREFUL_KAPPA = 11.0  # of too few voyages, and the most by which a trial counts less
+FEWEST_VOYAGES = 3  # from which κ is estimated
 GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held to
 
 
@@ -40,11 +39,10 @@ GIVEN = 0.1  # of the plausible spread, that coefficients nobody fitted are held
 class Reference:
     """θ that all is linearised about, and what the nominal campaign says around it.
 
-    information  [C, C]  and pull [C], in units of `columns.unit`, κ applied; `anchor` [C] of the
-                 latter is the run's own coefficients'
-    nominal      that campaign, and its `modes` under the nominal process noise; None where the
-                 model was trained on the very data that are diagnosed
-    freedom      degrees of freedom with which κ is known; intervals are wider with fewer
+    information  [C, C]  and pull [C], in units of `columns.unit`; `anchor` [C] of the latter is the
+                 run's own coefficients'
+    nominal      that campaign; None where the model was trained on the very data that are diagnosed
+    freedom      degrees of freedom that the voyages leave; intervals are wider with fewer
     adapts       whether the model has absorbed causes there, and is fitted again with them
     misfit       the error of its MMG as a function of the network's inputs
     counts       share of itself that a trial counts, as its voyages have errors of their own
@@ -60,9 +58,7 @@ class Reference:
     information: np.ndarray
     pull: np.ndarray
     anchor: np.ndarray
-    kappa: float
     nominal: Linear | None
-    modes: Modes | None
     freedom: float
     adapts: bool = False
     misfit: Misfit | None = None
@@ -110,47 +106,6 @@ class Reference:
         return dict(zip(self.model.stand_in.names, values, strict=True))
 
 
-def learn(
-    model: Extended,
-    setting: Setting,
-    start: Start,
-    record: Record,
-    at: Converged | None = None,
-    kappa: float | None = None,
-    least: float = CAMPAIGN,
-    inputs: Network | None = None,
-) -> Reference:
-    """From the nominal campaign, linearised at its converged fit `at`. κ is estimated from its own
-    voyages unless given, and not below `least`. `inputs`: a network whose inputs the discrepancy is
-    a function of."""
-    at = at or converged(model, setting, start, record)
-    columns = columns_of(model, setting, start)
-    cut, moved, observed = read(model, setting, record, segments.begins(record))
-    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
-    g = segments.grid(record)
-    linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
-    modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
-    held = anchored(start, at.theta, columns)
-    wrong = None
-    if inputs is not None:
-        wrong = input_misfit.of(
-            inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
-        )  # fmt: skip
-        modes = modes.joined(wrong.accelerations(linear.cut, g))
-        columns = columns.with_misfit(wrong.count)
-        held = np.concatenate((held, np.zeros(wrong.count)))
-    voyage = linear.cut.voyage
-    names = np.unique(voyage)
-    by = np.concatenate(([1.0], columns.unit))
-    each = np.stack([modes.total((voyage == v).astype(float)) for v in names]) * np.outer(by, by)
-    chosen = kappa or inflation(each, columns.known, held, least)
-    information, pull = nominal_information(each.sum(0), chosen, columns.known, held)
-    return Reference(
-        model, setting, at.theta, columns, at.process_noise, wide_of(setting), information, pull,
-        held, chosen, linear, modes, freedom(len(names)), misfit=wrong,
-    )  # fmt: skip
-
-
 def freedom(voyages: int) -> float:
     """Degrees of it that so many voyages leave to what they have in common."""
     return float(max(voyages - 1, 2))
@@ -164,51 +119,59 @@ def nominal_information(
     return total[1:, 1:] / kappa + np.diag(known), total[1:, 0] / kappa + held
 
 
-def inflation(
-    each: np.ndarray, known: np.ndarray, held: np.ndarray, least: float = CAMPAIGN
-) -> float:
-    """κ that predicts each voyage best from the others; not below `least`, and careful with fewer
-    than three.
+def inflation(each: np.ndarray, known: np.ndarray, held: np.ndarray) -> float:
+    """κ that predicts each voyage best from the others; careful with too few.
 
     each [V, 1 + C, 1 + C] products of a voyage; what is known before any data, information and
     pull, `known` and `held` [C]: all in units
     """
-    if len(each) < 3:
+    if len(each) < FEWEST_VOYAGES:
         return CAREFUL_KAPPA
     total = each.sum(0)
-    scores, tried = [], [kappa for kappa in KAPPAS if kappa >= least]
-    for kappa in tried:
+    scores = []
+    for kappa in KAPPAS:
         score = 0.0
         for left in each:
             score += marginal(left, *nominal_information(total - left, kappa, known, held))
         scores.append(score)
-    return tried[int(np.argmax(scores))]
+    return KAPPAS[int(np.argmax(scores))]
 
 
 def assume(
-    model: Extended, setting: Setting, start: Start, record: Record, given: bool,
-    inputs: Network | None = None,
-) -> Reference:  # fmt: skip
-    """Without a nominal campaign: the process noise is estimated from these voyages.
+    model: Extended, setting: Setting, start: Start, record: Record, given: bool, inputs: Network
+) -> Reference:
+    """Of a network without a nominal campaign: noise, discrepancy and κ are estimated from these
+    voyages, and coefficients have their plausible spread.
 
-    given    published coefficients, with a tenth of their plausible spread; else coefficients of a
-             fit to these voyages, with their plausible spread
-    inputs   a network that trained on these voyages
+    given    published coefficients, with a tenth of that spread, and not fitted to these voyages
+    inputs   the network that trained on these voyages: the discrepancy is a function of its inputs
     """
     if given:
         start = replace(start, spread=GIVEN * start.spread)
     at = converged(model, setting, start, record, rounds=0 if given else nominal_fit.LINEARISATIONS)
-    kappa, least = (CAREFUL_KAPPA, CAMPAIGN) if inputs is None else (None, VOYAGES)
-    whole = learn(model, setting, start, record, at, kappa, least, inputs)
-    columns = whole.columns
-    information = np.diag(columns.known.copy())
-    causes = slice(columns.base, columns.linearised)
+    columns = columns_of(model, setting, start)
+    cut, moved, observed = read(model, setting, record, segments.begins(record))
+    whole = np.concatenate((at.theta, np.zeros(len(columns.unit) - columns.base)))
+    g = segments.grid(record)
+    linear = linearisation.linear(model, whole, cut, g, at.path, moved, observed)
+    modes = likelihood.modes(likelihood.weighed(linear, at.process_noise), at.process_noise)
+    wrong = input_misfit.of(
+        inputs, linear.cut, g, modes, columns.known, columns.unit, at.process_noise.acceleration
+    )  # fmt: skip
+    held = np.append(anchored(start, at.theta, columns), np.zeros(wrong.count))
+    columns = columns.with_misfit(wrong.count)
+    modes = modes.joined(wrong.accelerations(linear.cut, g))
+    names = np.unique(linear.cut.voyage)
+    by = np.concatenate(([1.0], columns.unit))
+    each = [modes.total((linear.cut.voyage == v).astype(float)) for v in names]
+    kappa = inflation(np.stack(each) * np.outer(by, by), columns.known, held)
     # without a nominal campaign no cause has a nominal size
-    information[causes, causes] = np.eye(columns.linearised - columns.base) * HELD_INFORMATION
-    return replace(
-        whole, information=information, pull=whole.anchor, nominal=None, modes=None,
-        adapts=not given,
-        counts=1.0 / min(whole.kappa, CAREFUL_KAPPA) if inputs is not None else 1.0,
+    known = columns.known.copy()
+    known[columns.base : columns.linearised] = HELD_INFORMATION
+    return Reference(
+        model, setting, at.theta, columns, at.process_noise, wide_of(setting), np.diag(known),
+        held, held, None, freedom(len(names)), adapts=not given, misfit=wrong,
+        counts=1.0 / min(kappa, CAREFUL_KAPPA),
     )  # fmt: skip
 
 

@@ -54,7 +54,7 @@ def left_by(
 
 
 def by_channel(left: Left, at_one_place: np.ndarray | None = None) -> tuple[float, Remainder]:
-    """The most probable factors of surge, sway and yaw rate, and their log likelihood.
+    """Log likelihood of the most probable factors of surge, sway and yaw rate, and these factors.
 
     at_one_place  acceleration [3] of nominal process noise that acts at one place: it is raised
                   with the others; None without any

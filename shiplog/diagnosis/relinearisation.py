@@ -53,8 +53,10 @@ class _Iterate:
         return little or self.step * rate / (1.0 - rate) < LEFT
 
     def at_point(self) -> Found:
-        """The fit with the point's own numbers, without the gain that the step promises."""
-        return replace(self.base, numbers=self.point.numbers,
+        """The fit with the point's own numbers, in the order of its covariance, without the gain
+        that the step promises."""
+        stood = {name: self.point.numbers[name] for name in self.base.numbers}
+        return replace(self.base, numbers=stood,
                        evidence=self.base.evidence - 0.5 * self.step**2)  # fmt: skip
 
 
@@ -93,10 +95,11 @@ def converge(
             if last is not None and here.rejected(last):
                 raise np.linalg.LinAlgError("a step too far")
         except np.linalg.LinAlgError:  # the fit diverged, and its path with it
-            if halvings == MOST_HALVINGS or not included:
+            free = [name for name in included if name not in trial.fixed]
+            if halvings == MOST_HALVINGS or not free:
                 break
             halvings, damping = halvings + 1, 0.5 * damping
-            numbers = _half_way(numbers, last.point.numbers if last else None, included[-1])
+            numbers = _half_way(numbers, last.point.numbers if last else None, free[-1])
             continue
         converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
@@ -158,11 +161,11 @@ def _fitted(
 
 
 def _half_way(
-    numbers: Mapping[str, np.ndarray], accepted: Mapping[str, np.ndarray] | None, newest: str
+    numbers: Mapping[str, np.ndarray], accepted: Mapping[str, np.ndarray] | None, last: str
 ) -> Mapping[str, np.ndarray]:
-    """Half a step from the accepted numbers; where there are none, half of the newest cause."""
+    """Half a step from the accepted numbers; where there are none, half of the last free cause."""
     if accepted is None:
-        return {**numbers, newest: 0.5 * numbers[newest]}
+        return {**numbers, last: 0.5 * numbers[last]}
     return _towards(numbers, accepted, 0.5)
 
 

@@ -104,7 +104,7 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 
     voyage, time_s, ACCELERATIONS, the same with _sd, x0, y0, heading in (-π, π], surge, sway,
     yaw_rate, the actuators, wind_ahead, wind_starboard (apparent, where it comes from), share (of
-    the campaign). Motion and wind are means over the 2 s around the knot.
+    the campaign). Motion, actuators and wind are means over a knot's length about it (`around`).
     """
     keep = once(found)
     rows = found.rows[keep]
@@ -129,7 +129,8 @@ def table(found: Unexplained, record: Record) -> pl.DataFrame:
 
 
 def around(record: Record, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Means of values [n, c] over a knot around rows [m], within the stretch: [m, c]."""
+    """Means [m, c] of values [n, c] over the time between two knots, about rows [m]; over less of
+    it at the ends of a stretch."""
     half = round(0.5 * record.timescale.knot / record.step)
     low = np.maximum(rows - half, record.firsts[rows])
     high = np.minimum(rows + half, record.lasts[rows]) + 1

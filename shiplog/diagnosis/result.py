@@ -16,8 +16,8 @@ from shiplog.models.causes import Cause, ParameterEstimate
 
 EXPLAIN_MORE = "explain more"  # why a verdict is undecided: the causes by themselves do
 REFUTED = "refuted"  # the same: held-out voyages refute the most probable causes
-PATTERN = "pattern"  # the same: a force is on and off less clearly than a device, and clearer than
-# one that varies
+# The same: a force is on and off less clearly than a device, and more clearly than one that varies
+PATTERN = "pattern"
 SIDE_THRUST = "side_thrust"
 
 
@@ -60,8 +60,8 @@ class Decision:
     structure  of what is unknown, or may be
     side_force  the unrecorded thruster, where it is one of the causes
     traces     causes below their practical size
-    rejected   label → why not
-    ranking    label or family → probability, of the first step
+    rejected   name, or label of one kind of a cause → why it is not named
+    ranking    every answer → probability: names of causes, families as `unknown:family`, none
     fit        the hypothesis of the verdict: what is named, or nothing, with its remainder
     nothing    no cause, with the same remainder
     expected   label → expected log Bayes factor of each cause, by its size

@@ -25,11 +25,12 @@ class Cut:
     y       [S, B, 6]      what was measured, averaged over bins
     used    [S, B, 6]      bool
     driven  [S, K, A + 3]  actuators, share of the campaign, true wind: at the steps' nodes
-    voyage  [S]
-    water    [2] velocity of the water along x₀ and y₀ [m/s]; the discrepancy depends on the motion
-             through it
-    factors  family of the discrepancy → factor [3] of the forces that depend on its inputs; none
-             where they are as on the nominal voyages
+    voyage  [S]            counts in the record's names
+    step                   s between the steps' nodes
+    water   [2]            velocity of the water along x₀ and y₀ [m/s]; the discrepancy depends on
+                           the motion through it
+    factors                family of the discrepancy → factor [3] of the forces that depend on its
+                           inputs; none where they are as on the nominal voyages
     """
 
     rows: np.ndarray

@@ -19,11 +19,12 @@ from shiplog.voyages.windows import Windows
 
 
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
-    """The change of convention with the smallest mean L on these windows, in words, and that L."""
-    tried = [
-        (words, float(np.minimum(simulator.losses(turned), RUNAWAY).mean()))
-        for words, turned in other(simulator.profile, cut)
-    ]
+    """The change of convention with the smallest mean L on these windows, in words, and that L. A
+    window in which the model diverges has an L of RUNAWAY."""
+    tried = []
+    for words, turned in other(simulator.profile, cut):
+        each = np.nan_to_num(simulator.losses(turned), nan=RUNAWAY, posinf=RUNAWAY)
+        tried.append((words, float(np.minimum(each, RUNAWAY).mean())))
     return min(tried, key=lambda pair: pair[1])
 
 

@@ -27,9 +27,9 @@ REMAINDER = 0.15
 # each further cause has to exceed this squared times that of the strongest one.
 FORM_ERROR = 0.02
 
-# Share of what a hypothesis explains. With a remainder, a cause is named only
-# where it explains more than the remainder does, and where the remainder could do no more than this
-# share of what the cause does.
+# Share of what a hypothesis explains, and of what a cause does. With a remainder, causes are named
+# only where they explain at least this share, which is more than the remainder does; and a cause
+# only where the remainder could do no more than this share of what the cause does.
 MOST = 0.5
 
 # Share of what a hypothesis explains. A remainder that adds no more than this is an error of the

@@ -17,7 +17,11 @@ from shiplog.diagnosis.remainder import INTERMITTENT, Remainder
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
-REACH_LENGTHS = 0.5  # lengths from midship
+REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
+# To start from: places in ship lengths; forces in multiples of the one that accelerates the ship
+# sideways as much as the nominal process noise does
+LEVERS = np.linspace(-0.45, 0.45, 7)
+SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
 
 @dataclass(frozen=True)
@@ -59,11 +63,8 @@ def estimate_side_force(
         unit = across + lever * length * turning
         return left.likelihood(replace(left.nominal, intermittent=unit * force))
 
-    levers = np.linspace(-0.45, 0.45, 7)
-    # in newtons that matter: from the nominal process noise upwards
-    ordinary = left.nominal.acceleration[1] / abs(across[1])
-    sizes = ordinary * np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-    lever, force = max(itertools.product(levers, sizes), key=lambda tried: of(*tried))
+    sizes = left.nominal.acceleration[1] / abs(across[1]) * SIZES  # N
+    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: of(*tried))
     finer = minimize(  # together with the place itself a part of the force would be another cause's
         lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
         bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None)),

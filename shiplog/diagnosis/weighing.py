@@ -107,8 +107,9 @@ def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
         near = table.score(fit.found.evidence, labels, RAISED) > before.score - SEARCH_NATS
         rounds = 1 if near else 0
     for _ in range(rounds):
-        fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
-    if not math.isfinite(fit.found.evidence):
+        if fit.holds:
+            fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
+    if not fit.holds:
         return plain
     at, remainder = fit.point, fit.remainder
     levels = evidence.levels(trial, at, included, fit.found.noise_factor, remainder)
@@ -117,9 +118,7 @@ def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
 
 
 def _fitted_with(table: Hypotheses, labels: tuple[str, ...], fit: Fit, remainder: Remainder) -> Fit:
-    """The same causes with another remainder; as it is, where an earlier fit of them failed."""
-    if not math.isfinite(fit.found.evidence):
-        return fit
+    """The same causes with another remainder."""
     point, found = converge(
         table.trial, table.included(labels), fit.found.numbers, fit.point.path, remainder=remainder
     )
@@ -226,6 +225,8 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
     if before is not None:
         fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
     for _ in range(rounds):
+        if not fit.holds:  # nor is there anything left of it that a force could explain
+            return
         tried = table.intermittent(fit)
         fit = _fitted_with(table, labels, fit, tried.remainder)
     if tried.gain > 0.0 and fit.found.evidence > raised.evidence:

@@ -103,6 +103,20 @@ def test_full_thrust_is_that_of_the_open_water_diagram(sailed):
     assert full[0] == pytest.approx(bollard, rel=1e-6)
 
 
+def test_a_ship_in_tow_has_no_full_thrust_to_compare_with(sailed):
+    """Its screws never turned: 20 N for ten knots of 2 s, against 2 N that its hull can do."""
+    record = afloat.record(sailed)
+    rows = 20 * np.arange(40)
+    force = np.zeros((40, 3))
+    force[15:25, 0] = 20.0
+    weighed = external_forces.Balance(
+        rows, force, np.full((40, 3), 0.1), np.full((40, 3), 2.0), np.zeros(3), np.zeros(3)
+    )
+    (stretch,) = external_forces.find(weighed, record)
+    assert (stretch.start_s, stretch.end_s) == (29.0, 49.0)  # half of the peak, between knots
+    assert stretch.sentence.startswith("A force of 20 N ahead for 20 s: pushed")
+
+
 def test_the_sentence_says_how_much_and_which_way():
     output = Stretch("v", 70.0, 85.0, "sway", -24.0, 600.0)
     assert output.sentence.startswith("A force of 24 N to port (600 % of full thrust) for 15 s")

@@ -110,6 +110,24 @@ def test_a_path_held_firmly_follows_the_acceleration_that_is_expected_of_it():
     assert ahead.acceleration == pytest.approx(true.acceleration, abs=1e-5)
 
 
+def test_a_path_that_is_not_finite_is_lost_by_itself():
+    """As of a model without an acceleration at a measured state: rows of zeros, and the other
+    segments as they were."""
+    true = replace(path(), acceleration=np.zeros((4, 3, GRID.knots)))
+    cut = simulated(true)
+    broken = replace(true, acceleration=true.acceleration.copy())
+    broken.acceleration[1, 0, 3] = np.nan
+    away = np.arange(4) == 1
+    pulled = linearisation.pulled(Toy(), THETA, cut, GRID, WIDE, broken)
+    assert np.array_equal(pulled.acceleration[1], broken.acceleration[1], equal_nan=True)
+    assert pulled.start[~away] == pytest.approx(true.start[~away], abs=1e-6)
+    none = np.zeros((*cut.driven.shape, 0)), np.zeros((*cut.y.shape, 0))
+    found = linearisation.linear(Toy(), THETA, cut, GRID, pulled, *none)
+    assert np.array_equal(found.lost, away)
+    assert not found.e[1].any() and not found.z[1].any() and not found.j[1].any()
+    assert found.e[~away] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_a_path_is_pulled_on_a_longer_grid_too():
     """Segments of 60 s with nodes of 4 s: accelerations found from the record on."""
     viewed = replace(RECORD, timescale=Timescale(60.0, 4.0, 4.0))

@@ -59,9 +59,13 @@ class Model:
     causes = CAUSES[:2]
 
 
-def fitted(monkeypatch, start, shape=np.arctan, slope=lambda x: 1.0 / (1.0 + x**2), rounds=20):
-    """A campaign of 24 segments that feels its first coefficient as a `shape`, with its `slope`:
-    the fit, and the coefficients at which it was linearised."""
+def fitted(
+    monkeypatch, start, shape=np.arctan, slope=lambda x: 1.0 / (1.0 + x**2), rounds=20,
+    beyond=np.inf,
+):  # fmt: skip
+    """A campaign of 24 segments that feels its first coefficient as a `shape`, with its `slope`,
+    and of which all diverge `beyond` a size of it: the fit, and the coefficients at which it was
+    linearised."""
     columns = nominal_fit.columns_of(Model(), SETTING, start)
     record = straight.sailed(24)
     plain = straight.passed(record, columns, sensitivity=3.0)
@@ -71,7 +75,8 @@ def fitted(monkeypatch, start, shape=np.arctan, slope=lambda x: 1.0 / (1.0 + x**
         asked.append(whole[:2].copy())
         j = plain.j.copy()
         j[..., 0] = felt * slope(whole[0])
-        return replace(plain, e=plain.e - felt * shape(whole[0]) - plain.j[..., 1] * whole[1], j=j)
+        e = plain.e - felt * shape(whole[0]) - plain.j[..., 1] * whole[1]
+        return replace(plain, e=e, j=j, lost=np.full(24, abs(whole[0]) > beyond))
 
     monkeypatch.setattr(nominal_fit, "read", lambda *_: (plain.cut, None, None))
     for name, given in (
@@ -115,6 +120,19 @@ def test_without_rounds_the_coefficients_stay(monkeypatch):
     found, asked = fitted(monkeypatch, start, rounds=0)
     assert found.theta.tolist() == [BEGIN, 0.0]
     assert len(asked) == 1
+
+
+def test_a_campaign_on_which_the_model_diverges_everywhere_is_no_fit(monkeypatch):
+    """At the start there is nothing to compare; later it is a move that went too far: Newton's
+    first step on an arctangent, from 3 to -9.5."""
+    start = Start(
+        np.array([BEGIN, 0.0]), np.array([20.0, 2.0]), np.full(2, -99.0), np.full(2, 99.0)
+    )
+    with pytest.raises(np.linalg.LinAlgError, match="every segment"):
+        fitted(monkeypatch, start, beyond=0.9 * BEGIN)
+    found, asked = fitted(monkeypatch, start, beyond=1.1 * BEGIN)
+    assert asked[1, 0] < -1.1 * BEGIN
+    assert found.theta[0] == pytest.approx(0.0, abs=0.1)
 
 
 @pytest.mark.parametrize(

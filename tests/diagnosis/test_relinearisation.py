@@ -35,7 +35,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, converged={}, first=None), asked
+    return SimpleNamespace(at=at, converged={}, first=None, fixed=()), asked
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -66,9 +66,59 @@ def test_a_fit_without_end_has_the_evidence_of_the_best_numbers_that_it_met(monk
     assert found.evidence == pytest.approx(-0.5 * best ** (2.0 / 3.0) / NOISE**2 - np.log(by))
 
 
+def test_numbers_of_a_fit_without_end_are_in_the_order_of_their_covariance(monkeypatch):
+    """A set begins with the cause that was added last, and its covariance is in alphabetical
+    order: a tenth of the spread of b is not that of a."""
+    trial, _ = fits(monkeypatch, np.cbrt, lambda x: np.abs(x) ** (-2.0 / 3.0) / 3.0)
+
+    def at(numbers, *_):
+        if numbers["b"][0] != 1.0:
+            raise np.linalg.LinAlgError
+        return SimpleNamespace(numbers=numbers, path=None, linear=SimpleNamespace(e=np.zeros(1)))
+
+    def fit(*_):
+        numbers = {"a": np.array([9.0]), "b": np.array([9.0])}
+        return Found("", 0.0, 1.0, numbers, np.diag([1.0, 0.01]), density=0.0)
+
+    trial.at = at
+    monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    _, found = converge(trial, ("a", "b"), {"b": np.array([1.0]), "a": np.array([2.0])}, None)
+    spread = dict(zip(found.numbers, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert spread == pytest.approx({"a": 1.0, "b": 0.1})
+    assert found.numbers == {"a": [2.0], "b": [1.0]}
+
+
 def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
     """A slope that is a half too steep leaves a third of the way at each step: 30, 10, 3.3 ..."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.5)
     _, found = converge(trial, ("x",), {"x": np.array([3.0])}, None)
     assert abs(found.numbers["x"][0]) < relinearisation.LEFT * NOISE
     assert asked[:3] == pytest.approx([3.0, 1.0, 1.0 / 3.0])
+
+
+def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
+    """Where the model diverges with them alone there is no fit; where it diverges with another
+    cause too, that one is halved until it holds: 4, 2, 1."""
+    trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
+    trial.fixed = ("held",)
+    seen, plain = [], trial.at
+
+    def at(numbers, *more):
+        seen.append(float(numbers["held"][0]))
+        if numbers.get("x", np.full(1, 9.0))[0] > 1.0:
+            raise np.linalg.LinAlgError
+        return plain(numbers, *more)
+
+    def fit(_trial, point, *_):
+        numbers = {"held": point.numbers["held"], "x": np.zeros(1)}
+        return Found("", 0.0, 1.0, numbers, np.eye(2), density=0.0)
+
+    trial.at = at
+    monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    held = {"held": np.array([3.0])}
+    trial.first = SimpleNamespace()
+    _, alone = converge(trial, ("held",), held, None)
+    assert alone.evidence == -np.inf and alone.numbers["held"] == [3.0]
+    _, both = converge(trial, ("held", "x"), {**held, "x": np.array([4.0])}, None)
+    assert both.evidence == 0.0
+    assert asked == [1.0] and set(seen) == {3.0}

@@ -189,6 +189,14 @@ def test_segments_on_which_the_model_runs_away_carry_no_weight(made):
     assert trial.weight[5] > 0.0
 
 
+def test_a_model_that_diverges_on_every_segment_has_no_evidence(made):
+    """Of nothing the prior is left, in which no cause is the most probable answer."""
+    nominal, record, given = made
+    lost = replace(given, lost=np.ones(8, dtype=bool))
+    with pytest.raises(np.linalg.LinAlgError, match="every segment"):
+        evidence.begin(straight.Straight.of(nominal, record, given=lost), {})
+
+
 def test_the_model_as_it_stands_is_linearised_until_its_evidence_stays(made):
     """Else a cause gains by a path that converges with it. Each path is ten times as close."""
     nominal, record, given = made
@@ -231,3 +239,12 @@ def test_products_without_a_voyage_are_those_of_segments_of_no_weight(trial, kin
             np.abs(found[0, 0] / products.total(point, 1.5, trial.weight, remainder)[0][0, 0] - 1)
             > 0.01
         )
+
+
+def test_stretches_of_one_segment_have_nothing_between_their_segments(made):
+    """Four voyages of 30 s and one row: the pass is that of their own segments."""
+    nominal, _, _ = made
+    record = straight.sailed(4, voyages=4, seed=5)
+    given = straight.passed(record, nominal.reference.columns)
+    trial = straight.trial(nominal, record, given)
+    assert trial.covering(trial.first) is trial.first.linear

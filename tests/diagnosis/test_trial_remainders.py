@@ -10,9 +10,10 @@ from dense_trial import SHARE, gaussian, level, nats, of_noise
 from scipy.stats import multivariate_normal, norm
 from straight import CAUSES, PROCESS_NOISE
 
-from shiplog.diagnosis import evidence, fits, remainder
+from shiplog.diagnosis import evidence, fits, remainder, weighing
 from shiplog.diagnosis.discrepancy import EVEN
 from shiplog.diagnosis.fitted import Fit
+from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
 
 # --- changes
@@ -169,3 +170,35 @@ def test_the_best_level_is_the_one_that_was_drawn(made):
     again = evidence.levels(trial, trial.at({}), (), best.noise_factor, raised)
     near = max(again, key=lambda one: one.value)
     assert near.noise_factor == pytest.approx(best.noise_factor, rel=0.02)
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_a_fit_that_diverges_with_raised_noise_leaves_no_noise_to_explain(
+    made, monkeypatch, failing
+):
+    """The first or the second fit of a set diverges, with numbers that are not finite: neither a
+    factor of each channel nor a force is asked of it, and the set stays with raised noise."""
+    trial, point = evidence.begin(straight.trial(*made), {})
+    table, real, count = Hypotheses(trial, point, {}), weighing.converge, 0
+    monkeypatch.setattr(weighing, "RAISED_FROM", 0.0)
+
+    def diverges(trial, included, numbers, *more, **others):
+        nonlocal count
+        count += len(others)  # its remainder, but for the fit that a set begins with
+        at, found = real(trial, included, numbers, *more, **others)
+        if count >= failing:
+            found = replace(found, evidence=-math.inf, numbers={"drag": np.array([np.nan])})
+        return at, found
+
+    def asked(fit):
+        assert np.isfinite([*fit.found.numbers.values()]).all()
+        return straight.no_hull(fit)
+
+    table.intermittent = asked
+    monkeypatch.setattr(table, "nominal_side_force", None, raising=False)
+    weighing.weigh(table, (), {}, point)
+    monkeypatch.setattr(weighing, "converge", diverges)
+    weighing.weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
+    assert count >= failing
+    assert np.isfinite(table.found[("drag",), RAISED].evidence)
+    assert (("drag",), INTERMITTENT) not in table.found
