@@ -164,12 +164,12 @@ def tests_of_open(ranking: Mapping[str, float], causes: Sequence[Cause]) -> list
     """Notes on an undecided verdict: the test of each two candidates that the catalogue knows how
     to separate.
 
-    ranking   label → probability
+    ranking   name → probability
     """
-    by = {c.label: c for c in causes}
+    by = {c.name: c for c in causes}
     candidates = [
-        by[label] for label, p in ranking.items()
-        if label in by and LEAST_CANDIDATE <= p < thresholds.STATED
+        by[name] for name, p in ranking.items()
+        if name in by and LEAST_CANDIDATE <= p < thresholds.STATED
     ]  # fmt: skip
     tests = {}
     for one, other in combinations(candidates, 2):
