@@ -125,7 +125,7 @@ def uncovered(
         found.append(
             Interval(
                 row["voyage"], float(row["elapsed"]), float(row["elapsed"] + size), "coverage",
-                f"Only {row['coverage']:.0%} of these seconds lie where the model was made: {why}.",
+                f"Only {row['coverage']:.0%} of these seconds are inside the training data: {why}.",
             )
         )  # fmt: skip
     return found

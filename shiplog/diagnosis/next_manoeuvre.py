@@ -116,10 +116,11 @@ def advice(
 
 
 def apart(trial: Trial, gram: np.ndarray, one: Named, other: str) -> float:
-    """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units."""
+    """Nats by which a cause as found would beat another, of a gram [1 + C, 1 + C] in units. The
+    manoeuvre counts as much of itself as a trial does."""
     columns = trial.reference.columns
     own, rival = columns.of[one.cause.label], columns.of[other]
-    g = gram[1:, 1:]
+    g = trial.reference.counts * gram[1:, 1:]
     left = g - g @ np.linalg.solve(g + trial.reference.information, g)
     p = one.numbers / columns.unit[own]
     imitated = left[np.ix_(rival, own)] @ p

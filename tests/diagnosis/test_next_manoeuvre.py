@@ -14,8 +14,10 @@ from shiplog.diagnosis import next_manoeuvre
 from shiplog.voyages.timescale import Timescale
 
 
-def test_what_a_rival_imitates_does_not_count():
-    """Columns: one coefficient, the cause, its rival. G = XᵀX of three made-up observations."""
+@pytest.mark.parametrize("counts", [1.0, 0.25])
+def test_what_a_rival_imitates_does_not_count(counts):
+    """Columns: one coefficient, the cause, its rival. G = XᵀX of three made-up observations of
+    variance 1. Where a trial counts a quarter of itself, their variance is four times as large."""
     x = np.array([[1.0, 2.0, 1.0], [0.0, 1.0, 3.0], [2.0, 0.0, 1.0]])
     g = np.zeros((4, 4))
     g[1:, 1:] = x.T @ x
@@ -23,11 +25,13 @@ def test_what_a_rival_imitates_does_not_count():
     columns = SimpleNamespace(
         of={"one": np.array([1]), "other": np.array([2])}, unit=np.array([1.0, 2.0, 1.0])
     )
-    trial = SimpleNamespace(reference=SimpleNamespace(columns=columns, information=known))
+    trial = SimpleNamespace(
+        reference=SimpleNamespace(columns=columns, information=known, counts=counts)
+    )
     named = SimpleNamespace(cause=SimpleNamespace(label="one"), numbers=np.array([3.0]))
     # by hand: y = 1.5 x₁, where the coefficient is N(0, ¼) and the rival N(0, 1)
     y = 1.5 * x[:, 1]
-    alone = np.eye(3) + 0.25 * np.outer(x[:, 0], x[:, 0])
+    alone = np.eye(3) / counts + 0.25 * np.outer(x[:, 0], x[:, 0])
     with_rival = alone + np.outer(x[:, 2], x[:, 2])
     expected = 0.5 * y @ np.linalg.inv(with_rival) @ y
     assert next_manoeuvre.apart(trial, g, named, "other") == pytest.approx(expected, rel=1e-6)
