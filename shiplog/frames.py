@@ -61,14 +61,14 @@ def in_earth_axes(ahead: Any, starboard: Any, cos: Any, sin: Any) -> tuple[Any, 
 
 def to_body(earth: np.ndarray, heading: np.ndarray | Axes) -> np.ndarray:
     """Earth-fixed (north, east) [n, 2] to body axes (ahead, starboard) [n, 2]."""
-    return np.stack(in_body_axes(earth[:, 0], earth[:, 1], *axes(heading)), axis=-1)
+    return np.stack(in_body_axes(earth[:, 0], earth[:, 1], *axes(heading))).T
 
 
 def position_at_midship(
     position: np.ndarray, heading: np.ndarray | Axes, arm: tuple[float, float]
 ) -> np.ndarray:
     """Antenna position [n, 2] minus the lever arm (ahead, starboard) turned by the heading."""
-    return position - np.stack(in_earth_axes(*arm, *axes(heading)), axis=-1)
+    return position - np.stack(in_earth_axes(*arm, *axes(heading))).T
 
 
 def velocity_at_midship(
@@ -76,7 +76,7 @@ def velocity_at_midship(
 ) -> np.ndarray:
     """Body velocity [n, 2] of the point at `arm`, less r × arm: (u + r·y, v - r·x)."""
     ahead, starboard = arm
-    return velocity + np.stack((yaw_rate * starboard, -yaw_rate * ahead), axis=-1)
+    return velocity + np.stack((yaw_rate * starboard, -yaw_rate * ahead)).T
 
 
 def quaternion_heading(z: np.ndarray, w: np.ndarray, east_north_up: bool) -> np.ndarray:

@@ -53,9 +53,7 @@ def at_midship(
     velocity = frames.velocity_at_midship(
         velocity, readings.yaw_rate, tuple(of_velocity + moved) if shared else tuple(of_velocity)
     )
-    return np.stack(
-        (
-            position[:, 0], velocity[:, 0], position[:, 1], velocity[:, 1],
-            readings.heading, readings.yaw_rate,
-        ), -1,
-    )  # fmt: skip
+    return np.stack((
+        position[:, 0], velocity[:, 0], position[:, 1], velocity[:, 1],
+        readings.heading, readings.yaw_rate,
+    )).T  # fmt: skip

@@ -133,7 +133,9 @@ class Record:
     def measured_as(self, readings: Sighted, moved: tuple[float, float] = (0.0, 0.0)) -> Record:
         """The record of these sights. `moved`: the antenna, from where the profile has it [m]."""
         state = instruments.at_midship(readings, self.profile.sensors, moved)
-        return replace(self, state=state)
+        found = replace(self, state=state)
+        found.__dict__["axes"] = readings.axes  # of its heading: not to be worked out again
+        return found
 
     def pick(self, voyages: Sequence[str]) -> Record:
         """The rows of these voyages, shares of the campaign as they were."""

@@ -206,6 +206,16 @@ def test_sights_are_reduced_as_ingest_does(profile):
     assert going == pytest.approx(observed.state[:, [1, 3]], abs=1e-12)
 
 
+def test_a_record_of_other_sights_has_the_axes_of_its_own_heading():
+    """Axes are handed on with the sights: of a heading that was turned they are turned, too."""
+    observed = closed.record(PROFILE)
+    for sight, turned in ((observed.sighted, 0.0), (observed.sighted.turned(0.3), 0.3)):
+        found = observed.measured_as(sight)
+        assert found.state[:, 4] == pytest.approx(observed.state[:, 4] + turned)
+        assert found.axes.cos == pytest.approx(np.cos(found.state[:, 4]), abs=1e-12)
+        assert found.axes.sin == pytest.approx(np.sin(found.state[:, 4]), abs=1e-12)
+
+
 def test_an_antenna_that_is_sighted_moves_as_its_velocity_says():
     """Over ground, the sighted velocity is the derivative of the sighted position."""
     observed = closed.record(PROFILE)
