@@ -43,6 +43,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Learn a ship's dynamic model from its logs, and see where it fails.",
+    epilog="Exit codes: 0 done; 1 the input is at fault; 2 wrong usage; 3 done, but something was "
+    "lost or refused.",
 )
 
 

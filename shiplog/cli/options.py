@@ -44,7 +44,12 @@ JsonOption = Annotated[
 CHOSEN = "Names or shell patterns, several times; unless given,"
 Voyages = Annotated[list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all.")]
 TrainingVoyages = Annotated[
-    list[str] | None, typer.Option("--voyages", help=f"{CHOSEN} all of the store, split.")
+    list[str] | None,
+    typer.Option(
+        "--voyages",
+        help=f"{CHOSEN} all of the store. A network's are split; physics are identified from all "
+        "that are given.",
+    ),
 ]
 TestVoyages = Annotated[
     list[str] | None,
