@@ -321,6 +321,31 @@ def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path
     ).read_bytes()
 
 
+def test_packed_answers_hold_no_path_of_the_machine(tmp_path, stubs):
+    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(called="another program"))
+    folder = out / "cases" / "5"
+    recording = str(folder / "d" / "diagnosis.rrd")
+    (folder / "verdict.json").write_text(json.dumps({"verdict": "none", "recording": recording}))
+    run._seal_file(folder / "verdict.json")
+    steps = json.loads((folder / "steps.json").read_text())
+    steps[-1] |= {"stderr": f"Recording: {recording}"}
+    (folder / "steps.json").write_text(json.dumps(steps))
+    (out / "cases" / "6" / "verdict.sha256").write_text("0  verdict.json")  # its answer was changed
+    archive.pack([out], packed)
+    with tarfile.open(packed) as content:
+        content.extractall(tmp_path / "elsewhere", filter="data")
+    there = tmp_path / "elsewhere" / "out"
+    verdict = (there / "cases" / "5" / "verdict.json").read_text()
+    assert json.loads(verdict)["recording"] == "out/cases/5/d/diagnosis.rrd"
+    assert str(tmp_path) not in verdict + (there / "cases" / "5" / "steps.json").read_text()
+    with pytest.raises(score.Sealed, match="is not what was sealed"):
+        score.read(there)
+    (there / "cases" / "6" / "verdict.sha256").unlink()
+    (one,) = score.read(there).answers
+    assert one.word == "none" and program.of_answers(one.steps) == ("another program",)
+
+
 def test_unpacked_answers_become_a_test_that_can_be_asked_again(tmp_path, stubs):
     out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())

@@ -18,7 +18,7 @@ python -m pipelines.experiments.hidden_effects abroad --out DIR [--count 100] [-
 python -m pipelines.experiments.hidden_effects remake DIR [--share]
     logs, stores and models of cases whose answers alone are here, such as those that were unpacked
 python -m pipelines.experiments.hidden_effects replay DIR [--out NEW] [--rivals] [--every N]
-    [--first N] [--shiplog COMMAND] [--whole [--share]]
+    [--first N] [--shiplog COMMAND [--called NAME]] [--whole [--share]]
     the kept cases of DIR diagnosed again by the program as it is now, into another folder; with
     --whole from their logs on, for a program that cannot read their stores and models
 python -m pipelines.experiments.hidden_effects score DIR
@@ -127,6 +127,7 @@ def _run(given: argparse.Namespace) -> None:
     settings = Settings(
         jobs=given.jobs, keep=given.keep, share=given.share, rivals=given.rivals,
         oracle=given.oracle, limit=given.limit, shiplog=command,
+        called=given.called,
     )  # fmt: skip
     if given.what == "replay":
         given.out = given.out or replay.folder_of(given.source)
@@ -205,6 +206,7 @@ def _processes(command: argparse.ArgumentParser) -> None:
     command.add_argument("--share", action="store_true", help="train once a ship, not once a case")
     command.add_argument("--limit", type=float, default=3600.0, help="seconds for one step")
     command.add_argument("--shiplog", metavar="COMMAND", help="instead of this source's")
+    command.add_argument("--called", metavar="NAME", default="", help="what pages call that one")
 
 
 if __name__ == "__main__":

@@ -29,9 +29,9 @@ def identity(checkout: Path = ROOT) -> dict[str, Any]:
     return {"commit": commit or None, "dirty": None if changes is None else bool(changes)}
 
 
-def other(command: Sequence[str]) -> dict[str, Any]:
-    """The identity of a program that is not this source: its command is all that is known."""
-    return {"commit": None, "dirty": None, "program": shlex.join(command)}
+def other(command: Sequence[str], called: str = "") -> dict[str, Any]:
+    """The identity of a program that is not this source: what it is called, or else its command."""
+    return {"commit": None, "dirty": None, "program": called or shlex.join(command)}
 
 
 def name(step: Mapping[str, Any]) -> str:

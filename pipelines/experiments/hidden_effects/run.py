@@ -58,6 +58,7 @@ class Settings:
     case: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.simulated_ship", "case")
     abroad: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.other_families", "case")
     shiplog: tuple[str, ...] = OUR_SHIPLOG
+    called: str = ""  # what pages call that program, where it is not this source's
     rival: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.hidden_effects.rivals")
     truth: tuple[str, ...] = (sys.executable, "-m", "pipelines.experiments.hidden_effects.oracle")
 
@@ -280,7 +281,7 @@ def step(name: str, command: Sequence[str], folder: Path, settings: Settings) ->
     foreign = settings.shiplog != OUR_SHIPLOG and list(command[: len(settings.shiplog)]) == list(
         settings.shiplog
     )
-    known = program.other(settings.shiplog) if foreign else program.identity()
+    known = program.other(settings.shiplog, settings.called) if foreign else program.identity()
     # in this checkout, another program written in Python would find this source and not its own
     place = folder if foreign else ROOT
     return _process(name, command, folder, place, settings.limit) | known
