@@ -82,9 +82,10 @@ def diagnose_run(
     else:
         done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
     _save(done, store, names, began)
-    if extend is not None:
+    done = _drawn(done)
+    if extend is not None:  # last: once it is there, the same command is refused
         _extend(run, done, extend, cause_files)
-    return _drawn(done)
+    return done
 
 
 @dataclass(frozen=True)
@@ -196,11 +197,13 @@ def _save(done: DiagnosedTrial, store: Store, names: Sequence[str], began: float
 
 
 def _drawn(done: DiagnosedTrial) -> DiagnosedTrial:
-    """The pictures, last: all else is written. Where they fail, the answer says why."""
+    """The pictures, once the verdict is written. Where they fail, the answer says why."""
     if done.recording is None:
         return done
     try:
         diagnosis_pictures.save(done, done.recording)
+    except (KeyboardInterrupt, SystemExit):
+        raise
     except BaseException as error:  # a panic of polars is no Exception
         fault = error if isinstance(error, ShiplogError) else unexpected(error, "drawing")
         log.warning("%s", fault)
