@@ -14,7 +14,7 @@ from pathlib import Path
 from pipelines.experiments.hidden_effects import plan as plans
 from pipelines.experiments.hidden_effects import run
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
-from pipelines.experiments.hidden_effects.run import Made, Settings
+from pipelines.experiments.hidden_effects.run import Prepared, Settings
 from shiplog.exceptions import ShiplogError
 
 log = logging.getLogger(__name__)
@@ -44,28 +44,22 @@ def _case(out: Path, planned: Planned, settings: Settings) -> str | None:
     key = (out / AGAIN / f"{planned.label}.json").resolve()
     key.parent.mkdir(exist_ok=True)
     _remove(folder)
-    base = run.base_to_make(out, planned, settings)
-    made = Made(folder / "logs", folder / "store", base, key)
-    seconds = 0.0
-    for name, command in run.making(planned, settings, made).items():
-        if name == "train" and not run.to_train(base, made.logs):
-            continue
-        done = run.step(name, command, folder, settings)
-        if done["rc"] in run.STOPPED:
-            return None
-        if done["rc"] not in (run.DONE, run.LOST):
-            _remove(folder)
-            raise ShiplogError(f"{planned.label}: {name} ended with {done['rc']}: {done['stderr']}")
-        if name == "logs" and key.read_bytes() != plans.key_path(out, planned).read_bytes():
-            _remove(folder)
-            raise ShiplogError(
-                f"{planned.label} hides something else than when it was diagnosed.",
-                hint="make it again with the program that its steps.json names.",
-            )
-        if name == "train" and settings.share:
-            run.mark(base, made.logs)
-        seconds += done["wall_s"]
-    return f"made after {seconds:.0f} s"
+    prepared = Prepared(folder / "logs", folder / "store", run.base_to_make(out, planned, settings))
+    steps = run.prepare(planned, settings, folder, prepared, key)
+    if steps is None:
+        return None
+    if run.failed(last := steps[-1]):
+        _remove(folder)
+        raise ShiplogError(
+            f"{planned.label}: {last['step']} ended with {last['rc']}: {last['stderr']}"
+        )
+    if key.read_bytes() != plans.key_path(out, planned).read_bytes():
+        _remove(folder)
+        raise ShiplogError(
+            f"{planned.label} hides something else than when it was diagnosed.",
+            hint="make it again with the program that its steps.json names.",
+        )
+    return f"made after {sum(done['wall_s'] for done in steps):.0f} s"
 
 
 def _remove(folder: Path) -> None:

@@ -64,13 +64,12 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """What a diagnosis stands on, and the key to it."""
+class Prepared:
+    """The folders that a diagnosis stands on: logs, the store of them, and the nominal model."""
 
     logs: Path
     store: Path
     base: Path
-    key: Path
 
 
 def run(
@@ -144,27 +143,22 @@ def run_case(
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     key = plans.key_path(out, planned).resolve()
-    logs, store = made or folder / "logs", folder / "store"
     base = base_to_make(out, planned, settings)
-    commands = making(planned, settings, Made(logs, store, base, key)) | {
-        "diagnose": diagnosing(settings, base, store, folder)
-    }
-    steps: list[dict[str, Any]] = []
-    for name, command in commands.items():
-        if (name == "logs" and made) or (name == "train" and not to_train(base, logs)):
-            continue
-        done = step(name, command, folder, settings)
+    there = Prepared(made or folder / "logs", folder / "store", base)
+    steps = prepare(planned, settings, folder, there, None if made else key)
+    if steps is None:
+        return None
+    if not failed(steps[-1]):
+        command = diagnosing(settings, base, there.store, folder)
+        done = step("diagnose", command, folder, settings)
         if done["rc"] in STOPPED:
             return None
-        steps.append(done | {"attempt": number})
-        if done["rc"] not in (DONE, LOST):
-            break
-        if name == "train" and settings.share:
-            mark(base, logs)
+        steps.append(done)
+    steps = [done | {"attempt": number} for done in steps]
     reported = seal(folder, steps)
     compared = None
     if steps[-1]["step"] == "diagnose" and settings.rivals:  # where it failed they may not
-        compared = ask_rivals(folder, base_of(out, planned), store, settings)
+        compared = ask_rivals(folder, base_of(out, planned), there.store, settings)
         if compared is None:
             return None
     if settings.oracle and steps[-1]["step"] == "diagnose":
@@ -176,19 +170,45 @@ def run_case(
     return f"{reported}; {compared}" if compared else reported
 
 
-def making(planned: Planned, settings: Settings, made: Made) -> dict[str, list[str]]:
-    """The commands that a diagnosis stands on."""
+def prepare(
+    planned: Planned, settings: Settings, folder: Path, prepared: Prepared, key: Path | None
+) -> list[dict[str, Any]] | None:
+    """The steps that lead to these folders, up to the first one that fails; None where somebody
+    stopped one. A shared model of the same nominal logs is not identified again.
+
+    key   where the simulator writes it; None where the logs are there already
+    """
     simulator = settings.abroad if planned.family else settings.case
-    profile = str(made.logs / "ship.toml") if planned.family else "esso-vectwin"
-    logs, store = str(made.logs), str(made.store)
-    return {
-        "logs": [*simulator, str(planned.seed), logs, "--key", str(made.key), *planned.options],
+    profile = str(prepared.logs / "ship.toml") if planned.family else "esso-vectwin"
+    logs, store = str(prepared.logs), str(prepared.store)
+    commands = {
+        "logs": [*simulator, str(planned.seed), logs, "--key", str(key), *planned.options],
         "ingest": [*settings.shiplog, "ingest", logs, "--profile", profile, "--store", store],
         "train": [
             *settings.shiplog, "train", *_training(planned.model),
-            "--store", store, "--out", str(made.base),
+            "--store", store, "--out", str(prepared.base),
         ],
     }  # fmt: skip
+    if key is None:
+        del commands["logs"]
+    steps: list[dict[str, Any]] = []
+    for name, command in commands.items():
+        if name == "train" and not _to_train(prepared.base, prepared.logs):
+            continue
+        done = step(name, command, folder, settings)
+        if done["rc"] in STOPPED:
+            return None
+        steps.append(done)
+        if failed(done):
+            break
+        if name == "train" and settings.share:
+            _mark(prepared.base, prepared.logs)
+    return steps
+
+
+def failed(done: Mapping[str, Any]) -> bool:
+    """Whether a step did not do what it was for."""
+    return done["rc"] not in (DONE, LOST)
 
 
 def attempts(folder: Path) -> int:
@@ -231,7 +251,7 @@ def ask_rivals(folder: Path, base: Path, store: Path, settings: Settings) -> str
         return None
     steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
     _write_steps(folder, [*(one for one in steps if one["step"] != "rivals"), done])
-    if done["rc"] not in (DONE, LOST) or _object(answers, "methods") is None:
+    if failed(done) or _object(answers, "methods") is None:
         answers.unlink(missing_ok=True)
         return f"not compared: rivals ended with {done['rc']}"
     _seal_file(answers)
@@ -320,7 +340,7 @@ def _process(
     }
 
 
-def to_train(base: Path, logs: Path) -> bool:
+def _to_train(base: Path, logs: Path) -> bool:
     """Unless there is a whole base of exactly these nominal logs; a part of one is removed."""
     marked = _object(_trained_on(base), "nominal_1.mcap")
     if marked is not None and marked == _nominal(logs):
@@ -330,7 +350,7 @@ def to_train(base: Path, logs: Path) -> bool:
     return True
 
 
-def mark(base: Path, logs: Path) -> None:
+def _mark(base: Path, logs: Path) -> None:
     """Which nominal logs a shared base was identified from."""
     _trained_on(base).write_text(json.dumps(_nominal(logs), indent=1), encoding="utf-8")
 
@@ -350,15 +370,11 @@ def seal(folder: Path, steps: list[dict[str, Any]]) -> str:
     verdict, last = folder / "verdict.json", steps[-1]
     _write_steps(folder, steps)
     content = _object(verdict)
-    if last["rc"] not in (DONE, LOST) or content is None:
-        content = _failed(last)
+    if failed(last) or content is None:
+        content = {"contract": 1, "verdict": FAILED, "step": last["step"], "rc": last["rc"]}
         verdict.write_text(json.dumps(content), encoding="utf-8")
     _seal_file(verdict)
     return str(content["verdict"])
-
-
-def _failed(done: Mapping[str, Any]) -> dict[str, Any]:
-    return {"contract": 1, "verdict": FAILED, "step": done["step"], "rc": done["rc"]}
 
 
 def _write_steps(folder: Path, steps: list[dict[str, Any]]) -> None:
