@@ -1,4 +1,8 @@
-"""From where and how an instrument measures to the ship's state at midship."""
+"""From where and how an instrument measures to the ship's state at midship.
+
+Vectors [n, 2] are made as `np.stack(...).T`, each component in one piece of memory: a diagnosis
+turns them thousands of times, component by component.
+"""
 
 from __future__ import annotations
 

@@ -76,9 +76,9 @@ class Fit:
         return tuple(self.found.numbers)
 
     @property
-    def holds(self) -> bool:
-        """Whether the fit found numbers: one that diverged has no evidence."""
-        return math.isfinite(self.found.evidence)
+    def diverged(self) -> bool:
+        """Whether it has no evidence: its numbers are then of no use."""
+        return not math.isfinite(self.found.evidence)
 
     @property
     def noise_factor(self) -> float:

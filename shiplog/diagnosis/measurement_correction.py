@@ -73,15 +73,15 @@ def read(
     moved = np.zeros((*base.driven.shape, len(columns.unit)))
     observed = np.zeros((*base.y.shape, len(columns.unit)))
     before = record  # as the causes before this one have it
-    averaged: tuple[Record, Record] | None = None  # of that record, which several clocks share
+    averaged, of = record, None  # that record averaged, which several clocks share
     for place, cause in enumerate(model.causes):
         if not cause.reads:
             continue
         here = given.get(cause.label, np.zeros(cause.count))
         low, high = cause.bounds(setting)
-        if cause.shifts and (averaged is None or averaged[0] is not before):
-            averaged = before, before.smoothed(AVERAGING_S)
-        moving = averaged[1] if cause.shifts and averaged is not None else before
+        if cause.shifts and of is not before:
+            averaged, of = before.smoothed(AVERAGING_S), before
+        moving = averaged if cause.shifts else before
         for i, column in enumerate(columns.of[cause.label]):
             step = np.zeros(cause.count)
             step[i] = READ_STEP * sizes[cause.label][i]

@@ -107,9 +107,9 @@ def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
         near = table.score(fit.found.evidence, labels, RAISED) > before.score - SEARCH_NATS
         rounds = 1 if near else 0
     for _ in range(rounds):
-        if fit.holds:
+        if not fit.diverged:
             fit = _fitted_with(table, labels, fit, table.raised_by_channel(fit))
-    if not fit.holds:
+    if fit.diverged:
         return plain
     at, remainder = fit.point, fit.remainder
     levels = evidence.levels(trial, at, included, fit.found.noise_factor, remainder)
@@ -225,7 +225,7 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
     if before is not None:
         fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
     for _ in range(rounds):
-        if not fit.holds:  # nor is there anything left of it that a force could explain
+        if fit.diverged:  # nor is there anything left of it that a force could explain
             return
         tried = table.intermittent(fit)
         fit = _fitted_with(table, labels, fit, tried.remainder)

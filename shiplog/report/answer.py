@@ -171,12 +171,11 @@ def tests_of_open(ranking: Mapping[str, float], causes: Sequence[Cause]) -> list
         by[name] for name, p in ranking.items()
         if name in by and LEAST_CANDIDATE <= p < thresholds.STATED
     ]  # fmt: skip
-    tests = {}
-    for one, other in combinations(candidates, 2):
-        test = one.separated_by.get(other.name) or other.separated_by.get(one.name)
-        if test:
-            tests[f"A test that separates {one.name} from {other.name}: {test}."] = None
-    return list(tests)
+    return [
+        f"A test that separates {one.name} from {other.name}: {test}."
+        for one, other in combinations(candidates, 2)
+        if (test := one.separated_by.get(other.name) or other.separated_by.get(one.name))
+    ]
 
 
 def of_given(run: Run) -> str:

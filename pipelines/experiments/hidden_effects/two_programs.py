@@ -22,8 +22,9 @@ COMMAND = """\
     python -m pipelines.experiments.hidden_effects compare docs/results/former-answers.tar.xz \\
         docs/validation-answers.tar.xz --markdown docs/results/former_decision.md"""
 INTRODUCTION = """\
-The cases are the first ones of [validation](../validation.md), whose words and goals hold here too.
-Both programs had the same logs and profiles. Each made its own store and identified its own model.
+The cases are those of [validation](../validation.md) that both programs answered; its words and
+goals hold here too. Both had the same logs and profiles. Each made its own store and identified its
+own model.
 The *former* decision is the one that this decision replaced: its rules had grown case by case.
 
 A share has its count and, in brackets, its Clopper-Pearson interval at 90 %, in %. The two columns

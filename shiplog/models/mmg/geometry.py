@@ -18,7 +18,7 @@ WIDE_ANGLE = math.radians(45.0)
 UNITS = ("propellers", "rudders", "thrusters")
 PARTS = ("hull", *FORCES)  # all forces that a ship may have
 # What a command of 1 without a unit is taken as, and the unit to record it in instead.
-OF_ONE = {"rudder": ("1 rad", "deg"), "propeller": ("1 rev/s", "rpm")}
+OF_ONE = {"rudder": ("1 rad", "deg"), "azimuth": ("1 rad", "deg"), "propeller": ("1 rev/s", "rpm")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +213,7 @@ def _without_unit(actuator: Actuator) -> str:
     full = f"{1.0 / units.factor(unit):g}" + ("" if unit == "1" else f" {unit}")
     return (
         f"The command of the {actuator.kind} {actuator.name!r} has no unit of its own: {full} is "
-        f"taken as {one}. If that is wrong, record it in {other}."
+        f"taken as {one}. If that is wrong, give a factor in `sign`, or record it in {other}."
     )
 
 
