@@ -78,6 +78,6 @@ def commit_of_source() -> str | None:
             timeout=5,
             check=False,
         )
-    except OSError:
+    except (OSError, subprocess.SubprocessError):  # also of a git that takes too long
         return None
     return done.stdout.strip() or None
