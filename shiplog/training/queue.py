@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from types import ModuleType
 from typing import Any
 
 from shiplog.exceptions import ShiplogError
@@ -124,7 +126,7 @@ def _hire() -> _Worker:
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    with _one_thread(), _signals_deferred():
+    with _one_thread(), _signals_deferred(), _script_hidden():
         process.start()
     theirs.close()  # so that a worker's death is the end of the pipe
     return _Worker(process, ours)
@@ -236,3 +238,17 @@ def _one_thread() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """A child process does not run the script again that calls shiplog from Python.
+
+    It would import it as its main module. All that a task is made of is in modules of their own.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script

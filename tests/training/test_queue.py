@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -67,6 +68,27 @@ def test_closing_the_queue_ends_its_processes(tmp_path):
             time.sleep(0.05)
     with pytest.raises(ProcessLookupError):
         os.kill(int(path.read_text(encoding="utf-8")), 0)
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, "FOLDER")
+from test_queue import square
+from shiplog.training.queue import Task, work
+
+print("once")
+for event in work([Task("a", square, (3,))], 1):
+    if event.ended:
+        print(event.result, event.failure)
+"""
+
+
+def test_a_script_that_trains_is_not_run_again_by_each_process(tmp_path):
+    """As a reader of the README writes it, without `if __name__ == "__main__"`."""
+    path = tmp_path / "script.py"
+    path.write_text(SCRIPT.replace("FOLDER", str(Path(__file__).parent)), encoding="utf-8")
+    ended = subprocess.run([sys.executable, path], capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == ("once\n9 \n", "")
 
 
 INTERRUPTED = """
