@@ -81,11 +81,7 @@ class TrainOptions:
                 "a core.",
                 hint="add --recipe paper, or leave --device out.",
             )
-        if self.window < LEAST_WINDOW:
-            raise UsageError(
-                f"A window of {self.window} s is too short to compare velocities in.",
-                hint=f"choose --window {LEAST_WINDOW} or longer.",
-            )
+        self._check_numbers()
         kind = MODELS[self.model]
         for name in filter(taking, self.given()):
             flag = "--no-fit" if name == "fit" else f"--{name.replace('_', '-')}"
@@ -112,6 +108,19 @@ class TrainOptions:
             raise UsageError(
                 f"--data {self.data} is of noisy copies, which an identification has no use for.",
                 hint="choose ref or d-ref.",
+            )
+
+    def _check_numbers(self) -> None:
+        """Raises UsageError for a number that is too small; a command refuses all but the window
+        before it comes here."""
+        for name, least in (("seeds", 1), ("width", 1), ("epochs", 1), ("folds", 0)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise UsageError(f"--{name} {value} is too small.", hint=f"give {least} or more.")
+        if self.window < LEAST_WINDOW:
+            raise UsageError(
+                f"A window of {self.window} s is too short to compare velocities in.",
+                hint=f"choose --window {LEAST_WINDOW} or longer.",
             )
 
     def without_idle_seeds(self) -> TrainOptions:

@@ -25,3 +25,16 @@ def test_a_window_in_which_no_velocities_can_be_compared_is_refused():
     with pytest.raises(UsageError, match="A window of 5 s is too short") as refused:
         TrainOptions(window=5).check()
     assert refused.value.hint == "choose --window 6 or longer."
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "least"),
+    [("feedforward", "seeds", 1), ("feedforward", "width", 1), ("feedforward", "epochs", 1),
+     ("mmg", "seeds", 1), ("mmg", "folds", 0)],
+)  # fmt: skip
+def test_numbers_that_a_command_refuses_are_refused_in_python_too(model, name, least):
+    """A run without a seed has no model, and ended in a traceback after it was begun."""
+    TrainOptions(model=model, **{name: least}).check()
+    with pytest.raises(UsageError, match=f"--{name} {least - 1} is too small") as refused:
+        TrainOptions(model=model, **{name: least - 1}).check()
+    assert refused.value.hint == f"give {least} or more."
