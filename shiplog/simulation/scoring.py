@@ -79,4 +79,5 @@ def score(dynamics: Dynamics | Simulates, windows: Windows) -> Scores:
         "end_position_m": far,
         "end_heading_deg": np.degrees(np.abs(turned)),
     }
-    return Scores(simulated, prediction_error(error), pl.DataFrame(columns))
+    whole = {name: np.where(np.isnan(one), np.inf, one) for name, one in columns.items()}
+    return Scores(simulated, prediction_error(error), pl.DataFrame(whole))

@@ -105,8 +105,13 @@ def test_a_model_that_diverges_scores_infinity_and_not_nan():
     def explode(state, actuator, wind):
         return state**9 * 1e9 + 1e9
 
-    scores = scoring.score(explode, one_window([0] * 6))
-    assert scores.errors["loss"][0] == math.inf
+    def shake(state, actuator, wind):
+        return -(1e300 * (state + 1.0))  # to and fro: infinity less infinity is no number
+
+    for model in (explode, shake):
+        scores = scoring.score(model, one_window([0] * 6))
+        assert scores.errors.row(0) == (math.inf,) * len(scoring.ERRORS)
+        assert scores.errors.columns == list(scoring.ERRORS)
 
 
 def test_least_squares_goes_no_further_outside_its_range():
