@@ -159,7 +159,7 @@ def _band(run: NetworkRun, held: pl.DataFrame) -> prediction_interval.Band:
     simulated = [simulate(model, unseen) for model in run.models().values()]
     error = np.concatenate([states - unseen.state for states in simulated])
     spread = np.concatenate([prediction_interval.seeds_spread(simulated)] * len(simulated))
-    return prediction_interval.calibrate(error, spread, len(run.config.split.validation))
+    return prediction_interval.calibrate(error, spread, unseen.plan["voyage"].n_unique())
 
 
 def training_of(run: NetworkRun, seed: int) -> Training:
