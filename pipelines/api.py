@@ -60,7 +60,7 @@ class Evaluation(_Printed):
                al. 2024), RMSE of surge and sway [m/s] and yaw rate [rad/s], and how far off the end
                is [m], [deg]
     rollouts   one row per run, seed, voyage, window and second: time [s], the simulated
-               state (m, m/s, rad, rad/s) and the error d of Eq. 6
+               state (m, m/s, rad, rad/s) and the error d of Eq. 5
     coverage   one row per window: share of its seconds inside the training data
     """
 

@@ -29,7 +29,7 @@ def network(shape, data, seed=0):
 
 
 def by_autograd(model, data):
-    """Eqs. 6, 8 and 9 word by word, with velocities only."""
+    """Eqs. 5, 8 and 9 word by word, with velocities only."""
     driven = driven_by(data, model.shape.wind_input)
     measured, dt = torch.from_numpy(data.velocity), torch.from_numpy(data.dt)
     velocity, errors = measured[:, 0], []

@@ -36,7 +36,7 @@ class ComparisonData:
 
     measured    voyage, time [s from the voyage's start], the six states, one column per
                 actuator, wind_speed and wind_angle if `has_wind`
-    simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 6]; of a model
+    simulated   model (label), seed, voyage, window, time, the six states, d [Eq. 5]; of a model
                 that knows its doubt also each state with _low and _high, the 90 % band
     training    what a model was trained on: the channels of `measured`
     trained     which model that is, where there are several

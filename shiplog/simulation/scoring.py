@@ -22,14 +22,14 @@ ERRORS = ("loss", "rmse_surge", "rmse_sway", "rmse_yaw_rate", "end_position_m", 
 
 
 def weighted_squares(error: np.ndarray) -> np.ndarray:
-    """What surge, sway and yaw rate (in deg/s) add to d of Eq. 6: [..., 3]."""
+    """What surge, sway and yaw rate (in deg/s) add to d of Eq. 5: [..., 3]."""
     with np.errstate(over="ignore", invalid="ignore"):
         velocity = error[..., list(channels.VELOCITY_IN_STATE)]
         return (velocity * np.array(channels.VELOCITY_WEIGHTS)) ** 2
 
 
 def prediction_error(error: np.ndarray) -> np.ndarray:
-    """d of Eq. 6 [N, I]; infinite where the rollout has diverged."""
+    """d of Eq. 5 [N, I]; infinite where the rollout has diverged."""
     with np.errstate(over="ignore"):
         d = weighted_squares(error).sum(-1)
     return np.where(np.isfinite(d), d, np.inf)

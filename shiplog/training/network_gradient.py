@@ -256,7 +256,7 @@ def adam(
     weights    and `gradients` of the same shapes, in one type
     moments    first moments of all weights, then second ones; zero before the first step
     step       counts from 1
-    decay      times the weight is added to its gradient: 2λ for the regulariser λ‖θ‖² of Eq. 7
+    decay      times the weight is added to its gradient: 2λ for the regulariser λ‖θ‖² of Eq. 6
     """
     means, squares = list(moments[: len(weights)]), list(moments[len(weights) :])
     level = kernel.level() if weights[0].device.type == "cpu" else None

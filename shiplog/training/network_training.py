@@ -57,7 +57,7 @@ def paper(
 
     Stops once more than `least_epochs` are done and L > rise · (L_init - L_min) + L_min on the
     validation windows (Eq. 24). The weights to keep are `best_weights` (smallest L, not smoothed).
-    The regulariser λ‖θ‖² of Eq. 7 has the gradient 2λθ, which is Adam's `weight_decay`.
+    The regulariser λ‖θ‖² of Eq. 6 has the gradient 2λθ, which is Adam's `weight_decay`.
 
     checkpoint  is called every so many epochs with where it stands, `resume` of a later call
     pause       return after so many epochs, finished or not

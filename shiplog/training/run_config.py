@@ -24,7 +24,7 @@ class Paper(Section):
     """Table 5 and Sec. 4.3 of the paper."""
 
     learning_rate: float = Field(default=1e-4, gt=0)
-    regularisation: float = Field(default=1e-2, ge=0)  # λ of Eq. 7, on all parameters
+    regularisation: float = Field(default=1e-2, ge=0)  # λ of Eq. 6, on all parameters
     subsets: int = Field(default=3, gt=0)
     smoothing: float = Field(default=0.1, gt=0, le=1)  # α of Eq. 23
     least_epochs: int = Field(default=10_000, ge=0)

@@ -20,7 +20,7 @@ LEGEND = """
   the 90 % band of its bold line instead, except for d.
 - Hulls are to scale. The earth axes are x₀ north and y₀ east, the wind's angle is where it blows
   from, clockwise from the bow.
-- d is the error of Eq. 6; histograms and d are drawn as log10(1 + value).
+- d is the error of Eq. 5; histograms and d are drawn as log10(1 + value).
 """
 FORCES = """- Forces are what {model} says each part exerts, along the measured voyage: surge
   positive ahead, sway to starboard, yaw bow to starboard. The wide dark line is their total.
