@@ -111,7 +111,7 @@ class Hybrid:
         return (z - self.residual.mean) / self.residual.std
 
     def fade(self, z: Array) -> Array:
-        """1 within the training data, 0 from REACH limits beyond them on; smooth between."""
+        """1 within the training data, 0 from FADE_LIMITS limits beyond them on; smooth between."""
         net = self.residual
         square = ((z[..., None, :] - net.anchors) ** 2).sum(-1).min(-1)
         beyond = jnp.sqrt(jnp.maximum(square, 1e-12)) - net.radius

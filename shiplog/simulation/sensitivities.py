@@ -161,8 +161,8 @@ def rollout(model: Physical, theta: np.ndarray, data: WindowSeries) -> np.ndarra
 
 
 def padded(data: WindowSeries) -> WindowSeries:
-    """Filled up with windows of weight 0 to the next power of two (multiples of CHUNK above):
-    a shape that has been compiled once serves every selection of voyages."""
+    """Filled up with windows of weight 0 to the next power of two, and above WINDOWS_AT_A_TIME to
+    a multiple of that: a shape that has been compiled once serves every selection of voyages."""
     count = len(data.measured)
     size = (
         -(-count // WINDOWS_AT_A_TIME) * WINDOWS_AT_A_TIME
@@ -277,7 +277,7 @@ class Normal:
 def normal(
     model: Physical, theta: np.ndarray, data: WindowSeries, free: tuple[int, ...] | None = None
 ) -> Normal:
-    """Loss, gradient and Gauss-Newton matrix in flat memory, CHUNK windows at a time.
+    """Loss, gradient and Gauss-Newton matrix in flat memory: WINDOWS_AT_A_TIME windows at once.
 
     free   indices of the parameters wanted; then P is their number
     """
