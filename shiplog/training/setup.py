@@ -92,7 +92,7 @@ def prepare(
     model = _stable(model, start.values, data)
     return Prepared(
         model, start, data, voyages, [first[v] for v in voyages],
-        _free(config.physics.free, start.names), unseen,
+        _free(config.physics.free, start), unseen,
     )  # fmt: skip
 
 
@@ -125,8 +125,10 @@ def _stable(model: Any, values: np.ndarray, data: WindowSeries) -> Any:
     return model  # the identification says what is wrong
 
 
-def _free(patterns: Sequence[str], names: tuple[str, ...]) -> np.ndarray:
-    """Which parameters may move. Raises RunError for a pattern that none has."""
+def _free(patterns: Sequence[str], start: Parameters) -> np.ndarray:
+    """Which parameters may move. Raises RunError for a pattern that none has, and where the ridge
+    lets none of them move."""
+    names = start.names
     if not patterns:
         return np.ones(len(names), dtype=bool)
     for pattern in patterns:
@@ -135,4 +137,12 @@ def _free(patterns: Sequence[str], names: tuple[str, ...]) -> np.ndarray:
                 f"No parameter is called {pattern!r}{nearest(pattern, names)}.",
                 hint=f"--free takes names or patterns such as 'wind.*': {listed(names, most=99)}.",
             )
-    return np.array([any(fnmatch.fnmatch(n, p) for p in patterns) for n in names])
+    free = np.array([any(fnmatch.fnmatch(n, p) for p in patterns) for n in names])
+    if not start.spread[free].any():
+        chosen = [name for name, one in zip(names, free, strict=True) if one]
+        raise RunError(
+            f"No parameter can move: the plausible spread of {listed(chosen, most=8)} is a share "
+            "of the starting value, and that is 0.",
+            hint="start from another value with --parameters, or choose others with --free.",
+        )
+    return free

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from shiplog.exceptions import RunError
+from shiplog.models.coefficients import ParameterEntry, parameters
 from shiplog.training import setup
 from shiplog.training.cross_validation import finite_mean
 from shiplog.training.held_out import _sentence
@@ -18,6 +21,24 @@ def test_the_sentence_counts_what_may_move():
     rest = "of 3 parameters free, 4 windows, starting values from a file"
     assert ready.sentence(fit=True) == f"2 {rest}"
     assert ready.sentence(fit=False) == f"0 {rest}"
+
+
+def test_a_parameter_that_cannot_move_is_not_identified_alone():
+    """A thruster that only pushes ahead: its spread is its thrust, which is 0 astern."""
+    thrust, loss = (ParameterEntry("T", "", share, least, 0.0, 1e7, unit="N")
+                    for share, least in ((1.0, 0.0), (0.0, 0.5)))  # fmt: skip
+    wanted = {
+        "thruster.bow_ahead": thrust,
+        "thruster.bow_astern": thrust,
+        "thruster.bow_loss": loss,
+    }
+    given = {"thruster": {"bow_ahead": 40.0, "bow_astern": 0.0, "bow_loss": 0.0}}
+    start = parameters(wanted, given, "a file")
+    for patterns, free in (((), [True] * 3), (("*ahead",), [True, False, False]),
+                           (("*_loss", "*astern"), [False, True, True])):  # fmt: skip
+        assert setup._free(patterns, start).tolist() == free
+    with pytest.raises(RunError, match=r"the plausible spread of thruster\.bow_astern is a share"):
+        setup._free(("*astern",), start)
 
 
 def test_a_loss_that_is_huge_but_finite_is_no_stable_start(monkeypatch):
