@@ -20,7 +20,11 @@ from shiplog.simulation import baselines, prediction_interval, scoring
 from shiplog.simulation import coverage as covering
 from shiplog.training import load_model
 from shiplog.training.load_model import Run
-from shiplog.training.run_checks import refuse_other_columns, refuse_other_window
+from shiplog.training.run_checks import (
+    refuse_no_window,
+    refuse_other_columns,
+    refuse_other_window,
+)
 from shiplog.training.voyages_to_test import held_back, say_twins
 from shiplog.unexpected import unexpected
 from shiplog.voyages import windows
@@ -55,6 +59,7 @@ def evaluate_runs(
         say_twins(run, rows)
     size = first.config.window
     planned = plan(rows, "ref", size)
+    refuse_no_window(first, names, planned)
     cut = windows.cut(rows, planned, size, profile.actuator_names, profile.wind_names)
     numbered = _numbered(cut)
     reach("simulating")

@@ -3,12 +3,12 @@ with."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sized
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
 
 import polars as pl
 
-from shiplog.exceptions import RunError, listed
+from shiplog.exceptions import RunError, WindowError, listed
 from shiplog.profile import Profile
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
@@ -43,6 +43,17 @@ def refuse_other_window(first: RunFolder, other: RunFolder) -> None:
             f"{first.name} has windows of {first.config.window} s, {other.name} of "
             f"{other.config.window} s.",
             hint="compare runs with the same window.",
+        )
+
+
+def refuse_no_window(run: RunFolder, names: Sequence[str], planned: Sized) -> None:
+    """Raises WindowError where no window of a run was planned in these voyages."""
+    if not len(planned):
+        size = run.config.window
+        raise WindowError(
+            f"{run.name} has windows of {size} s, and there are no {size} s without a gap in "
+            f"{listed(names, most=8)}.",
+            hint="choose longer voyages with --voyages, or train a run with a shorter --window.",
         )
 
 

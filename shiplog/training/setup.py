@@ -77,7 +77,6 @@ def prepare(
         start = _as_known(start, known, config.physics.parameters)
     names = (profile.actuator_names, profile.wind_names)
     cut = windows.cut(learnt, planned, config.window, *names)
-    _refuse_none(planned, config.window, config.split.training)
     unseen = None
     if held.height:
         whole = plan(held, "ref", config.window)

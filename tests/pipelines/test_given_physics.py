@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from safetensors.numpy import load_file, save_file
 from short_voyages import BOTH, HULL, STATES, WINDOW, scored, train
 
 import shiplog
+from pipelines.experiments import simulated_ship
 from shiplog.exceptions import RunError
 from shiplog.models.causes import CATALOGUE, user
 from shiplog.training import extension_file, load_model
@@ -196,6 +198,23 @@ def test_a_window_longer_than_every_voyage_is_refused(store, tmp_path):
                          "--window", 400, *BOTH, *HULL)  # fmt: skip
     assert code == 1 and "longer than every" in reported
     assert not list(tmp_path.iterdir())
+
+
+def test_voyages_shorter_than_a_runs_window_are_refused_with_what_can_be_done(published, tmp_path):
+    """A run's window is chosen when it is trained: `evaluate` has no --window."""
+    logs, store = tmp_path / "logs", tmp_path / "store"
+    logs.mkdir()
+    voyage = simulated_ship.sail(15.0, seed=5, wind=simulated_ship.Wind(3.0, 5))
+    simulated_ship.write_voyage(
+        logs / "brief.mcap", voyage, seed=5, start=datetime(2026, 5, 2, tzinfo=UTC)
+    )
+    assert call("ingest", logs, "--store", store)[0] == 0
+    for command in ("evaluate", "compare"):
+        code, _, reported = call(command, published[0], "--store", store, "--voyages", "brief")
+        assert code == 1 and reported == (
+            "published has windows of 25 s, and there are no 25 s without a gap in brief.\n"
+            "  choose longer voyages with --voyages, or train a run with a shorter --window."
+        )
 
 
 def test_a_hybrid_has_to_be_fitted(store, tmp_path):
