@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from shiplog.exceptions import RunError
+from shiplog.frames import wrap
 from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.models.extended import Extended
 from shiplog.profile import Profile
@@ -57,7 +58,7 @@ class ExtendedSimulator:
         for cause in self.model.causes:
             was = cause.read(was, numbers[cause.label])
         shape = windows.state.shape
-        driven = np.concatenate((was.actuator, was.share[:, None]), 1)
+        driven = np.concatenate((_acted(was, recorded, windows), was.share[:, None]), 1)
         data = WindowSeries(
             was.state.reshape(shape),
             driven.reshape(*shape[:2], -1),
@@ -215,8 +216,12 @@ def split(causes: Sequence[Cause], numbers: np.ndarray) -> dict[str, np.ndarray]
 def as_record(
     windows: Windows, profile: Profile, shares: Shares, lengths: Mapping[str, float]
 ) -> Record:
-    """Windows end to end as stretches of a record, a row a sample."""
+    """Windows end to end as stretches of a record, a row a sample; an azimuth that passes ±180 deg
+    counts on."""
     count, size, _ = windows.state.shape
+    actuator = windows.actuator.copy()
+    turning = _circular(profile)
+    actuator[..., turning] = np.unwrap(actuator[..., turning], axis=1)
     starts = np.zeros((count, size), dtype=bool)
     starts[:, 0] = True
     wind = np.zeros((count, size, 2))
@@ -243,10 +248,24 @@ def as_record(
         starts=starts.reshape(rows),
         measured=np.ones(rows, dtype=bool),
         state=windows.state.reshape(rows, 6),
-        actuator=windows.actuator.reshape(rows, -1),
+        actuator=actuator.reshape(rows, -1),
         wind=wind.reshape(rows, 2),
         step=float(np.median(windows.dt)),
     )
+
+
+def _acted(was: Record, recorded: Record, windows: Windows) -> np.ndarray:
+    """Actuators [n, A] as they acted, azimuths in (-π, π] as the windows have them."""
+    if was.actuator is recorded.actuator:  # no cause is about them
+        return windows.actuator.reshape(was.actuator.shape)
+    acted, turning = was.actuator.copy(), _circular(was.profile)
+    acted[:, turning] = wrap(acted[:, turning])
+    return acted
+
+
+def _circular(profile: Profile) -> list[int]:
+    """Columns of the actuators that turn through ±180 deg."""
+    return [i for i, one in enumerate(profile.actuators) if one.circular]
 
 
 def campaign(record: Record) -> tuple[dict[str, tuple[float, float]], dict[str, float]]:

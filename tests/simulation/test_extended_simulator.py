@@ -1,9 +1,66 @@
 """Runs that were extended by causes."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
 import numpy as np
+import polars as pl
 import pytest
 
-from shiplog.simulation.extended_simulator import Extension
+from shiplog import frames
+from shiplog import profile_file as profiles
+from shiplog.models import mmg
+from shiplog.models.causes.ship import RudderDelay, RudderLag
+from shiplog.models.extended import Extended
+from shiplog.simulation.extended_simulator import ExtendedSimulator, Extension
+from shiplog.voyages.windows import Windows
+
+FERRY = profiles.load("milliampere")  # steered by azimuths
+
+
+@jax.tree_util.register_static
+@dataclass(frozen=True)
+class Repeating:
+    """u̇ is the angle of the first azimuth, whichever turn it is in."""
+
+    substeps: int = 1
+    smooth: float = 0.0
+    names: ClassVar = ()
+
+    def acceleration(self, theta, state, actuator, true_wind):
+        nothing = jnp.zeros_like(actuator[..., 0])
+        return jnp.stack((actuator[..., 0], nothing, nothing), -1)
+
+
+def acted(causes, numbers, recorded: np.ndarray) -> np.ndarray:
+    """The angles that a model with these causes is driven by, second by second."""
+    count = len(recorded)
+    actuator = np.zeros((1, count, len(FERRY.actuators)))
+    actuator[0, :, 0] = recorded
+    plan = pl.DataFrame({"voyage": ["a"], "elapsed": [0.0]})
+    cut = Windows(plan, np.zeros((1, count, 6)), actuator, np.zeros((1, count, 0)),
+                  np.ones((1, count - 1)))  # fmt: skip
+    ship, main, _ = mmg.geometry_of(FERRY)
+    model = Extended(Repeating(), causes, mmg.MMG(ship), mmg.estimated(ship, main).values, {})
+    theta = np.array(numbers)
+    simulator = ExtendedSimulator(model, theta, np.zeros((len(theta),) * 2), FERRY)
+    return np.diff(simulator.simulate(cut)[0, :, 1])
+
+
+def test_an_azimuth_that_passes_180_degrees_does_not_swing_round_the_other_way():
+    """It turns by 0.02 rad/s. A delay of 1.5 s is 0.03 rad; a lag of T behind a ramp is
+    0.02 T (1 - exp(-t/T)), from balance at the begin."""
+    time = np.arange(60.0)
+    turned = np.pi - 0.3 + 0.02 * time
+    recorded = frames.wrap(turned)
+    assert acted((), (), recorded) == pytest.approx(recorded[:-1], abs=1e-12)
+    late = acted((RudderDelay(what="azimuths"),), (1.5,), recorded)
+    assert late[2:] == pytest.approx(frames.wrap(turned - 0.03)[2:-1], abs=1e-9)
+    behind = 0.02 * 2.0 * (1.0 - np.exp(-time / 2.0))
+    slow = acted((RudderLag(what="azimuths"),), (2.0,), recorded)
+    assert slow == pytest.approx(frames.wrap(turned - behind)[:-1], abs=1e-9)
 
 
 def test_numbers_that_a_cause_did_not_have_when_a_run_was_extended_change_nothing():
