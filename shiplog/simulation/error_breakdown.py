@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 
 from shiplog import channels
+from shiplog.frames import wrap
 from shiplog.profile import Profile
 from shiplog.simulation.scoring import loss_shares
 from shiplog.simulation.sensitivities import VELOCITY_COLUMNS, WindowSeries, apparent_wind
@@ -211,7 +212,7 @@ def _controls(data: WindowSeries, profile: Profile) -> Iterator[Regime]:
         back = max(1, round(RECENT / float(np.median(data.dt))))
         values = data.actuator[..., angles]
         before = np.concatenate((np.repeat(values[:, :1], back, axis=1), values), 1)
-        change = np.abs(values - before[:, : values.shape[1]])
+        change = np.abs(wrap(values - before[:, : values.shape[1]]))
         moved = (change > 0.25 * np.maximum(values.std((0, 1)), 1e-9)).any(-1)
         yield "angle", f"{name} moving", moved
         yield "angle", f"{name} still", ~moved

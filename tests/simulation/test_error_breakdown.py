@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from shiplog import profile_file as profiles
 from shiplog.simulation import error_breakdown
 from shiplog.simulation.scoring import window_loss
 from shiplog.simulation.sensitivities import WindowSeries
@@ -104,6 +105,23 @@ def test_where_it_is_wrong_is_reported(driven, regime, words):
     assert worst.occurs < 0.4
     others = {c.channel: c.where for c in found.channels[1:]}
     assert others == {"surge": "everywhere alike", "sway": "everywhere alike"}
+
+
+def test_an_azimuth_that_is_held_astern_is_not_moving(driven):
+    """It passes 180 deg to and fro by a tenth of a degree, in a third of the time."""
+    ferry = profiles.load("milliampere")
+    data, windows = driven
+    steps = np.random.default_rng(8).uniform(size=(COUNT, SIZE // 20)) < 1 / 3
+    astern = np.repeat(steps, 20, axis=1)
+    trembling = np.pi * np.where(np.arange(SIZE) // 2 % 2, 0.999, -0.999)
+    actuator = np.full((COUNT, SIZE, len(ferry.actuators)), 0.5)
+    actuator[..., 0] = np.where(astern, trembling, 0.0)
+    error = little(data)
+    error[..., 5] = np.where(astern, np.radians(0.5), error[..., 5])
+    data = data._replace(actuator=actuator)
+    found = error_breakdown.explain(error, data, windows, ferry)
+    assert found.channels[0].channel == "yaw_rate" and found.channels[0].share > 0.99
+    assert "moving" not in found.channels[0].where
 
 
 def test_two_conditions_are_reported_where_both_are_needed(driven):
