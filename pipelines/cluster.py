@@ -22,18 +22,19 @@ log = logging.getLogger(__name__)
 def resample(
     paths: Sequence[Path], columns: Sequence[str], circular: Sequence[str], out: Path, address: str
 ) -> list[Path]:
-    """10 Hz rows to 1 Hz rows, a task a voyage: a folder of Parquet in `out` for each of `paths`.
+    """10 Hz rows to 1 Hz rows, a task a voyage: a folder of Parquet in `out` for each of `paths`,
+    numbered as they are. Returns these folders.
 
-    paths   a Parquet file of 10 Hz rows for each voyage; both they and `out` on a disk that all
-            nodes share
+    paths   a Parquet file of 10 Hz rows for each voyage, such as the store's `table.parquet`; both
+            they and `out` on a disk that all nodes share
 
     Raises ShiplogError without Ray or a cluster.
     """
     ray = cluster.connected(address)
     one = ray.remote(num_cpus=1, max_retries=-1)(_resample_one)
     try:
-        tasks = [one.remote(path, tuple(columns), tuple(circular), out / path.stem)
-                 for path in paths]  # fmt: skip
+        tasks = [one.remote(path, tuple(columns), tuple(circular), out / f"{number:06d}")
+                 for number, path in enumerate(paths)]  # fmt: skip
         return ray.get(tasks)
     finally:
         ray.shutdown()
