@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog.models.azimuths import within_a_turn
 from shiplog.models.mmg.wind import apparent
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ KERNEL_WIDTH = 2.0  # no voyage covers all combinations of many inputs: data of 
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=["weights", "mean", "std", "out_mean", "out_std", "frequency", "phase", "bent"],
-    meta_fields=["wind", "components", "input_tanh"],
+    meta_fields=["wind", "components", "input_tanh", "turning"],
 )
 @dataclass(frozen=True)
 class Network:
@@ -37,6 +38,7 @@ class Network:
     weights     (W₁, b₁, W₂, b₂, ...), each W [out, in], in the precision it was trained in
     frequency   [inputs, F] and phase [F] of φ on the standardised inputs
     bent        [F, 3] weights w of φ in m/s² and rad/s²; None for the network as it was trained
+    turning     columns of the actuators that are azimuths
     """
 
     weights: tuple
@@ -50,6 +52,7 @@ class Network:
     components: bool
     input_tanh: bool
     bent: np.ndarray | Array | None = None
+    turning: tuple[int, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -95,7 +98,7 @@ class Network:
 
     def _inputs(self, state, actuator, true_wind, components: bool) -> Array:
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
-        parts = [u[..., None], v[..., None], r[..., None], actuator]
+        parts = [u[..., None], v[..., None], r[..., None], within_a_turn(actuator, self.turning)]
         if self.wind:
             ahead, starboard = apparent(true_wind, heading, u, v)
             if components:
@@ -121,8 +124,8 @@ class Network:
         return jnp.concatenate((values[:-2], jnp.full(2, wind)))
 
 
-def compiled(model: FeedForward, seed: int = 0) -> Network:
-    """A trained network."""
+def compiled(model: FeedForward, turning: tuple[int, ...] = (), seed: int = 0) -> Network:
+    """A trained network; `turning` are the columns of the actuators that are azimuths."""
     shape, scale = model.shape, model.scaling
     rng = np.random.default_rng([seed, 77])
     inputs = shape.inputs
@@ -138,4 +141,5 @@ def compiled(model: FeedForward, seed: int = 0) -> Network:
         wind=shape.wind,
         components=shape.wind_input == "components",
         input_tanh=shape.input_tanh,
+        turning=turning,
     )

@@ -15,6 +15,7 @@ import numpy as np
 from jax import Array
 
 from shiplog.models import mmg
+from shiplog.models.azimuths import within_a_turn
 from shiplog.models.mmg import body
 from shiplog.models.mmg.model import MMG
 from shiplog.models.mmg.wind import apparent
@@ -103,6 +104,8 @@ class Hybrid:
     def features(self, state: Array, actuator: Array, true_wind: Array) -> Array:
         """z [..., Z], standardised."""
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
+        azimuths = {unit.turned_by for unit in self.physics.geometry.thrusters} - {None}
+        actuator = within_a_turn(actuator, sorted(azimuths))
         parts = [u[..., None], v[..., None], r[..., None], actuator]
         if self.physics.geometry.wind:
             wind = apparent(true_wind, heading, u, v)

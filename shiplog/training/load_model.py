@@ -196,7 +196,9 @@ class NetworkRun(Run):
         return None
 
     def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
-        return compiled_network.compiled(self.simulator(seed)), np.zeros(0), np.zeros((0, 0))
+        azimuths = tuple(i for i, one in enumerate(self.profile.actuators) if one.circular)
+        model = compiled_network.compiled(self.simulator(seed), azimuths)
+        return model, np.zeros(0), np.zeros((0, 0))
 
     def _plain_base(self) -> Base:
         none = np.zeros(0)

@@ -44,9 +44,12 @@ def trained(hybrid, theta) -> np.ndarray:
 
 
 def away(data: WindowSeries) -> WindowSeries:
-    """The same windows, the azimuth turned once more: where no training second was, the same
-    thrust to the physics."""
-    return data._replace(actuator=data.actuator + np.array([2.0 * math.pi, 0.0]))
+    """The same windows with the azimuth half round: where no training second was."""
+    return turned(data, math.pi)
+
+
+def turned(data: WindowSeries, angle: float) -> WindowSeries:
+    return data._replace(actuator=data.actuator + np.array([angle, 0.0]))
 
 
 # ---------------------------------------------------------------- what it adds
@@ -139,6 +142,14 @@ def test_far_away_it_is_the_physics_to_the_last_digit(hybrid, physics, trained, 
 
 
 # ---------------------------------------------------------------- what it sees
+
+
+def test_an_azimuth_that_has_turned_round_stands_where_it_stood(hybrid, trained, data):
+    """A record counts on past 180 deg; a training second has it between -180 and 180."""
+    once = np.asarray(hybrid.added(trained, *flat(data)))
+    again = np.asarray(hybrid.added(trained, *flat(turned(data, -4.0 * math.pi))))
+    assert np.abs(once).max() > 1e-3
+    assert again == pytest.approx(once, rel=1e-9, abs=1e-12)
 
 
 def table(data: WindowSeries) -> pl.DataFrame:
