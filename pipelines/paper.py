@@ -113,7 +113,7 @@ def paper_command(
 def choose_voyages(
     store: Store, voyages: Sequence[str], validation: Sequence[str], size: int
 ) -> Voyages:
-    """As in the paper's Table 4 where there are six voyages; else the training voyages are halved
+    """As in the paper's Table 3 where there are six voyages; else the training voyages are halved
     in time, and the reference set has the first half. Where the user names those that validate,
     all that are not used otherwise test. Raises StoreError without a test voyage."""
     whole = choose_split(store, voyages, validation, "d-ref", size)

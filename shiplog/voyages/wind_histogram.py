@@ -1,4 +1,4 @@
-"""How often the apparent wind was how strong and from where, in the bins of the paper's Fig. 7."""
+"""How often the apparent wind was how strong and from where, in the bins of the paper's Fig. 4."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Windows by the paper's equations: counts of Table 4, tracing, noise, and no window over a gap."""
+"""Windows by the paper's equations: counts of Table 3, tracing, noise, and no window over a gap."""
 
 from datetime import UTC, datetime, timedelta
 

@@ -25,7 +25,7 @@ LABELS = {c.name: c.label for c in channels.VELOCITY} | {"d": "error d"}
 
 
 def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
-    """Fig. 6: how often each velocity and actuator was where, in each set.
+    """Fig. 3: how often each velocity and actuator was where, in each set.
 
     table   as sets.histograms gives it
     units   of the channels
@@ -52,7 +52,7 @@ def histograms(table: pl.DataFrame, units: dict[str, str], path: Path) -> None:
 
 
 def wind(table: pl.DataFrame, path: Path) -> None:
-    """Fig. 7: the apparent wind of each set, table as sets.wind gives it."""
+    """Fig. 4: the apparent wind of each set, table as sets.wind gives it."""
     from matplotlib.colors import LogNorm
 
     sets = table["set"].unique(maintain_order=True).to_list()
@@ -78,7 +78,7 @@ def wind(table: pl.DataFrame, path: Path) -> None:
 
 
 def validation(histories: pl.DataFrame, path: Path) -> None:
-    """Fig. 8: smoothed validation losses (Eq. 23) against epochs, every training.
+    """Fig. 5: smoothed validation losses (Eq. 23) against epochs, every training.
 
     histories   set, seed, epoch, smoothed
     """
@@ -104,7 +104,7 @@ def validation(histories: pl.DataFrame, path: Path) -> None:
 
 
 def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
-    """Fig. 9: L of the test windows, every seed's point and the mean.
+    """Fig. 6: L of the test windows, every seed's point and the mean.
 
     losses      set, seed, loss
     baselines   name → L
@@ -129,7 +129,7 @@ def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
 
 
 def inputs(rows: pl.DataFrame, units: dict[str, str], path: Path) -> None:
-    """Fig. 10: actuators and apparent wind of a test voyage.
+    """Fig. 7: actuators and apparent wind of a test voyage.
 
     rows    elapsed [s], the channels of `units`, angles in rad
     """
@@ -148,7 +148,7 @@ def inputs(rows: pl.DataFrame, units: dict[str, str], path: Path) -> None:
 
 
 def states(rollouts: pl.DataFrame, measured: pl.DataFrame, pair: Sequence[str], path: Path) -> None:
-    """Figs. 11 to 14: velocities and the error d of two sets along a test voyage.
+    """Figs. 8 to 11: velocities and the error d of two sets along a test voyage.
 
     rollouts   set, seed, window, time [s], surge, sway, yaw_rate [rad/s], d
     measured   elapsed [s] and the velocities

@@ -1,4 +1,4 @@
-"""The eight window sets as tables: their sizes (Table 4), what their data cover (Figs. 6, 7)."""
+"""The eight window sets as tables: their sizes (Table 3), what their data cover (Figs. 3, 4)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HISTOGRAM_BINS = 30  # of a histogram of one channel
 def sizes(
     plans: Mapping[str, pl.DataFrame], voyages: Mapping[str, Sequence[str]], size: int
 ) -> pl.DataFrame:
-    """set, voyages, step and copies of Table 4, windows, samples: one row a set.
+    """set, voyages, step and copies of Table 3, windows, samples: one row a set.
 
     plans    the planned windows of each set, a row a window
     voyages  which each set is cut from
