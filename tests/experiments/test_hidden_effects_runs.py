@@ -321,6 +321,20 @@ def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path
     ).read_bytes()
 
 
+def test_a_case_that_could_not_be_made_is_packed_without_a_key(tmp_path, stubs):
+    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
+    planned = plan.save(out, suites.plan("nightly", 5, 2))
+    run.run(out, replace(planned, cases=planned.cases[:1]), stubs())
+    settings = stubs()
+    (tmp_path / "case.py").write_text("raise SystemExit(1)")
+    run.run(out, planned, settings)
+    archive.pack([out], packed)
+    with archive.opened([packed]) as folders:
+        found = score.read(folders[0])
+    assert [one.label for one in found.unmade] == ["6"]
+    assert [one.planned.label for one in found.answers] == ["5"]
+
+
 def test_packed_answers_hold_no_path_of_the_machine(tmp_path, stubs):
     out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(called="another program"))

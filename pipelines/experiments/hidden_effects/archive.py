@@ -67,13 +67,19 @@ def _elsewhere(test: Path, file: Path) -> bytes:
 
 
 def _contents(test: Path) -> list[Path]:
-    """The plan, and of each sealed case its key and answers."""
+    """The plan, and of each sealed case its key and answers; a case whose logs could not be written
+    has no key."""
     sealed = sorted(seal.parent for seal in (test / "cases").glob("*/verdict.sha256"))
-    keys = [test / "keys" / f"{case.name}.json" for case in sealed]
+    keys = [test / "keys" / f"{case.name}.json" for case in sealed if _made(case)]
     return [
         test / "keys" / "plan.json", *keys,
         *(case / name for case in sealed for name in KEPT if (case / name).exists()),
     ]  # fmt: skip
+
+
+def _made(case: Path) -> bool:
+    """Whether the simulator wrote logs and key."""
+    return json.loads((case / "steps.json").read_text(encoding="utf-8"))[0]["rc"] == 0
 
 
 @contextmanager
