@@ -20,6 +20,8 @@ from typing import ParamSpec, TypeVar
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from shiplog.report.numbers import counted
+
 log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
@@ -41,7 +43,7 @@ class Bars:
         self._progress: Progress | None = None
         if costs and drawable():
             self._progress = _columns()
-            self._all = self._progress.add_task(f"{len(costs)} trainings", total=1.0)
+            self._all = self._progress.add_task(counted(len(costs), "training"), total=1.0)
 
     def __enter__(self) -> Bars:
         if self._progress is not None:

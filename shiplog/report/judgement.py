@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
+from shiplog.report.numbers import counted
 from shiplog.simulation import error_reduction
 
 FEWEST_WINDOWS = 6  # windows, fewer of which give no interval: three blocks of two are drawn from
@@ -67,9 +68,9 @@ class Judgement:
 
     @property
     def sentence(self) -> str:
-        found = f"{self.run}, on {self.windows} windows of {self.seconds} s"
+        found = f"{self.run}, on {counted(self.windows, 'window')} of {self.seconds} s"
         if self.lost == self.windows:
-            return f"{found}: every one of them diverged."
+            return f"{found}: {'it' if self.windows == 1 else 'every one of them'} diverged."
         parts = [one.sentence for one in self.against]
         found = f"{found}: {'; '.join(parts)}." if parts else f"{found}."
         if self.windows - self.lost < FEWEST_WINDOWS:

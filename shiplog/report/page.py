@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
+from shiplog.report.numbers import counted
 from shiplog.report.verdict import HOPELESS, WHICH, Verdict
 from shiplog.report.verdict_sentence import less
 
@@ -68,8 +69,8 @@ def _gain(verdict: Verdict) -> list[str]:
     return [
         "## Gain on held-out windows", "",
         f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
-        f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
-        f"fitted without {verdict.without}).", "",
+        f"({less(g.low)} to {less(g.high)}, {counted(g.windows, 'window')}, each predicted with "
+        f"numbers fitted without {verdict.without}).", "",
         "By channel: " + ", ".join(channels) + ".", "",
     ]  # fmt: skip
 

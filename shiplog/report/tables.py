@@ -12,6 +12,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
+from shiplog.report.numbers import counted
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
@@ -26,12 +27,12 @@ COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "
 def voyage_lines(report: VoyageReport) -> list[str]:
     """What one log's health is, in a few lines: at most a screen."""
     lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
-    head = f"{report.name}: {report.messages_read} messages read, {lost} lost; "
+    head = f"{report.name}: {counted(report.messages_read, 'message')} read, {lost} lost; "
     if report.usable_s is None:
         return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
     head += (
         f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
-        f"{report.windows} {'window' if report.windows == 1 else 'windows'} of {WINDOW} s"
+        f"{counted(report.windows, 'window')} of {WINDOW} s"
     )
     return [head, *_instruments(report.instruments), *_findings(report.findings)]
 
@@ -75,7 +76,7 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
             lines.append(f"  {kind}: {channel}, {len(group)} times; most: {largest.sentence}")
     left = len(lines) - MOST_FINDINGS
     if left > 0:
-        lines = [*lines[:MOST_FINDINGS], f"  and {left} more lines."]
+        lines = [*lines[:MOST_FINDINGS], f"  and {counted(left, 'more line')}."]
     if any(len(group) > MOST_ALIKE for group in groups.values()) or left > 0:
         lines.append("  all of them, one by one, with --json.")
     return lines

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.result import EXPLAIN_MORE, PATTERN, REFUTED, SIDE_THRUST
 from shiplog.exceptions import listed
+from shiplog.report.numbers import counted
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
@@ -79,14 +80,15 @@ def _named(
     text = " ".join(_likely(cause) for cause in causes)
     if gain is None:
         return text
+    windows = counted(gain.windows, "held-out window")
     if gain.real:
         share = (
-            f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
+            f"{gain.reduction:.0%} of the error on {windows} is "
             f"explained ({gain.low:.0%} to {gain.high:.0%})."
         )
     else:
         share = (
-            f"No significant part of the error on {gain.windows} held-out windows is explained: "
+            f"No significant part of the error on {windows} is explained: "
             f"it is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
         )
     text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)

@@ -65,6 +65,13 @@ def test_windows_that_ran_away_are_counted_and_left_out():
     assert found.against[0].share == pytest.approx(0.5)
 
 
+def test_one_window_is_one_window():
+    one = judge("ref", errors([1.0]), {"hold": np.full(1, 2.0)}, 3.0, 100)
+    assert one.sentence.startswith("ref, on 1 window of 100 s: 0.5 of the L of holding")
+    lost = judge("ref", errors([math.inf]), {"hold": np.full(1, 2.0)}, 3.0, 100)
+    assert lost.sentence == "ref, on 1 window of 100 s: it diverged."
+
+
 @pytest.mark.parametrize("count", [1, FEWEST_WINDOWS - 1, FEWEST_WINDOWS])
 def test_of_too_few_windows_there_is_no_interval(count):
     found = judge("ref", errors([1.0] * count), {"hold": np.full(count, 2.0)}, 3.0, 20)

@@ -26,6 +26,13 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
+def test_one_window_is_one_window():
+    lag = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 0.9}
+    for after, low, high in ((400.0, 0.1, 0.3), (500.0, -0.1, 0.1)):
+        output = sentence("named", [lag], None, Gain(500.0, after, low, high, 1, {}), 1.0)
+        assert "of the error on 1 held-out window is explained" in output
+
+
 def test_one_of_several_causes_that_acts_in_addition_is_in_the_sentence():
     sure = {
         "sentence": "The clock is late.", "name": "clock_offset", "probability": 1.0,
