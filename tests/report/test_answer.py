@@ -36,6 +36,20 @@ def test_each_unit_and_channel_has_a_row_of_its_own():
     ]  # fmt: skip
 
 
+def test_sizes_of_a_large_ship_are_written_out():
+    limits = [{"name": "payload", "share": 0.5,
+               "parameters": {"mass": {"value": 123456.0, "unit": "kg"},
+                              "factor": {"value": 1.5, "unit": "1"}}}]  # fmt: skip
+    row = page._limits(SimpleNamespace(limits=limits))[6]
+    assert row == "| payload | mass 120000 kg, factor 150% | 50% |"
+    force = {"value": 12345.0, "low": 11000.0, "high": 14000.5, "unit": "N"}
+    cause = {
+        "name": "side_thrust", "probability": 0.95, "sentence": "A side force.", "equation": "Y",
+        "parameters": {"force": force}, "indistinguishable_from": [],
+    }  # fmt: skip
+    assert "| force | 12340 | 11000 to 14000 | N |" in page._cause(cause)
+
+
 def test_the_report_says_what_was_not_tested_and_why():
     """A cause that no sensor shows is not one that these data exclude."""
     unavailable = ({"name": "bank", "reason": "the profile's [site] shows no bank"},)

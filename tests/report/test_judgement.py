@@ -82,6 +82,15 @@ def test_of_too_few_windows_there_is_no_interval(count):
     assert found.against[0].word == ("not significantly better or worse" if few else "better")
 
 
+def test_a_poor_model_and_a_large_force_are_written_out():
+    """134 deg was 1.3e+02 deg."""
+    poor = judge("ref", errors([1500.0], 1230.0, 134.0), {"hold": np.full(1, 10.0)}, 3.0, 100)
+    assert "100 s: 150 of the L of holding the velocity." in poor.sentence
+    assert poor.sentence.endswith("After 100 s it is 410 ship lengths and 130 deg off (medians).")
+    large = pl.DataFrame({"voyage": ["a"], "part": ["hull"], "surge": [12345.0], "sway": [0.0]})
+    assert force_line(large, "a").endswith("hull 12000 N.")
+
+
 def test_forces_of_a_voyage_in_a_line():
     """Of 3 N and 4 N in turn the root mean square is 3.5; ahead 3 N and aside 4 N are 5 N."""
     forces = pl.DataFrame(
