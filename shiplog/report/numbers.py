@@ -12,3 +12,12 @@ def figure(value: float, digits: int = 2) -> str:
     """With so many significant digits. A large number keeps its zeros: 12000, and not 1.2e+04."""
     rounded = float(f"{value:.{digits}g}")
     return f"{rounded:.0f}" if abs(rounded) >= 10.0**digits else f"{value:.{digits}g}"
+
+
+def percent(share: float) -> str:
+    """Whole per cent; a part that would be rounded to nothing, or to all, has a decimal."""
+    if 0.0 < share < 0.005:
+        return f"{max(share, 0.001):.1%}"
+    if 0.995 <= share < 1.0:
+        return f"{min(share, 0.999):.1%}"
+    return f"{share:.0%}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
-from shiplog.report.numbers import counted, figure
+from shiplog.report.numbers import counted, figure, percent
 from shiplog.report.verdict import HOPELESS, WHICH, Verdict
 from shiplog.report.verdict_sentence import less
 
@@ -91,7 +91,7 @@ def _limits(verdict: Verdict) -> list[str]:
         )
         which = next((one[key] for key in WHICH if key in one), "")
         label = f"{one['name']} ({which})" if which else one["name"]
-        share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
+        share = percent(one["share"]) if one["share"] < HOPELESS else "not detectable"
         lines.append(f"| {label} | {numbers} | {share} |")
     return [*lines, ""]
 

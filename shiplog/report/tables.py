@@ -12,7 +12,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
-from shiplog.report.numbers import counted
+from shiplog.report.numbers import counted, percent
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
@@ -223,7 +223,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
         .rows()
     )
     cells = [
-        (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
+        (v, f"{t:.0f}", loss, p, h, percent(c), why or "-") for v, t, loss, p, h, c, why in rows
     ]
     return table(
         (
@@ -294,7 +294,7 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
     for run in inside["run"].unique(maintain_order=True):
         mine = inside.filter(pl.col("run") == run)
         shares = ", ".join(
-            f"{channel.replace('_', ' ')} {share:.0%}"
+            f"{channel.replace('_', ' ')} {percent(share)}"
             for channel, share in mine.select("channel", "share").iter_rows()
         )
         lines.append(f"Inside the 90 % band of {run}: {shares}.")
@@ -308,7 +308,7 @@ def voyages_table(answer: dict) -> str:
             name,
             v["windows"],
             v["loss"],
-            f"{v['coverage']:.0%}" if v["windows"] >= FEWEST_WINDOWS else "-",
+            percent(v["coverage"]) if v["windows"] >= FEWEST_WINDOWS else "-",
         )
         for name, v in answer["voyages"].items()
     ]

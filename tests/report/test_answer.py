@@ -42,6 +42,9 @@ def test_sizes_of_a_large_ship_are_written_out():
                               "factor": {"value": 1.5, "unit": "1"}}}]  # fmt: skip
     row = page._limits(SimpleNamespace(limits=limits))[6]
     assert row == "| payload | mass 120000 kg, factor 150% | 50% |"
+    limits[0]["share"] = 0.004
+    row = page._limits(SimpleNamespace(limits=limits))[6]
+    assert row.endswith("| 0.4% |")
     force = {"value": 12345.0, "low": 11000.0, "high": 14000.5, "unit": "N"}
     cause = {
         "name": "side_thrust", "probability": 0.95, "sentence": "A side force.", "equation": "Y",

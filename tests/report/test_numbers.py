@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from shiplog.report.numbers import counted, figure
+from shiplog.report.numbers import counted, figure, percent
 
 
 @pytest.mark.parametrize(
@@ -23,3 +23,15 @@ def test_one_is_singular():
     assert [counted(n, "more line") for n in (0, 1, 2)] == [
         "0 more lines", "1 more line", "2 more lines",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "0%"), (0.0004, "0.1%"), (0.004, "0.4%"), (0.006, "1%"), (0.125, "12%"),
+        (0.994, "99%"), (0.996, "99.6%"), (0.9996, "99.9%"), (1.0, "100%"), (1.234, "123%"),
+        (-0.2, "-20%"),
+    ],
+)  # fmt: skip
+def test_a_part_is_neither_nothing_nor_all(share, text):
+    assert percent(share) == text
