@@ -259,9 +259,12 @@ def runs_away(run: Run, before_effect: bool) -> Verdict:
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     least, segment = thresholds.LEAST_RECORD_S, recorded.timescale.seconds
     lacking = FEWEST_SEGMENTS - len(segments.begins(recorded))
-    short = max(least - recorded.seconds, lacking * segment)
+    used = round(recorded.seconds)
+    if recorded.seconds < least:  # what is a part of a second short is short
+        used = min(used, round(least) - 1)
+    short = max(least - used, lacking * segment)
     sentence = (
-        f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {least:.0f} s are "
+        f"Too little for a verdict: {used} s can be used, and {least:.0f} s are "
         f"needed in unbroken stretches of {segment:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."

@@ -13,7 +13,8 @@ from shiplog.report.verdict import Verdict
 
 
 @pytest.mark.parametrize(
-    ("seconds", "unbroken", "more"), [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140)]
+    ("seconds", "unbroken", "more"),
+    [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140), (239.7, 4, 1)],
 )
 def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken, more):
     """240 s in all, and four segments of 30 s each: pieces of 25 s hold none, however many."""
@@ -22,6 +23,7 @@ def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken,
     found = answer.too_little(SimpleNamespace(name="run"), record, True)
     assert not answer.enough(record)
     assert f"Log at least {more} s more" in found.sentence
+    assert f" {int(seconds)} s can be used, and 240 s are needed" in found.sentence
 
 
 def test_each_unit_and_channel_has_a_row_of_its_own():
