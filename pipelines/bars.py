@@ -134,7 +134,9 @@ class Schedule:
     """Share done and time left of a sequence of stages, from their expected lengths.
 
     Within a stage the share grows with time, but never beyond the stage's end. The time left is
-    scaled by how long the finished stages took against their expected lengths.
+    scaled by how long the finished stages took against their expected lengths, and where a stage
+    takes longer than that, by how long all took until now: a first stage that is read from the
+    cache does not make the others as fast.
     """
 
     def __init__(self, seconds: Mapping[str, float], now: float) -> None:
@@ -153,6 +155,7 @@ class Schedule:
         index = names.index(self._stage)
         before, whole = sum(lengths[:index]), sum(lengths)
         scale = (self._entered - self._began) / before if before > 0.0 else 1.0
+        scale = max(scale, (now - self._began) / max(before + lengths[index], 1e-9))
         inside = (now - self._entered) / max(scale, 1e-9)
         done = min(before + inside, before + lengths[index])
         return done / whole, (whole - done) * scale
