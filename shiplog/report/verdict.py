@@ -38,7 +38,7 @@ class Verdict:
     sentence: str
     run: str
     before_effect: bool
-    made: str = "fitted to earlier voyages"
+    made: str
     causes: tuple[dict, ...] = ()
     ranking: tuple[dict, ...] = ()
     rejected: tuple[dict, ...] = ()

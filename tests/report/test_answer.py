@@ -12,6 +12,30 @@ from shiplog.report import answer, page
 from shiplog.report.verdict import Verdict
 
 
+def run_of(*voyages, given=False):
+    return SimpleNamespace(name="run", given=given, trained_on=voyages, judges_itself=True)
+
+
+@pytest.mark.parametrize(
+    ("run", "words"),
+    [
+        (run_of("home"), "fitted to earlier voyages"),  # which this store may not have
+        (run_of("home", "trip"), "fitted to these very voyages"),
+        (run_of("trip[0:100]"), "fitted to these very voyages"),
+        (run_of(given=True), "with coefficients that were not fitted to these voyages"),
+    ],
+)
+@pytest.mark.parametrize("before", [True, False])
+def test_what_the_model_was_fitted_to_does_not_depend_on_the_store(monkeypatch, run, words, before):
+    """`before`: whether the store has its voyages. A verdict of too little says it, too."""
+    record = SimpleNamespace(seconds=9.0, timescale=SimpleNamespace(seconds=30.0), names=("trip",))
+    monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(0, dtype=int))
+    for verdict in (answer.too_little(run, record, before), answer.runs_away(run, record, before)):
+        assert f"Model: run, {words}." in page.markdown(verdict)
+    notes = answer.of_own_voyages(run, SimpleNamespace(record=record), SimpleNamespace(adapted=0))
+    assert bool(notes) == ("very" in words)
+
+
 @pytest.mark.parametrize(
     ("seconds", "unbroken", "more"),
     [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140), (239.7, 4, 1)],
@@ -19,8 +43,10 @@ from shiplog.report.verdict import Verdict
 def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken, more):
     """240 s in all, and four segments of 30 s each: pieces of 25 s hold none, however many."""
     monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(unbroken, dtype=int))
-    record = SimpleNamespace(seconds=seconds, timescale=SimpleNamespace(seconds=30.0))
-    found = answer.too_little(SimpleNamespace(name="run"), record, True)
+    record = SimpleNamespace(
+        seconds=seconds, timescale=SimpleNamespace(seconds=30.0), names=("trip",)
+    )
+    found = answer.too_little(run_of("home"), record, True)
     assert not answer.enough(record)
     assert f"Log at least {more} s more" in found.sentence
     assert f" {int(seconds)} s can be used, and 240 s are needed" in found.sentence
@@ -58,9 +84,9 @@ def test_sizes_of_a_large_ship_are_written_out():
 def test_the_report_says_what_was_not_tested_and_why():
     """A cause that no sensor shows is not one that these data exclude."""
     unavailable = ({"name": "bank", "reason": "the profile's [site] shows no bank"},)
-    text = page.markdown(Verdict("none", "No change.", "run", True, unavailable=unavailable))
+    text = page.markdown(Verdict("none", "No change.", "run", True, "", unavailable=unavailable))
     assert "## Not testable\n\n- bank: the profile's [site] shows no bank\n" in text
-    assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True))
+    assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True, ""))
 
 
 def test_an_undecided_verdict_says_which_test_separates_its_candidates():
