@@ -37,6 +37,7 @@ class Bars:
         self._cost = dict(costs)
         self._whole = sum(costs.values()) or 1.0
         self._share = dict.fromkeys(costs, 0.0)
+        self._before: dict[str, float] = {}  # share that an interrupted training goes on from
         self._ended = 0
         self._began = self._latest = time.monotonic()
         self._own: dict[str, TaskID] = {}
@@ -58,7 +59,9 @@ class Bars:
         """Show that this share (0 to 1) of task `name` is done."""
         self._share[name] = 1.0 if ended else share
         self._ended += ended
-        done = sum(self._cost[n] * s for n, s in self._share.items()) / self._whole
+        if share > 0.0 and not ended:
+            self._before.setdefault(name, share)
+        done = self._of_all(self._share)
         if self._progress is None:
             self._line(done)
             return
@@ -67,16 +70,21 @@ class Bars:
         self._progress.update(self._own[name], completed=share, visible=not ended)
         self._progress.update(self._all, completed=done)
 
+    def _of_all(self, share: Mapping[str, float]) -> float:
+        return sum(self._cost[n] * s for n, s in share.items()) / self._whole
+
     def _line(self, done: float) -> None:
         now = time.monotonic()
-        if now - self._latest < LINE_S or done < LEAST_DONE:
+        if now - self._latest < LINE_S:
             return
         self._latest = now
-        left = (now - self._began) * (1.0 - done) / done
+        here = done - self._of_all(self._before)  # in this process, whose clock it is
+        left = ""
+        if here >= LEAST_DONE:
+            left = f"; about {_duration((now - self._began) * (1.0 - done) / here)} left"
         log.info(
-            "%d of %d trainings done, %.0f%%; about %s left",
-            self._ended, len(self._share), 100.0 * done, _duration(left),
-        )  # fmt: skip
+            "%d of %d trainings done, %.0f%%%s", self._ended, len(self._share), 100.0 * done, left
+        )
 
 
 def _duration(seconds: float) -> str:
