@@ -70,7 +70,7 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
             continue
         largest = max((f for f in group if f.start_s is not None), key=_size, default=group[0])
         if largest.unit == "s":
-            total = sum(f.value or 0.0 for f in group)
+            total = sum(f.value or 0.0 for f in group if f.unit == "s")  # others are counts
             lines.append(f"  {kind}: {channel}, {total:.1f} s in all; most: {largest.sentence}")
         else:
             lines.append(f"  {kind}: {channel}, {len(group)} times; most: {largest.sentence}")
