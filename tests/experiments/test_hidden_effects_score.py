@@ -196,6 +196,20 @@ def test_the_truth_in_the_catalogues_own_numbers():
         assert numbers_of(name) is None
 
 
+def test_the_truth_of_one_unit_is_not_that_of_all():
+    setting = Setting(profiles.load("blueboat"), {"speed": 1.0}, np.zeros((12, 2)), 1.0)
+    factor = {"factor": {"value": 0.8}}
+    for parameters, label in (
+        (factor, "thrust_loss"),
+        (factor | {"unit": {"value": "thruster_port"}}, "thrust_loss:thruster_port"),
+    ):
+        truth = {"name": "thrust_loss", "parameters": parameters}
+        cause, numbers = oracle.true_cause(truth, setting)
+        assert cause.label == label and numbers == pytest.approx([-0.2])
+    nobody = {"name": "thrust_loss", "parameters": factor | {"unit": {"value": "bow"}}}
+    assert oracle.true_cause(nobody, setting) is None
+
+
 # --- parameters -----------------------------------------------------------------------------------
 
 
