@@ -222,6 +222,19 @@ def test_another_program_makes_its_own_store_and_model_from_the_kept_logs(tmp_pa
     assert len(score.read(new).answers) == 3
 
 
+@pytest.mark.parametrize(("code", "word"), [(1, "failed"), (3, "none")])
+def test_logs_that_a_program_refuses_or_damages_are_its_own_answer(tmp_path, stubs, code, word):
+    """They are there, whatever it does with them: the case counts."""
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(keep=True))
+    settings = stubs()
+    end = f'if command == "ingest":\n    sys.exit({code})\n'
+    (tmp_path / "shiplog.py").write_text(SHIPLOG + end)
+    replay.replay(out, new, settings, whole=True)
+    found = score.read(new)
+    assert [one.word for one in found.answers] == [word] and not found.unmade
+
+
 def test_one_case_of_several_is_asked_again(tmp_path, stubs):
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))
