@@ -222,6 +222,20 @@ def test_another_program_makes_its_own_store_and_model_from_the_kept_logs(tmp_pa
     assert len(score.read(new).answers) == 3
 
 
+def test_a_replay_that_is_stopped_can_be_scored(tmp_path, stubs):
+    """While simpler methods are asked: the verdict is sealed by then."""
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(keep=True))
+    settings = stubs(rivals=True)
+    (tmp_path / "rival.py").write_text("raise SystemExit(130)")
+    with pytest.raises(KeyboardInterrupt):
+        replay.replay(out, new, settings)
+    assert [one.word for one in score.read(new).answers] == ["none"]
+    (new / "keys" / "5.json").unlink()  # killed between seal and key
+    replay.replay(out, new, stubs())
+    assert [one.word for one in score.read(new).answers] == ["none"]
+
+
 @pytest.mark.parametrize(("code", "word"), [(1, "failed"), (3, "none")])
 def test_logs_that_a_program_refuses_or_damages_are_its_own_answer(tmp_path, stubs, code, word):
     """They are there, whatever it does with them: the case counts."""
