@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.experiments.measured_ships import way
+from pipelines.experiments.measured_ships import page, way
 from pipelines.experiments.measured_ships.ships import DataSet
 
 
@@ -37,3 +37,15 @@ def test_an_interrupted_way_goes_on_from_the_logs_that_it_made(tmp_path, monkeyp
     found = way.go("a ship", one, tmp_path, tmp_path / "out")
     assert done == ["convert", "ingest", "voyages", "train", "evaluate", "diagnose"]
     assert found.stopped == "" and found.cpu_s == 6.0
+
+
+def test_a_model_that_diverged_is_not_one_that_was_not_evaluated():
+    floors = {"hold": 90.0, "least_squares": None}
+    evaluated = {"evaluate": {"loss": None, "floors": floors}}
+    lines = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for answers in (evaluated, {})
+        for line in page.text([way.Way("kvlcc2", "stopped.", answers, 1.0, False)]).splitlines()
+        if line.startswith("| KVLCC2")
+    ]
+    assert [cells[4:8] for cells in lines] == [["50", "diverged", "90", "diverged"], ["-"] * 4]
