@@ -28,7 +28,7 @@ def voyage_lines(report: VoyageReport) -> list[str]:
     """What one log's health is, in a few lines: at most a screen."""
     lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
     head = f"{report.name}: {counted(report.messages_read, 'message')} read, {lost} lost; "
-    if report.usable_s is None:
+    if report.usable_s is None or report.windows is None:
         return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
     head += (
         f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
