@@ -198,8 +198,8 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     for label, expected in decision.expected.items():
         cause, least = by[label], expected.least(nats)
         sizes = least * cause.sizes(setting)
-        if len(cause.parameters) == len(sizes):
-            parts = zip(cause.parameters, sizes, least, strict=True)
+        if cause.parameters:  # its sizes begin with theirs; uncertain factors may follow
+            parts = zip(cause.parameters, sizes, least, strict=False)
             numbers = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
         else:  # a number for each rudder, or for each point of the map
             numbers = cause.displayed(sizes)

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shiplog.models.causes.environment import Current
+from shiplog.diagnosis.fitted import ExpectedEvidence
+from shiplog.models.causes.environment import Bank, Current
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
-from shiplog.report import answer, page
+from shiplog.report import answer, page, verdict
 from shiplog.report.verdict import Verdict
 
 
@@ -30,8 +31,8 @@ def test_what_the_model_was_fitted_to_does_not_depend_on_the_store(monkeypatch, 
     """`before`: whether the store has its voyages. A verdict of too little says it, too."""
     record = SimpleNamespace(seconds=9.0, timescale=SimpleNamespace(seconds=30.0), names=("trip",))
     monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(0, dtype=int))
-    for verdict in (answer.too_little(run, record, before), answer.runs_away(run, record, before)):
-        assert f"Model: run, {words}." in page.markdown(verdict)
+    for one in (answer.too_little(run, record, before), answer.runs_away(run, record, before)):
+        assert f"Model: run, {words}." in page.markdown(one)
     notes = answer.of_own_voyages(run, SimpleNamespace(record=record), SimpleNamespace(adapted=0))
     assert bool(notes) == ("very" in words)
 
@@ -79,6 +80,21 @@ def test_sizes_of_a_large_ship_are_written_out():
         "parameters": {"force": force}, "indistinguishable_from": [],
     }  # fmt: skip
     assert "| force | 12340 | 11000 to 14000 | N |" in page._cause(cause)
+
+
+def test_a_number_that_no_data_would_reveal_is_left_out_of_the_limits():
+    """5 nats of a number that has 10 at its realistic size: √(2 · 5 / 10) of it. A bank has two
+    uncertain factors besides."""
+    causes = [Bank(), Fouling()]
+    seen, hidden = np.array([10.0, 1.0, 1.0]), np.array([1e-4, 1e-5, 1e-5])
+    for each, strength in ((seen, {"value": 1.0, "unit": "1"}), (hidden, None)):
+        expected = {"bank": ExpectedEvidence(each, 0.0), "fouling": ExpectedEvidence(each[:1], 0.0)}
+        limits = verdict.limits_json(
+            SimpleNamespace(expected=expected), causes, SimpleNamespace(prior=lambda p: p.prior)
+        )
+        by = {one["name"]: one["parameters"] for one in limits}
+        assert by["bank"] == ({} if strength is None else {"strength": strength})
+        assert bool(by["fouling"]) == (strength is not None)
 
 
 def test_the_report_says_what_was_not_tested_and_why():
