@@ -33,6 +33,7 @@ from shiplog.diagnosis import (
     campaign_characteristics,
     discrepancy,
     nominal_cache,
+    nominal_fit,
     placebo,
     posterior,
     refutation,
@@ -297,6 +298,15 @@ def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
         if part in watched:
             assert getattr(*watched[part]) is not before[part]
     assert all(getattr(*where) is before[name] for name, where in watched.items())
+
+
+def test_a_fit_without_the_discrepancy_is_not_that_of_the_cache(monkeypatch):
+    """Nor is it kept there, where the whole program would take it for its own."""
+    monkeypatch.setattr(nominal_fit, "converged", lambda *given, seen: (given, seen))
+    monkeypatch.setattr(nominal_cache, "_key", None)  # whoever wants to read or keep it needs that
+    with ExitStack() as stack:
+        without.PARTS["discrepancy"](stack)
+        assert nominal_cache.converged("model", "record") == (("model", "record"), ())
 
 
 def test_logs_of_another_family_come_with_their_own_profile(tmp_path, stubs, simulator):
