@@ -258,14 +258,25 @@ def test_one_case_of_several_is_asked_again(tmp_path, stubs):
     assert len(score.read(tmp_path / "new").answers) == 2
 
 
+def found_from(folder, module):
+    """The file that `python -m` would run there."""
+    where = f"import importlib.util; print(importlib.util.find_spec({module!r}).origin)"
+    done = subprocess.run(
+        [sys.executable, "-c", where], cwd=folder, capture_output=True, text=True, check=False
+    )
+    return Path(done.stdout.strip() or "nowhere")
+
+
 def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, monkeypatch):
     """Two kept cases in which nothing was hidden; without the placebo a name would be reported."""
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(keep=True))
-    asked = []
+    asked, found = [], []
+    monkeypatch.delenv("PYTHONPATH", raising=False)
 
     def settings(jobs, shiplog):
         asked.append(shiplog[-1])
+        found.append(found_from(tmp_path, shiplog[-2]))
         monkeypatch.setenv("SAYS", "coverage" if shiplog[-1] == "placebo" else "none")
         return stubs(jobs=jobs)
 
@@ -276,6 +287,7 @@ def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, mon
     ]
     assert rows == [["nothing", "2", "2", "0", "0"], ["placebo", "2", "0", "0", "2"]]
     assert asked == ["nothing", "placebo"]
+    assert found == [Path(without.__file__)] * 2
     assert {folder.name for folder in (tmp_path / "out-without").iterdir()} == set(asked)
 
 
