@@ -234,19 +234,6 @@ def test_the_group_score_is_the_mean_of_what_is_left_open():
     assert sum(halves.values()) == len(halves) == 4
 
 
-def test_a_cause_at_the_wrong_place_is_no_score():
-    """The port unit has lost thrust, and the starboard one is named: as wrong as another cause."""
-    lost, blamed = key("thrust_loss"), named("thrust_loss")
-    lost["causes"][0]["parameters"] = {"unit": {"value": "port", "unit": ""}}
-    blamed["causes"][0]["parameters"] = {"actuator": {"value": "starboard"}}
-    one, other = answer(lost, blamed), answer(lost, named("fouling"))
-    assert scores.group_utility(one) == scores.group_utility(other) == 1.0 - (22 / 2 + 1) / 22
-    assert scores.isolation([one]) == 0.0 and scores.log_score(one) == math.log(scores.FLOOR)
-    blamed["causes"][0]["parameters"] = {"actuator": {"value": "port"}}
-    right = answer(lost, blamed)
-    assert scores.group_utility(right) == 1.0 and scores.isolation([right]) == 0.95
-
-
 def test_isolation_is_the_mean_probability_of_the_truth_where_there_was_an_alarm():
     given = [
         answer(CURRENT, named("current", p=0.9)),
