@@ -20,6 +20,8 @@ from typing import ParamSpec, TypeVar
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+from shiplog.report.numbers import counted
+
 log = logging.getLogger(__name__)
 
 LINE_S = 30.0  # between two lines where there is no terminal
@@ -35,13 +37,14 @@ class Bars:
         self._cost = dict(costs)
         self._whole = sum(costs.values()) or 1.0
         self._share = dict.fromkeys(costs, 0.0)
+        self._before: dict[str, float] = {}  # share that an interrupted training goes on from
         self._ended = 0
         self._began = self._latest = time.monotonic()
         self._own: dict[str, TaskID] = {}
         self._progress: Progress | None = None
         if costs and drawable():
             self._progress = _columns()
-            self._all = self._progress.add_task(f"{len(costs)} trainings", total=1.0)
+            self._all = self._progress.add_task(counted(len(costs), "training"), total=1.0)
 
     def __enter__(self) -> Bars:
         if self._progress is not None:
@@ -56,7 +59,9 @@ class Bars:
         """Show that this share (0 to 1) of task `name` is done."""
         self._share[name] = 1.0 if ended else share
         self._ended += ended
-        done = sum(self._cost[n] * s for n, s in self._share.items()) / self._whole
+        if share > 0.0 and not ended:
+            self._before.setdefault(name, share)
+        done = self._of_all(self._share)
         if self._progress is None:
             self._line(done)
             return
@@ -65,16 +70,21 @@ class Bars:
         self._progress.update(self._own[name], completed=share, visible=not ended)
         self._progress.update(self._all, completed=done)
 
+    def _of_all(self, share: Mapping[str, float]) -> float:
+        return sum(self._cost[n] * s for n, s in share.items()) / self._whole
+
     def _line(self, done: float) -> None:
         now = time.monotonic()
-        if now - self._latest < LINE_S or done < LEAST_DONE:
+        if now - self._latest < LINE_S:
             return
         self._latest = now
-        left = (now - self._began) * (1.0 - done) / done
+        here = done - self._of_all(self._before)  # in this process, whose clock it is
+        left = ""
+        if here >= LEAST_DONE:
+            left = f"; about {_duration((now - self._began) * (1.0 - done) / here)} left"
         log.info(
-            "%d of %d trainings done, %.0f%%; about %s left",
-            self._ended, len(self._share), 100.0 * done, _duration(left),
-        )  # fmt: skip
+            "%d of %d trainings done, %.0f%%%s", self._ended, len(self._share), 100.0 * done, left
+        )
 
 
 def _duration(seconds: float) -> str:
@@ -132,7 +142,9 @@ class Schedule:
     """Share done and time left of a sequence of stages, from their expected lengths.
 
     Within a stage the share grows with time, but never beyond the stage's end. The time left is
-    scaled by how long the finished stages took against their expected lengths.
+    scaled by how long the finished stages took against their expected lengths, and where a stage
+    takes longer than that, by how long all took until now: a first stage that is read from the
+    cache does not make the others as fast.
     """
 
     def __init__(self, seconds: Mapping[str, float], now: float) -> None:
@@ -151,6 +163,7 @@ class Schedule:
         index = names.index(self._stage)
         before, whole = sum(lengths[:index]), sum(lengths)
         scale = (self._entered - self._began) / before if before > 0.0 else 1.0
+        scale = max(scale, (now - self._began) / max(before + lengths[index], 1e-9))
         inside = (now - self._entered) / max(scale, 1e-9)
         done = min(before + inside, before + lengths[index])
         return done / whole, (whole - done) * scale

@@ -33,7 +33,8 @@ RECIPE = Fast(iterations=200)  # a hundred fewer than by default: somebody waits
 class Demo:
     """What the demo says and where the recording is.
 
-    complete   whether every log was taken, and every message of it could be read
+    complete   whether every log was taken, every message of it could be read, and all that the
+               demo makes could be written
     """
 
     text: str
@@ -81,12 +82,13 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
         path, store, [NEXT_SEASON], out / "diagnosis",
         extend=None if extended.exists() else extended,
     )  # fmt: skip
-    both, repeated = [path], "nothing was named"
+    both, repeated, drawn = [path], "nothing was named", diagnosis.drawn
     content = result.content | {"diagnosis": diagnosis.verdict.as_json()}
     if extended.exists():
         both.append(extended)
-        again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again").verdict
-        repeated, content["diagnosis_again"] = again.sentence, again.as_json()
+        again = diagnose_run(extended, store, [NEXT_SEASON], out / "diagnosis-again")
+        repeated, content["diagnosis_again"] = again.verdict.sentence, again.verdict.as_json()
+        drawn = drawn and again.drawn
     season = compare_runs(both, store, [NEXT_SEASON], out / "season2.rrd")
     took = time.monotonic() - began
     ending = (
@@ -100,7 +102,8 @@ def run_demo(out: Path, logs: Path | None) -> Demo:
     )
     content |= {"season2_recording": str(season.written()), "seconds": round(took, 1)}
     content |= {"refused": {path: str(why) for path, why in done.refused.items()}}
-    return Demo(ending, content, result.written(), done.complete)
+    complete = done.complete and drawn and not (result.lost or season.lost)
+    return Demo(ending, content, result.written(), complete)
 
 
 def _trained_already(path: Path, store: Store) -> bool:

@@ -111,7 +111,7 @@ def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTria
     except np.linalg.LinAlgError as error:  # of a matrix that only a model out of reach makes
         detailed = log.isEnabledFor(logging.DEBUG)
         log.info("no path of the model can be computed: %s", error, exc_info=detailed)
-        return DiagnosedTrial(answer.runs_away(of.run, of.before_effect), out)
+        return DiagnosedTrial(answer.runs_away(of.run, of.recorded, of.before_effect), out)
 
 
 def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
@@ -153,7 +153,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         simulated = network.extended_by(decision)
         whole = simulated[0].covering(simulated[1].nothing.point)
     if held and decision.named and tried.reference.adapts:
-        notes += answer.of_own_voyages(run, decision)
+        notes += answer.of_own_voyages(run, tried, decision)
         alone = held.adapted(decision).reduction if decision.adapted else None
     reach("report")
     context = Context(

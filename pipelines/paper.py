@@ -18,6 +18,7 @@ from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
 from shiplog.report import viewer
+from shiplog.report.numbers import counted
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
 from shiplog.report.text_table import inert
@@ -271,7 +272,7 @@ def write(results: Results, chosen: Voyages, store: Store, out: Path) -> str:
         files.write_frame(numbers / f"{name}.parquet", frame)
     text = report.text(results, chosen.chosen_by, sizes)
     files.write_text(out / "report.md", inert(text) + "\n")
-    title = f"{profile.ship.name}: {len(results.runs)} window sets"
+    title = f"{profile.ship.name}: {counted(len(results.runs), 'window set')}"
     viewer.save_album(title, text, pictures, out / "paper.rrd")
     return text
 

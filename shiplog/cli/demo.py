@@ -44,5 +44,5 @@ def demo(
             show(result.recording, web=False)
         except ShiplogError as error:  # the job is done; only the window is missing
             typer.echo(f"The viewer was not opened: {error.message}", err=True)
-    if not result.complete:  # named while they were ingested
+    if not result.complete:  # what was lost is said by then
         raise typer.Exit(LOST)

@@ -21,7 +21,7 @@ from shiplog.report.verdict_sentence import less, sentence
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.load_model import Run
-from shiplog.voyages import timescale
+from shiplog.voyages import parts, timescale
 from shiplog.voyages.recording import Record
 
 RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
@@ -129,7 +129,7 @@ def verdict(
         sentence=text,
         run=context.run.name,
         before_effect=context.before_effect,
-        made=_made(context.run, context.before_effect),
+        made=made_of(context.run, trial.record),
         causes=tuple(causes),
         ranking=ranking,
         rejected=verdicts.rejected_json(rejected),
@@ -187,10 +187,10 @@ def of_given(run: Run) -> str:
     )
 
 
-def of_own_voyages(run: Run, decision: Decision) -> list[str]:
-    """Notes on a verdict about a run's own training voyages."""
+def of_own_voyages(run: Run, trial: Trial, decision: Decision) -> list[str]:
+    """Notes on a verdict without a nominal campaign, such as one about a run's own voyages."""
     notes = []
-    if run.judges_itself:
+    if run.judges_itself and _on_its_own(run, trial.record):
         notes.append(
             f"{run.name} was fitted to these very voyages and may have absorbed a part of the "
             "cause. The numbers are then those of the residual, and too small."
@@ -232,10 +232,16 @@ def _word(decision: Decision, named: bool, held: HeldOut | None, context: Contex
     return decision.verdict
 
 
-def _made(run: Run, before_effect: bool) -> str:
+def made_of(run: Run, recorded: Record) -> str:
+    """What the model was fitted to, whether or not the store has that."""
     if run.given:
         return "with coefficients that were not fitted to these voyages"
-    return "fitted to earlier voyages" if before_effect else "fitted to these very voyages"
+    own = _on_its_own(run, recorded)
+    return "fitted to these very voyages" if own else "fitted to earlier voyages"
+
+
+def _on_its_own(run: Run, recorded: Record) -> bool:
+    return bool(parts.overlapping(recorded.names, run.trained_on))
 
 
 def enough(recorded: Record) -> bool:
@@ -246,24 +252,27 @@ def enough(recorded: Record) -> bool:
     )
 
 
-def runs_away(run: Run, before_effect: bool) -> Verdict:
+def runs_away(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     """The verdict where the model diverges on every segment: there is nothing to compare."""
     sentence = (
         "No verdict: the model diverges on these voyages or on its training voyages. Check signs, "
         "units and positions in the profile. Compare the model with its baselines (`shiplog "
         "evaluate`), or identify it again from more voyages."
     )
-    return Verdict("undecided", sentence, run.name, before_effect)
+    return Verdict("undecided", sentence, run.name, before_effect, made_of(run, recorded))
 
 
 def too_little(run: Run, recorded: Record, before_effect: bool) -> Verdict:
     least, segment = thresholds.LEAST_RECORD_S, recorded.timescale.seconds
     lacking = FEWEST_SEGMENTS - len(segments.begins(recorded))
-    short = max(least - recorded.seconds, lacking * segment)
+    used = round(recorded.seconds)
+    if recorded.seconds < least:  # what is a part of a second short is short
+        used = min(used, round(least) - 1)
+    short = max(least - used, lacking * segment)
     sentence = (
-        f"Too little for a verdict: {recorded.seconds:.0f} s can be used, and {least:.0f} s are "
+        f"Too little for a verdict: {used} s can be used, and {least:.0f} s are "
         f"needed in unbroken stretches of {segment:.0f} s. "
         f"Log at least {short:.0f} s more, with turns both ways, a stop, and runs on several "
         "headings."
     )
-    return Verdict("coverage", sentence, run.name, before_effect)
+    return Verdict("coverage", sentence, run.name, before_effect, made_of(run, recorded))

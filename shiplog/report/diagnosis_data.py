@@ -34,7 +34,8 @@ class Exhibit:
     extended   names of all causes in the extended model
     tracks     model (BEFORE or AFTER), voyage, window, time, the six states: every held-out window
     errors     voyage, window, time (its start), seconds (its length), before, after: L (Eq. 8) of
-               each held-out window; null after where nothing was named
+               each held-out window; null after where nothing was named, and both null where the
+               model diverges and the window is in none of the figures
     report     Markdown
     banks, ship_outline   as a Comparison has them
     """
@@ -64,7 +65,7 @@ class Exhibit:
         fell = pl.col("before") - pl.col("after").fill_null(0.0)
         return (
             self.errors.with_columns(fell=fell)
-            .sort("fell", descending=True, maintain_order=True)
+            .sort("fell", descending=True, nulls_last=True, maintain_order=True)
             .group_by("voyage", maintain_order=True)
             .first()
             .select(self.errors.columns)

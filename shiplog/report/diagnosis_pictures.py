@@ -155,7 +155,10 @@ def _before_and_after(done: DiagnosedTrial) -> tuple[pl.DataFrame, pl.DataFrame]
     )  # fmt: skip
     errors = numbered.with_columns(
         pl.Series("seconds", cut.dt.sum(1)),
-        *(pl.Series(k, held.parts(v).sum(1)) for k, v in states.items()),
+        *(
+            pl.Series(k, np.where(held.counted, held.parts(v).sum(1), np.nan)).fill_nan(None)
+            for k, v in states.items()
+        ),
     )
     if AFTER not in states:
         errors = errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))

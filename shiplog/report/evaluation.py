@@ -10,6 +10,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.report import tables
 from shiplog.report.judgement import MEANING, Judgement, force_line, judge
+from shiplog.report.numbers import counted
 from shiplog.training.load_model import Run
 
 
@@ -70,11 +71,11 @@ class EvaluatedRuns:
         answers = {f"{run.name}: {run.label}": self.answer(run) for run in self.runs}
         first = next(iter(answers.values()))
         errors = self.errors.filter(pl.col("run") == self.runs[0].name)
-        count = first["windows"]
+        count = counted(first["windows"], "window")
         lines = [
             *[self.judgement(run).sentence for run in self.runs],
             "",
-            f"{MEANING} Means over {count} windows and over seeds:",
+            f"{MEANING} Means over {count} and over seeds:",
             "",
             tables.models_table(answers, self.means, self.runs[0].name),
             "",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
+from shiplog.report.numbers import counted, figure
 from shiplog.simulation import error_reduction
 
 FEWEST_WINDOWS = 6  # windows, fewer of which give no interval: three blocks of two are drawn from
@@ -39,10 +40,10 @@ class Against:
     @property
     def sentence(self) -> str:
         name = BASELINES[self.baseline]
-        if self.low is None:
-            return f"{self.share:.2g} of the L of {name}"
-        between = f"({self.low:.2g} to {self.high:.2g})"
-        return f"{self.word} than {name}, with {self.share:.2g} of its L {between}"
+        if self.low is None or self.high is None:
+            return f"{figure(self.share)} of the L of {name}"
+        between = f"({figure(self.low)} to {figure(self.high)})"
+        return f"{self.word} than {name}, with {figure(self.share)} of its L {between}"
 
     def as_json(self) -> dict:
         return {"share": self.share, "low": self.low, "high": self.high, "word": self.word}
@@ -67,9 +68,9 @@ class Judgement:
 
     @property
     def sentence(self) -> str:
-        found = f"{self.run}, on {self.windows} windows of {self.seconds} s"
+        found = f"{self.run}, on {counted(self.windows, 'window')} of {self.seconds} s"
         if self.lost == self.windows:
-            return f"{found}: every one of them diverged."
+            return f"{found}: {'it' if self.windows == 1 else 'every one of them'} diverged."
         parts = [one.sentence for one in self.against]
         found = f"{found}: {'; '.join(parts)}." if parts else f"{found}."
         if self.windows - self.lost < FEWEST_WINDOWS:
@@ -77,8 +78,8 @@ class Judgement:
         if self.lost:
             found += f" Windows that diverged, in none of these figures: {self.lost}."
         return (
-            f"{found} After {self.seconds} s it is {self.lengths:.2g} ship lengths and "
-            f"{self.degrees:.2g} deg off (medians)."
+            f"{found} After {self.seconds} s it is {figure(self.lengths)} ship lengths and "
+            f"{figure(self.degrees)} deg off (medians)."
         )
 
     def as_json(self) -> dict:
@@ -139,5 +140,5 @@ def force_line(forces: pl.DataFrame, voyage: str) -> str:
     own = forces.filter(pl.col("voyage") == voyage, pl.col("part") != "total")
     size = (pl.col("surge").pow(2) + pl.col("sway").pow(2)).mean().sqrt()
     parts = own.group_by("part").agg(size=size).sort("size", descending=True)
-    sizes = [f"{part} {value:.2g} N" for part, value in parts.iter_rows()]
+    sizes = [f"{part} {figure(value)} N" for part, value in parts.iter_rows()]
     return f"Forces along {voyage}, root mean square: {', '.join(sizes)}."

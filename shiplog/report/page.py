@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
+from shiplog.report.numbers import counted, figure, percent
 from shiplog.report.verdict import HOPELESS, WHICH, Verdict
 from shiplog.report.verdict_sentence import less
 
@@ -45,7 +46,8 @@ def _cause(cause: dict) -> list[str]:
             lines.append(f"| {name} | {p['value']} | - | - |")
         else:
             lines.append(
-                f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} |"
+                f"| {name} | {figure(p['value'], 4)} | {figure(p['low'], 4)} to "
+                f"{figure(p['high'], 4)} | {p['unit']} |"
             )
     if cause["indistinguishable_from"]:
         lines += [
@@ -55,7 +57,7 @@ def _cause(cause: dict) -> list[str]:
     if (expected := cause.get("next_test_expected")) is not None:
         lines += [
             f"Of the simulated manoeuvres, {expected['manoeuvre']} separates them best: "
-            f"{expected['nats']:.3g} nats in {expected['seconds']:.0f} s.",
+            f"{figure(expected['nats'], 3)} nats in {expected['seconds']:.0f} s.",
         ]  # fmt: skip
     return [*lines, ""]
 
@@ -68,8 +70,8 @@ def _gain(verdict: Verdict) -> list[str]:
     return [
         "## Gain on held-out windows", "",
         f"L {g.before:.0f} before, {g.after:.0f} after: {less(g.reduction)} "
-        f"({less(g.low)} to {less(g.high)}, {g.windows} windows, each predicted with numbers "
-        f"fitted without {verdict.without}).", "",
+        f"({less(g.low)} to {less(g.high)}, {counted(g.windows, 'window')}, each predicted with "
+        f"numbers fitted without {verdict.without}).", "",
         "By channel: " + ", ".join(channels) + ".", "",
     ]  # fmt: skip
 
@@ -89,14 +91,14 @@ def _limits(verdict: Verdict) -> list[str]:
         )
         which = next((one[key] for key in WHICH if key in one), "")
         label = f"{one['name']} ({which})" if which else one["name"]
-        share = f"{one['share']:.0%}" if one["share"] < HOPELESS else "not detectable"
+        share = percent(one["share"]) if one["share"] < HOPELESS else "not detectable"
         lines.append(f"| {label} | {numbers} | {share} |")
     return [*lines, ""]
 
 
 def _change(value: float, unit: str) -> str:
     """A size in its unit; in per cent where it has none."""
-    return f"{100 * value:.2g}%" if unit == "1" else f"{value:.2g} {unit}"
+    return f"{figure(100 * value)}%" if unit == "1" else f"{figure(value)} {unit}"
 
 
 def _errors(verdict: Verdict) -> list[str]:

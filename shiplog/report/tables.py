@@ -12,6 +12,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
+from shiplog.report.numbers import counted, percent
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
@@ -26,12 +27,12 @@ COARSE = {"position": 0.05, "velocity": 0.03, "heading": 0.3, "yaw_rate": 0.3, "
 def voyage_lines(report: VoyageReport) -> list[str]:
     """What one log's health is, in a few lines: at most a screen."""
     lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
-    head = f"{report.name}: {report.messages_read} messages read, {lost} lost; "
-    if report.usable_s is None:
+    head = f"{report.name}: {counted(report.messages_read, 'message')} read, {lost} lost; "
+    if report.usable_s is None or report.windows is None:
         return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
     head += (
         f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
-        f"{report.windows} {'window' if report.windows == 1 else 'windows'} of {WINDOW} s"
+        f"{counted(report.windows, 'window')} of {WINDOW} s"
     )
     return [head, *_instruments(report.instruments), *_findings(report.findings)]
 
@@ -69,13 +70,13 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
             continue
         largest = max((f for f in group if f.start_s is not None), key=_size, default=group[0])
         if largest.unit == "s":
-            total = sum(f.value or 0.0 for f in group)
+            total = sum(f.value or 0.0 for f in group if f.unit == "s")  # others are counts
             lines.append(f"  {kind}: {channel}, {total:.1f} s in all; most: {largest.sentence}")
         else:
             lines.append(f"  {kind}: {channel}, {len(group)} times; most: {largest.sentence}")
     left = len(lines) - MOST_FINDINGS
     if left > 0:
-        lines = [*lines[:MOST_FINDINGS], f"  and {left} more lines."]
+        lines = [*lines[:MOST_FINDINGS], f"  and {counted(left, 'more line')}."]
     if any(len(group) > MOST_ALIKE for group in groups.values()) or left > 0:
         lines.append("  all of them, one by one, with --json.")
     return lines
@@ -222,7 +223,7 @@ def windows_table(errors: pl.DataFrame, coverage: pl.DataFrame, most: int = 8) -
         .rows()
     )
     cells = [
-        (v, f"{t:.0f}", loss, p, h, f"{c:.0%}", why or "-") for v, t, loss, p, h, c, why in rows
+        (v, f"{t:.0f}", loss, p, h, percent(c), why or "-") for v, t, loss, p, h, c, why in rows
     ]
     return table(
         (
@@ -293,7 +294,7 @@ def band_lines(inside: pl.DataFrame) -> list[str]:
     for run in inside["run"].unique(maintain_order=True):
         mine = inside.filter(pl.col("run") == run)
         shares = ", ".join(
-            f"{channel.replace('_', ' ')} {share:.0%}"
+            f"{channel.replace('_', ' ')} {percent(share)}"
             for channel, share in mine.select("channel", "share").iter_rows()
         )
         lines.append(f"Inside the 90 % band of {run}: {shares}.")
@@ -307,7 +308,7 @@ def voyages_table(answer: dict) -> str:
             name,
             v["windows"],
             v["loss"],
-            f"{v['coverage']:.0%}" if v["windows"] >= FEWEST_WINDOWS else "-",
+            percent(v["coverage"]) if v["windows"] >= FEWEST_WINDOWS else "-",
         )
         for name, v in answer["voyages"].items()
     ]

@@ -16,6 +16,7 @@ from shiplog.diagnosis.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
+from shiplog.report.numbers import figure
 from shiplog.simulation.error_reduction import Gain
 
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking
@@ -37,7 +38,7 @@ class Verdict:
     sentence: str
     run: str
     before_effect: bool
-    made: str = "fitted to earlier voyages"
+    made: str
     causes: tuple[dict, ...] = ()
     ranking: tuple[dict, ...] = ()
     rejected: tuple[dict, ...] = ()
@@ -151,8 +152,9 @@ def side_force_json(decision: Decision, times: Sequence[dict]) -> dict:
         "parameters": {"force": size},
         "times": list(times),
         "sentence": (
-            f"An intermittent side force of up to {peak:.2g} N acts {abs(found.lever):.2g} m "
-            f"{where} midship and is not recorded: a thruster, or an external force."
+            f"An intermittent side force of up to {figure(peak)} N acts "
+            f"{figure(abs(found.lever))} m {where} midship and is not recorded: a thruster, or an "
+            "external force."
         ),
         "equation": "Y + F(t), N + x F(t)",
         "indistinguishable_from": [],
@@ -196,8 +198,8 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     for label, expected in decision.expected.items():
         cause, least = by[label], expected.least(nats)
         sizes = least * cause.sizes(setting)
-        if len(cause.parameters) == len(sizes):
-            parts = zip(cause.parameters, sizes, least, strict=True)
+        if cause.parameters:  # its sizes begin with theirs; uncertain factors may follow
+            parts = zip(cause.parameters, sizes, least, strict=False)
             numbers = {p.name: (v / si(p.unit), p.unit) for p, v, of in parts if of < HOPELESS}
         else:  # a number for each rudder, or for each point of the map
             numbers = cause.displayed(sizes)

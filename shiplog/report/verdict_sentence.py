@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.result import EXPLAIN_MORE, PATTERN, REFUTED, SIDE_THRUST
 from shiplog.exceptions import listed
+from shiplog.report.numbers import counted, percent
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
@@ -46,7 +48,8 @@ def sentence(
     if verdict == "undecided":
         stated = [one for one in ranking if one["probability"] >= thresholds.STATED]
         text = [
-            f"{_answer(one['name'])} ({one['probability']:.0%})" for one in stated or ranking[:3]
+            f"{_answer(one['name'])} ({_likelihood(one['probability'])})"
+            for one in stated or ranking[:3]
         ]
         if stated:
             return (
@@ -79,14 +82,15 @@ def _named(
     text = " ".join(_likely(cause) for cause in causes)
     if gain is None:
         return text
+    windows = counted(gain.windows, "held-out window")
     if gain.real:
         share = (
-            f"{gain.reduction:.0%} of the error on {gain.windows} held-out windows is "
-            f"explained ({gain.low:.0%} to {gain.high:.0%})."
+            f"{percent(gain.reduction)} of the error on {windows} is "
+            f"explained ({percent(gain.low)} to {percent(gain.high)})."
         )
     else:
         share = (
-            f"No significant part of the error on {gain.windows} held-out windows is explained: "
+            f"No significant part of the error on {windows} is explained: "
             f"it is {less(gain.reduction)} ({less(gain.low)} to {less(gain.high)})."
         )
     text = " ".join(part for part in (share, text, _left(gain, wrong)) if part)
@@ -113,8 +117,8 @@ def _either(names: Sequence[str], structure: dict, ranking: Sequence[dict], why:
         ),
     }
     return (
-        f"Undecided: {causes} ({likely.get(names[0], 0.0):.0%}), or {_answer(outside)} "
-        f"({likely.get(outside, 0.0):.0%}). {reasons[why]}"
+        f"Undecided: {causes} ({_likelihood(likely.get(names[0], 0.0))}), or {_answer(outside)} "
+        f"({_likelihood(likely.get(outside, 0.0))}). {reasons[why]}"
     )
 
 
@@ -123,7 +127,7 @@ def _in_addition(one_of: Sequence[str], ranking: Sequence[dict]) -> str:
     if not one_of:
         return ""
     likely = {one["name"]: one["probability"] for one in ranking}
-    text = " or ".join(f"{_answer(name)} ({likely.get(name, 0.0):.0%})" for name in one_of)
+    text = " or ".join(f"{_answer(name)} ({_likelihood(likely.get(name, 0.0))})" for name in one_of)
     return f"By the log Bayes factor, {text} acts as well: these data cannot tell which."
 
 
@@ -153,9 +157,8 @@ def _left(gain: Gain, wrong: Sequence[dict]) -> str:
     if not left:
         return ""
     channel, share = max(left.items(), key=lambda pair: pair[1])
-    return (
-        f"The largest unexplained part is in {channel.replace('_', ' ')}: {share:.0%} of the error."
-    )
+    where = channel.replace("_", " ")
+    return f"The largest unexplained part is in {where}: {percent(share)} of the error."
 
 
 def _answer(name: str) -> str:
@@ -167,12 +170,19 @@ def _answer(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _likelihood(probability: float) -> str:
+    """In whole per cent; what is below `thresholds.STATED` is not rounded up to it."""
+    if probability < thresholds.STATED <= round(probability, 2):
+        return f"{math.floor(100.0 * probability)}%"
+    return f"{probability:.0%}"
+
+
 def _likely(cause: dict) -> str:
     """A cause's sentence, with its probability where that is below `thresholds.STATED`."""
     if cause["probability"] >= thresholds.STATED:
         return _or(cause)
     how = "Likely" if cause["probability"] > 0.5 else "Perhaps"
-    return f"{how} ({cause['probability']:.0%}): {_or(cause)}"
+    return f"{how} ({_likelihood(cause['probability'])}): {_or(cause)}"
 
 
 def _or(cause: dict) -> str:

@@ -5,40 +5,25 @@ import hashlib
 import json
 import subprocess
 import sys
-import tarfile
 import xml.etree.ElementTree as ElementTree
-from contextlib import ExitStack
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from hidden_stubs import SHIPLOG, names_in, programs
 
 from pipelines.experiments.hidden_effects import (
-    archive,
     methods,
     plan,
     program,
-    remake,
     replay,
     run,
     score,
     suites,
-    without,
 )
 from pipelines.experiments.hidden_effects.__main__ import main
 from pipelines.experiments.hidden_effects.plan import Plan, Planned
-from shiplog.diagnosis import (
-    baseline_check,
-    campaign_characteristics,
-    discrepancy,
-    nominal_cache,
-    placebo,
-    posterior,
-    refutation,
-    thresholds,
-    trial_voyages,
-)
 from shiplog.exceptions import ShiplogError
 
 ROOT = Path(__file__).parents[2]
@@ -112,52 +97,10 @@ def test_a_plan_from_before_there_were_families_still_loads(tmp_path):
 
 # --- the runner, with programs that do nothing ----------------------------------------------------
 
-SIMULATOR = """
-import json, pathlib, sys
-seed, logs, _, key, *options = sys.argv[1:]
-pathlib.Path(logs).mkdir()
-if "--family" in options:
-    (pathlib.Path(logs) / "ship.toml").write_text("")
-pathlib.Path(key).write_text(json.dumps({"verdict": "none", "causes": [], "structure": None}))
-"""
-SHIPLOG = """
-import json, os, pathlib, sys
-command, first, *options = sys.argv[1:]
-given = {k: v for k, v in zip(options, options[1:])}
-made = {"ingest": "--store", "train": "--out"}.get(command)
-if command == "ingest":
-    own = pathlib.Path(first, "ship.toml").exists()
-    assert given["--profile"] == (str(pathlib.Path(first, "ship.toml")) if own else "esso-vectwin")
-if made:
-    pathlib.Path(given[made]).mkdir()
-else:
-    assert pathlib.Path(first).is_dir() and pathlib.Path(given["--store"]).is_dir()
-    pathlib.Path(given["--json"]).write_text(json.dumps({"verdict": os.environ["SAYS"]}))
-"""
-RIVALS = """
-import json, pathlib, sys
-base, *options = sys.argv[1:]
-given = {k: v for k, v in zip(options, options[1:])}
-json_ = pathlib.Path(given["--json"])
-assert "keys" not in " ".join(sys.argv) and given["--voyages"] == "trial_*"
-assert pathlib.Path(base).is_dir() and pathlib.Path(given["--store"]).is_dir()
-assert (json_.parent / "verdict.sha256").exists()  # it comes last
-json_.write_text(json.dumps({"methods": {"glr": {"answer": None, "ranking": []}}}))
-"""
-
 
 @pytest.fixture
 def stubs(tmp_path, monkeypatch):
-    monkeypatch.setenv("SAYS", "none")
-    commands = {}
-    for name, source in (("case", SIMULATOR), ("shiplog", SHIPLOG), ("rival", RIVALS)):
-        (tmp_path / f"{name}.py").write_text(source)
-        commands[name] = (sys.executable, str(tmp_path / f"{name}.py"))
-    return lambda **more: run.Settings(**commands, abroad=commands["case"], **more)
-
-
-def names_in(out, label="5"):
-    return {p.name for p in (out / "cases" / label).iterdir()}
+    return programs(tmp_path, monkeypatch)
 
 
 def test_rivals_answer_once_the_verdict_is_sealed(tmp_path, stubs, monkeypatch):
@@ -222,54 +165,39 @@ def test_another_program_makes_its_own_store_and_model_from_the_kept_logs(tmp_pa
     assert len(score.read(new).answers) == 3
 
 
+def test_a_replay_that_is_stopped_can_be_scored(tmp_path, stubs):
+    """While simpler methods are asked: the verdict is sealed by then."""
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(keep=True))
+    settings = stubs(rivals=True)
+    (tmp_path / "rival.py").write_text("raise SystemExit(130)")
+    with pytest.raises(KeyboardInterrupt):
+        replay.replay(out, new, settings)
+    assert [one.word for one in score.read(new).answers] == ["none"]
+    (new / "keys" / "5.json").unlink()  # killed between seal and key
+    replay.replay(out, new, stubs())
+    assert [one.word for one in score.read(new).answers] == ["none"]
+
+
+@pytest.mark.parametrize(("code", "word"), [(1, "failed"), (3, "none")])
+def test_logs_that_a_program_refuses_or_damages_are_its_own_answer(tmp_path, stubs, code, word):
+    """They are there, whatever it does with them: the case counts."""
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs(keep=True))
+    settings = stubs()
+    end = f'if command == "ingest":\n    sys.exit({code})\n'
+    (tmp_path / "shiplog.py").write_text(SHIPLOG + end)
+    replay.replay(out, new, settings, whole=True)
+    found = score.read(new)
+    assert [one.word for one in found.answers] == [word] and not found.unmade
+
+
 def test_one_case_of_several_is_asked_again(tmp_path, stubs):
     out = tmp_path / "out"
     run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))
     again = replay.replay(out, tmp_path / "new", stubs(), every=2)
     assert [p.label for p in again.cases] == ["5", "7"]
     assert len(score.read(tmp_path / "new").answers) == 2
-
-
-def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, monkeypatch):
-    """Two kept cases in which nothing was hidden; without the placebo a name would be reported."""
-    out = tmp_path / "out"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(keep=True))
-    asked = []
-
-    def settings(jobs, shiplog):
-        asked.append(shiplog[-1])
-        monkeypatch.setenv("SAYS", "coverage" if shiplog[-1] == "placebo" else "none")
-        return stubs(jobs=jobs)
-
-    monkeypatch.setattr(without, "Settings", settings)
-    displayed = without.table(out, ("nothing", "placebo"), 1)
-    rows = [
-        [cell.strip() for cell in line.split("|")[1:-1]] for line in displayed.splitlines()[-2:]
-    ]
-    assert rows == [["nothing", "2", "2", "0", "0"], ["placebo", "2", "0", "0", "2"]]
-    assert asked == ["nothing", "placebo"]
-    assert {folder.name for folder in (tmp_path / "out-without").iterdir()} == set(asked)
-
-
-@pytest.mark.parametrize("part", list(without.PARTS))
-def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
-    """What a part replaces exists under that name, and is itself again afterwards."""
-    watched = {
-        "placebo": (placebo, "placebos"), "form-error": (thresholds, "FORM_ERROR"),
-        "discrepancy": (discrepancy, "SEEN"), "voyage-effects": (nominal_cache, "characteristics"),
-        "share-of-trial": (nominal_cache, "characteristics"),
-        "robust-weights": (campaign_characteristics, "robust_weights"),
-        "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
-        "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
-        "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.fits, "imitated"),
-    }  # fmt: skip
-    assert set(without.PARTS) == {without.WHOLE, *watched}
-    before = {name: getattr(*where) for name, where in watched.items()}
-    with ExitStack() as stack:
-        without.PARTS[part](stack)
-        if part in watched:
-            assert getattr(*watched[part]) is not before[part]
-    assert all(getattr(*where) is before[name] for name, where in watched.items())
 
 
 def test_logs_of_another_family_come_with_their_own_profile(tmp_path, stubs, simulator):
@@ -294,105 +222,6 @@ def test_the_page_is_written_with_its_picture_or_refused(tmp_path, stubs, capsys
     steps.write_text(json.dumps(content))
     assert main(["scores", str(out)]) == 2
     assert "several programs" in capsys.readouterr().err
-
-
-def test_packed_answers_make_the_same_page_and_a_test_goes_on_from_them(tmp_path, stubs, capsys):
-    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
-    planned = plan.save(out, suites.plan("nightly", 5, 2))
-    run.run(out, replace(planned, cases=planned.cases[:1]), stubs())
-    assert main(["pack", str(out), "--into", str(packed)]) == 0
-    before = packed.read_bytes()
-    with tarfile.open(packed) as content:
-        assert not [name for name in content.getnames() if "store" in name or "logs" in name]
-        content.extractall(tmp_path / "elsewhere", filter="data")
-    archive.pack([out], packed)
-    assert packed.read_bytes() == before
-    pages = []
-    for given in (out, packed):
-        capsys.readouterr()
-        assert main(["scores", str(given)]) == 0
-        pages.append(capsys.readouterr().out)
-    assert pages[0] == pages[1] and "1 of 2 cases; 1 not run" in pages[0]
-    run.run(tmp_path / "elsewhere" / "out", planned, stubs())
-    answers = score.read(tmp_path / "elsewhere" / "out").answers
-    assert [one.planned.label for one in answers] == ["5", "6"]
-    assert (out / "cases" / "5" / "verdict.json").read_bytes() == (
-        tmp_path / "elsewhere" / "out" / "cases" / "5" / "verdict.json"
-    ).read_bytes()
-
-
-def test_packed_answers_hold_no_path_of_the_machine(tmp_path, stubs):
-    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs(called="another program"))
-    folder = out / "cases" / "5"
-    recording = str(folder / "d" / "diagnosis.rrd")
-    (folder / "verdict.json").write_text(json.dumps({"verdict": "none", "recording": recording}))
-    run._seal_file(folder / "verdict.json")
-    steps = json.loads((folder / "steps.json").read_text())
-    steps[-1] |= {"stderr": f"Recording: {recording}"}
-    (folder / "steps.json").write_text(json.dumps(steps))
-    (out / "cases" / "6" / "verdict.sha256").write_text("0  verdict.json")  # its answer was changed
-    archive.pack([out], packed)
-    with tarfile.open(packed) as content:
-        content.extractall(tmp_path / "elsewhere", filter="data")
-    there = tmp_path / "elsewhere" / "out"
-    verdict = (there / "cases" / "5" / "verdict.json").read_text()
-    assert json.loads(verdict)["recording"] == "out/cases/5/d/diagnosis.rrd"
-    assert str(tmp_path) not in verdict + (there / "cases" / "5" / "steps.json").read_text()
-    with pytest.raises(score.Sealed, match="is not what was sealed"):
-        score.read(there)
-    (there / "cases" / "6" / "verdict.sha256").unlink()
-    (one,) = score.read(there).answers
-    assert one.word == "none" and program.of_answers(one.steps) == ("another program",)
-
-
-def test_unpacked_answers_become_a_test_that_can_be_asked_again(tmp_path, stubs):
-    out, packed = tmp_path / "out", tmp_path / "answers.tar.xz"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 2)), stubs())
-    archive.pack([out], packed)
-    with tarfile.open(packed) as content:
-        content.extractall(tmp_path / "elsewhere", filter="data")
-    there = tmp_path / "elsewhere" / "out"
-    answer = (there / "cases" / "5" / "verdict.json").read_bytes()
-    planned = remake.remake(there, stubs())
-    assert {"logs", "store", "base"} <= names_in(there) and run.kept(there, planned.cases[1])
-    assert (there / "cases" / "5" / "verdict.json").read_bytes() == answer
-    run.run(there, planned, stubs(rivals=True))
-    assert all(one.rivals for one in score.read(there).answers)
-    (there / "cases" / "5" / "store" / "mark").write_text("")
-    remake.remake(there, stubs())  # it is there already
-    assert (there / "cases" / "5" / "store" / "mark").exists()
-
-
-@pytest.mark.parametrize(
-    ("what", "reported"), [("key", "hides something else"), ("ingest", "ingest ended with 1")]
-)
-def test_a_case_that_is_not_the_same_again_is_not_kept(tmp_path, stubs, what, reported):
-    out = tmp_path / "out"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 1)), stubs())
-    if what == "key":
-        key = out / "keys" / "5.json"
-        key.write_text(key.read_text().replace("none", "named"))
-        settings = stubs()
-    else:
-        broken = tmp_path / "broken.py"
-        broken.write_text("import sys\nsys.exit(1)")
-        settings = replace(stubs(), shiplog=(sys.executable, str(broken)))
-    with pytest.raises(ShiplogError, match=reported):
-        remake.remake(out, settings)
-    assert not names_in(out) & set(run.LARGE)
-    assert "verdict.json" in names_in(out)
-
-
-def test_what_cannot_be_packed_or_unpacked_is_reported(tmp_path, capsys):
-    (tmp_path / "a").mkdir()
-    assert main(["pack", str(tmp_path / "a"), "--into", str(tmp_path / "b")]) == 1
-    assert "holds no test" in capsys.readouterr().err and not (tmp_path / "b").exists()
-    assert main(["pack", *[str(tmp_path / "a")] * 2, "--into", str(tmp_path / "b")]) == 1
-    assert "Two of the folders" in capsys.readouterr().err
-    (tmp_path / "b").write_text("words")
-    assert main(["scores", str(tmp_path / "b")]) == 1
-    assert "no archive of tests" in capsys.readouterr().err
 
 
 # --- the commit

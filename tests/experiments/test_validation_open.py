@@ -1,7 +1,10 @@
-"""The answers that an undecided verdict leaves open, as its sentence lists them; their scores."""
+"""The answers that an undecided verdict leaves open, as its sentence lists them, and what a name at
+the wrong place says; their scores."""
+
+import math
 
 import pytest
-from test_validation_scores import answer, key, ranked, undecided
+from test_validation_scores import answer, key, named, ranked, undecided
 
 from pipelines.experiments.hidden_effects import score_tables, scores
 from pipelines.experiments.hidden_effects.open_answers import open_answers
@@ -83,3 +86,16 @@ def test_the_plain_sentences_of_the_program_are_read():
     )  # fmt: skip
     assert read(bank=0.95, current=0.91, payload=0.2) == (({"bank", "current"}, 0.91),)
     assert read(bank=0.95) == (({"bank"}, 0.95),)
+
+
+def test_a_cause_at_the_wrong_place_is_no_score():
+    """The port unit has lost thrust, and the starboard one is named: as wrong as another cause."""
+    lost, blamed = key("thrust_loss"), named("thrust_loss")
+    lost["causes"][0]["parameters"] = {"unit": {"value": "port", "unit": ""}}
+    blamed["causes"][0]["parameters"] = {"actuator": {"value": "starboard"}}
+    one, other = answer(lost, blamed), answer(lost, named("fouling"))
+    assert scores.group_utility(one) == scores.group_utility(other) == 1.0 - (22 / 2 + 1) / 22
+    assert scores.isolation([one]) == 0.0 and scores.log_score(one) == math.log(scores.FLOOR)
+    blamed["causes"][0]["parameters"] = {"actuator": {"value": "port"}}
+    right = answer(lost, blamed)
+    assert scores.group_utility(right) == 1.0 and scores.isolation([right]) == 0.95

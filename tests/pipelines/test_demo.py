@@ -77,8 +77,14 @@ def test_the_demo_ends_with_a_recording_of_both_sides_and_resumes(tmp_path, monk
     )
     # a diagnosis is made again, for a minute, and what it says is tested elsewhere
     output = SimpleNamespace(sentence="as before", as_json=dict)
-    monkeypatch.setattr(demo, "diagnose_run", lambda *_, **__: SimpleNamespace(verdict=output))
+    drawn = [True, False]  # the second diagnosis, of the extended model, has no pictures
+    monkeypatch.setattr(
+        demo, "diagnose_run",
+        lambda *_, **__: SimpleNamespace(verdict=output, drawn=drawn.pop(0)),
+    )  # fmt: skip
+    (logs / "bad.mcap").unlink()
     again = demo.run_demo(tmp_path / "demo", logs)
+    assert drawn == [] and not again.content["refused"] and not again.complete
     assert again.content["runs"] == first.content["runs"]
     path = tmp_path / "demo" / "runs" / "ref" / "seed0" / "model.safetensors"
     assert path.stat().st_mtime_ns == trained

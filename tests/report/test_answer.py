@@ -5,23 +5,52 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shiplog.models.causes.environment import Current
+from shiplog.diagnosis.fitted import ExpectedEvidence
+from shiplog.models.causes.environment import Bank, Current
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
-from shiplog.report import answer, page
+from shiplog.report import answer, page, verdict
 from shiplog.report.verdict import Verdict
 
 
+def run_of(*voyages, given=False):
+    return SimpleNamespace(name="run", given=given, trained_on=voyages, judges_itself=True)
+
+
 @pytest.mark.parametrize(
-    ("seconds", "unbroken", "more"), [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140)]
+    ("run", "words"),
+    [
+        (run_of("home"), "fitted to earlier voyages"),  # which this store may not have
+        (run_of("home", "trip"), "fitted to these very voyages"),
+        (run_of("trip[0:100]"), "fitted to these very voyages"),
+        (run_of(given=True), "with coefficients that were not fitted to these voyages"),
+    ],
+)
+@pytest.mark.parametrize("before", [True, False])
+def test_what_the_model_was_fitted_to_does_not_depend_on_the_store(monkeypatch, run, words, before):
+    """`before`: whether the store has its voyages. A verdict of too little says it, too."""
+    record = SimpleNamespace(seconds=9.0, timescale=SimpleNamespace(seconds=30.0), names=("trip",))
+    monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(0, dtype=int))
+    for one in (answer.too_little(run, record, before), answer.runs_away(run, record, before)):
+        assert f"Model: run, {words}." in page.markdown(one)
+    notes = answer.of_own_voyages(run, SimpleNamespace(record=record), SimpleNamespace(adapted=0))
+    assert bool(notes) == ("very" in words)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "unbroken", "more"),
+    [(600.0, 0, 120), (600.0, 3, 30), (100.0, 3, 140), (239.7, 4, 1)],
 )
 def test_too_little_says_how_much_more_is_needed(monkeypatch, seconds, unbroken, more):
     """240 s in all, and four segments of 30 s each: pieces of 25 s hold none, however many."""
     monkeypatch.setattr(answer.segments, "begins", lambda record: np.zeros(unbroken, dtype=int))
-    record = SimpleNamespace(seconds=seconds, timescale=SimpleNamespace(seconds=30.0))
-    found = answer.too_little(SimpleNamespace(name="run"), record, True)
+    record = SimpleNamespace(
+        seconds=seconds, timescale=SimpleNamespace(seconds=30.0), names=("trip",)
+    )
+    found = answer.too_little(run_of("home"), record, True)
     assert not answer.enough(record)
     assert f"Log at least {more} s more" in found.sentence
+    assert f" {int(seconds)} s can be used, and 240 s are needed" in found.sentence
 
 
 def test_each_unit_and_channel_has_a_row_of_its_own():
@@ -36,12 +65,44 @@ def test_each_unit_and_channel_has_a_row_of_its_own():
     ]  # fmt: skip
 
 
+def test_sizes_of_a_large_ship_are_written_out():
+    limits = [{"name": "payload", "share": 0.5,
+               "parameters": {"mass": {"value": 123456.0, "unit": "kg"},
+                              "factor": {"value": 1.5, "unit": "1"}}}]  # fmt: skip
+    row = page._limits(SimpleNamespace(limits=limits))[6]
+    assert row == "| payload | mass 120000 kg, factor 150% | 50% |"
+    limits[0]["share"] = 0.004
+    row = page._limits(SimpleNamespace(limits=limits))[6]
+    assert row.endswith("| 0.4% |")
+    force = {"value": 12345.0, "low": 11000.0, "high": 14000.5, "unit": "N"}
+    cause = {
+        "name": "side_thrust", "probability": 0.95, "sentence": "A side force.", "equation": "Y",
+        "parameters": {"force": force}, "indistinguishable_from": [],
+    }  # fmt: skip
+    assert "| force | 12340 | 11000 to 14000 | N |" in page._cause(cause)
+
+
+def test_a_number_that_no_data_would_reveal_is_left_out_of_the_limits():
+    """5 nats of a number that has 10 at its realistic size: √(2 · 5 / 10) of it. A bank has two
+    uncertain factors besides."""
+    causes = [Bank(), Fouling()]
+    seen, hidden = np.array([10.0, 1.0, 1.0]), np.array([1e-4, 1e-5, 1e-5])
+    for each, strength in ((seen, {"value": 1.0, "unit": "1"}), (hidden, None)):
+        expected = {"bank": ExpectedEvidence(each, 0.0), "fouling": ExpectedEvidence(each[:1], 0.0)}
+        limits = verdict.limits_json(
+            SimpleNamespace(expected=expected), causes, SimpleNamespace(prior=lambda p: p.prior)
+        )
+        by = {one["name"]: one["parameters"] for one in limits}
+        assert by["bank"] == ({} if strength is None else {"strength": strength})
+        assert bool(by["fouling"]) == (strength is not None)
+
+
 def test_the_report_says_what_was_not_tested_and_why():
     """A cause that no sensor shows is not one that these data exclude."""
     unavailable = ({"name": "bank", "reason": "the profile's [site] shows no bank"},)
-    text = page.markdown(Verdict("none", "No change.", "run", True, unavailable=unavailable))
+    text = page.markdown(Verdict("none", "No change.", "run", True, "", unavailable=unavailable))
     assert "## Not testable\n\n- bank: the profile's [site] shows no bank\n" in text
-    assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True))
+    assert "Not testable" not in page.markdown(Verdict("none", "No change.", "run", True, ""))
 
 
 def test_an_undecided_verdict_says_which_test_separates_its_candidates():

@@ -46,7 +46,7 @@ def test_every_key_of_a_report_and_a_verdict_is_there():
     report = VoyageReport("v", 1, 0, 1, 0.1, instruments=(Instrument("gyro", 10.0, 0.0, "deg"),))
     content = report.as_json()
     assert {*content, *content["messages"], *content["instruments"][0]} <= WORDS
-    empty = Verdict("none", "", "run", True).as_json()
+    empty = Verdict("none", "", "run", True, "").as_json()
     assert {*empty, *empty["base"], "structure", "gain"} - {"contract"} <= WORDS
 
 

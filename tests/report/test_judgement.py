@@ -65,6 +65,13 @@ def test_windows_that_ran_away_are_counted_and_left_out():
     assert found.against[0].share == pytest.approx(0.5)
 
 
+def test_one_window_is_one_window():
+    one = judge("ref", errors([1.0]), {"hold": np.full(1, 2.0)}, 3.0, 100)
+    assert one.sentence.startswith("ref, on 1 window of 100 s: 0.5 of the L of holding")
+    lost = judge("ref", errors([math.inf]), {"hold": np.full(1, 2.0)}, 3.0, 100)
+    assert lost.sentence == "ref, on 1 window of 100 s: it diverged."
+
+
 @pytest.mark.parametrize("count", [1, FEWEST_WINDOWS - 1, FEWEST_WINDOWS])
 def test_of_too_few_windows_there_is_no_interval(count):
     found = judge("ref", errors([1.0] * count), {"hold": np.full(count, 2.0)}, 3.0, 20)
@@ -73,6 +80,15 @@ def test_of_too_few_windows_there_is_no_interval(count):
     assert (found.against[0].low is None) == few
     assert ("0.5 of the L of holding the velocity" in found.sentence) == few
     assert found.against[0].word == ("not significantly better or worse" if few else "better")
+
+
+def test_a_poor_model_and_a_large_force_are_written_out():
+    """134 deg was 1.3e+02 deg."""
+    poor = judge("ref", errors([1500.0], 1230.0, 134.0), {"hold": np.full(1, 10.0)}, 3.0, 100)
+    assert "100 s: 150 of the L of holding the velocity." in poor.sentence
+    assert poor.sentence.endswith("After 100 s it is 410 ship lengths and 130 deg off (medians).")
+    large = pl.DataFrame({"voyage": ["a"], "part": ["hull"], "surge": [12345.0], "sway": [0.0]})
+    assert force_line(large, "a").endswith("hull 12000 N.")
 
 
 def test_forces_of_a_voyage_in_a_line():

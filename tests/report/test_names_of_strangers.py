@@ -57,7 +57,7 @@ def test_markdown_of_a_name_is_displayed_and_not_done(name):
 
 def test_the_report_of_a_diagnosis(tmp_path):
     intervals = (Interval(HTML, 100.0, 200.0, "external", f"pushed by {LINK}"),)
-    verdict = Verdict("none", f"Nothing in {PICTURE}.", HTML, False, intervals=intervals)
+    verdict = Verdict("none", f"Nothing in {PICTURE}.", HTML, False, "", intervals=intervals)
     diagnose._write(DiagnosedTrial(verdict, tmp_path))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "onerror" in text and "javascript" in text and harmless(text)

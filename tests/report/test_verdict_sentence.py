@@ -26,6 +26,13 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
+def test_one_window_is_one_window():
+    lag = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 0.9}
+    for after, low, high in ((400.0, 0.1, 0.3), (500.0, -0.1, 0.1)):
+        output = sentence("named", [lag], None, Gain(500.0, after, low, high, 1, {}), 1.0)
+        assert "of the error on 1 held-out window is explained" in output
+
+
 def test_one_of_several_causes_that_acts_in_addition_is_in_the_sentence():
     sure = {
         "sentence": "The clock is late.", "name": "clock_offset", "probability": 1.0,
@@ -80,6 +87,26 @@ def test_an_undecided_verdict_does_not_contradict_its_ranking():
     assert sentence("undecided", [], None, None, 1.0, ranking=sure) == (
         "Undecided: the log Bayes factor favours rudder delay (99%), which held-out voyages do not "
         "confirm."
+    )
+
+
+def test_what_is_not_stated_is_not_rounded_to_what_would_be():
+    """0.897 is below 0.9, and 90 % of it would not be."""
+    near = [{"name": "fouling", "probability": 0.897}, {"name": "none", "probability": 0.1}]
+    assert sentence("undecided", [], None, None, 1.0, ranking=near) == (
+        "Undecided: fouling (89%) or no change (10%). No answer has a probability of 90%."
+    )
+    cause = {"sentence": "It is.", "indistinguishable_from": [], "probability": 0.897}
+    assert sentence("named", [cause], None, None, 1.0) == "Likely (89%): It is."
+
+
+def test_not_all_of_the_error_is_explained():
+    sure = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 1.0}
+    gained = Gain(500.0, 2.0, 0.993, 0.9991, 18, {"sway": 0.997})
+    wrong = [{"channel": "sway", "share_of_error": 1.0}]
+    assert sentence("named", [sure], None, gained, 1.0, wrong=wrong) == (
+        "99.6% of the error on 18 held-out windows is explained (99% to 99.9%). The rudders lag. "
+        "The largest unexplained part is in sway: 0.3% of the error."
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
@@ -9,7 +10,7 @@ import pytest
 from recordings import entities, rows, scalars
 
 from shiplog.channels import STATE
-from shiplog.report import viewer
+from shiplog.report import diagnosis_pictures, viewer
 from shiplog.report.diagnosis_data import AFTER, BEFORE, ERROR_COLUMNS, TRACKS, Exhibit
 from shiplog.report.viewer import diagnosis
 
@@ -101,6 +102,25 @@ def test_the_window_that_improved_most_comes_first(exhibit):
     unnamed = exhibit.errors.with_columns(pl.lit(None, pl.Float64).alias(AFTER))
     telling = replace(exhibit, errors=unnamed).telling
     assert telling.select("voyage", "window").rows() == [("out", 1), ("home", 1)]  # the worst
+
+
+def test_a_window_in_which_the_model_diverges_is_not_the_one_that_improved_most():
+    """It is in none of the figures: of three windows the second, whose L is 1e9."""
+    size, loss = 5, np.array([[30.0, 0.0, 0.0], [1e9, 0.0, 0.0], [0.0, 20.0, 0.0]])
+    cut = SimpleNamespace(
+        plan=pl.DataFrame({"voyage": ["out"] * 3, "elapsed": [0.0, 5.0, 10.0]}),
+        dt=np.ones((3, size - 1)), since=np.tile(np.arange(5.0), (3, 1)),
+    )  # fmt: skip
+    held = SimpleNamespace(
+        cut=cut, states_before=np.zeros((3, size, 6)), parts=lambda _: loss,
+        counted=np.array([True, False, True]),
+    )  # fmt: skip
+    done = SimpleNamespace(held=held, decision=True, after=None)
+    tracks, errors = diagnosis_pictures._before_and_after(done)
+    assert errors[BEFORE].to_list() == [30.0, None, 20.0] and tracks.height == 15
+    nothing = SimpleNamespace(errors=errors)
+    assert Exhibit.telling.fget(nothing)["window"].to_list() == [0]
+    assert Exhibit.telling.fget(SimpleNamespace(errors=errors[1:2]))["window"].to_list() == [1]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+from pipelines.experiments.hidden_effects.score import made
 from shiplog import files
 from shiplog.exceptions import ShiplogError
 
@@ -67,13 +69,18 @@ def _elsewhere(test: Path, file: Path) -> bytes:
 
 
 def _contents(test: Path) -> list[Path]:
-    """The plan, and of each sealed case its key and answers."""
+    """The plan, and of each sealed case its key and answers; a case whose logs could not be written
+    has no key."""
     sealed = sorted(seal.parent for seal in (test / "cases").glob("*/verdict.sha256"))
-    keys = [test / "keys" / f"{case.name}.json" for case in sealed]
+    keys = [test / "keys" / f"{case.name}.json" for case in sealed if made(_steps(case))]
     return [
         test / "keys" / "plan.json", *keys,
         *(case / name for case in sealed for name in KEPT if (case / name).exists()),
     ]  # fmt: skip
+
+
+def _steps(case: Path) -> list[dict[str, Any]]:
+    return json.loads((case / "steps.json").read_text(encoding="utf-8"))
 
 
 @contextmanager

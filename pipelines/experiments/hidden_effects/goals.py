@@ -172,11 +172,13 @@ def asked(limits: Limits) -> str:
 
 
 def met(share: float, limits: Limits) -> str:
-    """yes or no; empty where nothing is asked."""
+    """yes or no; empty where nothing is asked. What was named may gain more than the truth does: a
+    share of that is above 1."""
     least, most = limits
     if least is None and most is None:
         return ""
-    return "yes" if (least or 0.0) <= share <= (1.0 if most is None else most) else "no"
+    enough, little = least is None or share >= least, most is None or share <= most
+    return "yes" if enough and little else "no"
 
 
 def cell(hits: Sequence[bool]) -> str:

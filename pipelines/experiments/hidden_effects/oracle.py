@@ -35,14 +35,15 @@ Truth = Mapping[str, Any]  # a cause of a key: name, and parameters as the contr
 def true_cause(truth: Truth, setting: Setting) -> tuple[Cause, np.ndarray] | None:
     """The catalogue's cause and the numbers that show what the key says; None where none does."""
     told = {k: p["value"] for k, p in truth["parameters"].items()}
-    channel = told.pop("channel", None)
+    channel, unit = told.pop("channel", None), told.pop("unit", "")
     for one in CATALOGUE:
         if one.name != truth["name"] or getattr(one, "channel", None) != channel:
             continue
         if truth["name"] in OTHER_FORM or one.missing(setting):
             return None
-        cause = one.on(setting)
-        return cause, numbers(cause, told, setting)
+        for cause in one.each(setting):  # of one unit alone, or of all together
+            if getattr(cause, "actuator", "") == unit:
+                return cause, numbers(cause, told, setting)
     return None
 
 

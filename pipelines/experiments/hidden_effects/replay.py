@@ -82,7 +82,7 @@ def _from_the_logs(source: Path, out: Path, plan: Plan, settings: Settings) -> N
 def _left(out: Path, planned: Planned, settings: Settings) -> bool:
     folder = plans.case_folder(out, planned)
     asked = (folder / "rivals.sha256").exists() or not settings.rivals
-    return not (run.finished(folder) and asked)
+    return not (run.finished(folder) and asked and plans.key_path(out, planned).exists())
 
 
 def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str | None:
@@ -102,11 +102,11 @@ def _case(source: Path, out: Path, planned: Planned, settings: Settings) -> str 
         steps = json.loads((first / "steps.json").read_text(encoding="utf-8"))
         made = [one for one in steps if one["step"] in MADE]
         reported.append(f"{run.seal(folder, [*made, done])} after {done['wall_s']:.0f} s")
+    shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
     if settings.rivals and not (folder / "rivals.sha256").exists():
         reported.append(run.ask_rivals(folder, base, store, settings))
     if None in reported:
         return None
     if not settings.keep:
         shutil.rmtree(folder / "d", ignore_errors=True)
-    shutil.copyfile(plans.key_path(source, planned), plans.key_path(out, planned))
     return "; ".join(reported)

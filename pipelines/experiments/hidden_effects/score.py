@@ -316,12 +316,17 @@ def read(out: Path) -> Score:
             pending.append(one)
             continue
         steps = json.loads((folder / "steps.json").read_text(encoding="utf-8"))
-        if steps[0]["rc"] != 0:
+        if not made(steps):
             unmade.append(one)
         else:
             rivals, oracle = open_rivals(folder, key), _oracle(folder / "oracle.json")
             answers.append(Answer(one, *open_key(folder, key), steps, rivals, oracle))
     return Score(planned.suite, tuple(answers), tuple(pending), tuple(unmade))
+
+
+def made(steps: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether there are logs and a key; a replay from kept logs did not write them."""
+    return all(step["rc"] == 0 for step in steps if step["step"] == "logs")
 
 
 def _oracle(path: Path) -> float | None:

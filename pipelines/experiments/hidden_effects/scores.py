@@ -19,6 +19,7 @@ from shiplog.report import tables
 
 OUTSIDE = "outside the catalogue"  # a component of its own, next to the names
 COMPONENTS = len(NAMES) + 1
+ELSEWHERE = "another unit or channel"  # what a cause at the wrong place blames: it is not at fault
 FLOOR = 0.01  # least probability that the log score takes: a ranking lists nothing below it
 KINDS = {"none": "nothing", "one": "one cause", "two": "two at once", "outside": "outside"}
 
@@ -59,7 +60,10 @@ def right_among_alarms(answers: Sequence[Answer]) -> list[bool]:
 
 
 def _given(one: Answer, label: str) -> float:
-    """Probability of a label; of a verdict that gives none, 1 for what it says and 0 otherwise."""
+    """Probability of a label; of a verdict that gives none, 1 for what it says and 0 otherwise. A
+    cause that is named at the wrong place gives none to the truth."""
+    if label in one.misplaced:
+        return 0.0
     found = one.probability(label)
     return found if found is not None else float(label in _reported(one))
 
@@ -121,7 +125,8 @@ def candidates(one: Answer) -> dict[frozenset[str], float]:
             reported = frozenset().union(*map(_component, labels))
             found[reported] = found.get(reported, 0.0) + probability
         return found if sum(found.values()) > 0.0 else {frozenset(): 1.0}
-    return {frozenset(reported): 1.0 for reported in itertools.product(*one.groups)}
+    groups = [group or {ELSEWHERE} for group in one.groups]
+    return {frozenset(reported): 1.0 for reported in itertools.product(*groups)}
 
 
 def _component(label: str) -> frozenset[str]:

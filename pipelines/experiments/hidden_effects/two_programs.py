@@ -15,6 +15,7 @@ from pipelines.experiments.hidden_effects.score import Answer, Score
 from pipelines.experiments.hidden_effects.validation import PLACES, heading, one_program
 from shiplog.exceptions import ShiplogError
 from shiplog.report import tables
+from shiplog.report.numbers import counted
 
 FORMER, PRESENT = "former", "present"
 TITLE = "# Former and present decision on the same cases"
@@ -87,10 +88,10 @@ def _of_place(place: str, pairs: Sequence[Pair]) -> list[str]:
     }
     different = [pair for pair in pairs if pair.differ]
     return [
-        f"## {heading(place)}: {_cases(pairs)}",
+        f"## {heading(place)}: {counted(len(pairs), 'case')}",
         goals.by_method(by, place == goals.OTHER),
         split_table(pairs),
-        f"### Where the answers differ: {_cases(different)}",
+        f"### Where the answers differ: {counted(len(different), 'case')}",
         _differences(different),
     ]
 
@@ -148,7 +149,3 @@ def _differences(pairs: Sequence[Pair]) -> str:
 def _reported(answer: Answer) -> str:
     mark = "" if answer.right else " (wrong name)" if answer.misnamed else " (not right)"
     return score_tables.reported(answer) + mark
-
-
-def _cases(pairs: Sequence[Pair]) -> str:
-    return f"{len(pairs)} case" if len(pairs) == 1 else f"{len(pairs)} cases"

@@ -75,7 +75,8 @@ def _row(one: Way) -> tuple[object, ...]:
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0f}"
+    """A loss of an answer, whose JSON has no infinity."""
+    return "diverged" if value is None else f"{value:.0f}"
 
 
 def _answer(one: Way) -> str:

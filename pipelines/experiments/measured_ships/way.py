@@ -50,6 +50,8 @@ def go(name: str, one: DataSet, data: Path, out: Path) -> Way:
             done.append(before[what])
         else:
             log.info("%s: %s", name, what)
+            if what == "convert":  # it does not replace a log that is there
+                shutil.rmtree(folder / "logs", ignore_errors=True)
             command = [*OUR_SHIPLOG, what, *arguments, *_json(what, folder)]
             done.append(step(what, command, folder, SETTINGS))
             if what == "profile" and done[-1]["rc"] == DONE:
@@ -83,7 +85,6 @@ def _commands(one: DataSet, data: Path, folder: Path):
         yield "profile", [files[0], *which, "--out", profile]
     logs = files
     if one.tables:
-        shutil.rmtree(folder / "logs", ignore_errors=True)
         yield "convert", [*files, "--profile", profile, "--out", str(folder / "logs")]
         logs = [str(folder / "logs")]
     store = ["--store", str(folder / "store")]

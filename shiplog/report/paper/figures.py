@@ -108,8 +108,11 @@ def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
 
     losses      set, seed, loss
     baselines   name → L
+
+    A seed that diverged has no point, and is counted below its set; the mean is of the others.
     """
     sets = losses["set"].unique(maintain_order=True).to_list()
+    ticks = []
     with figure(2.8, path) as drawn:
         axis = drawn.subplots()
         for at, name in enumerate(sets):
@@ -117,6 +120,8 @@ def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
             spread = np.linspace(-0.18, 0.18, len(own)) if len(own) > 1 else np.zeros(1)
             axis.scatter(at + spread, own, s=9.0, color=COLOURS[name], alpha=0.75, linewidths=0)
             finite = own[np.isfinite(own)]
+            lost = len(own) - len(finite)
+            ticks.append(f"{named(name)}\n{lost} diverged" if lost else named(name))
             if len(finite):
                 axis.hlines(finite.mean(), at - 0.3, at + 0.3, color=COLOURS[name], linewidth=1.6)
         for name, value in baselines.items():
@@ -124,7 +129,7 @@ def test(losses: pl.DataFrame, baselines: dict[str, float], path: Path) -> None:
             axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right",
                           va="bottom", fontsize=6.5, color="#555555")  # fmt: skip
         axis.set_yscale("log")
-        axis.set_xticks(range(len(sets)), [named(name) for name in sets])
+        axis.set_xticks(range(len(sets)), ticks)
         axis.set_ylabel("test L (points: seeds, bar: mean)")
 
 

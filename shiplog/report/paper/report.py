@@ -9,6 +9,7 @@ import polars as pl
 from shiplog.exceptions import listed
 from shiplog.report import tables
 from shiplog.report.evaluation import EvaluatedRuns
+from shiplog.report.numbers import counted
 from shiplog.report.paper import statements
 from shiplog.report.paper.style import named
 from shiplog.training.run_folder import RunFolder
@@ -60,10 +61,10 @@ def text(results: Results, chosen_by: str, sizes: pl.DataFrame) -> str:
         for row in summary(results).iter_rows(named=True)
     ]
     lines = [
-        f"# {run.profile.ship.name}: {len(results.runs)} window sets",
+        f"# {run.profile.ship.name}: {counted(len(results.runs), 'window set')}",
         "",
         f"Recipe `{run.config.recipe}`, windows of {run.config.window} s; test on "
-        f"{listed(results.evaluation.voyages)}, {count} windows. Split by {chosen_by}.",
+        f"{listed(results.evaluation.voyages)}, {counted(count, 'window')}. Split by {chosen_by}.",
         "",
         tables.table(tuple(sizes.columns), _sizes(sizes)),
         "",

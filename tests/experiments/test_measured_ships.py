@@ -1,0 +1,51 @@
+"""The way of a data set, with commands that do nothing."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipelines.experiments.measured_ships import page, way
+from pipelines.experiments.measured_ships.ships import DataSet
+
+
+def test_an_interrupted_way_goes_on_from_the_logs_that_it_made(tmp_path, monkeypatch):
+    """Stopped while it ingests; then `ingest` is the first step that is done again."""
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "run.csv").write_text("t")
+    one = DataSet("a ship", "data", tables=("*.csv",), profile="kvlcc2")
+    done, stopped = [], True
+
+    def step(what, command, folder, settings):
+        if what == "convert":
+            assert not (folder / "logs").exists()
+            (folder / "logs").mkdir()
+            (folder / "logs" / "run.mcap").write_text("log")
+        if what == "ingest":
+            assert [p.name for p in Path(command[-5]).iterdir()] == ["run.mcap"]
+            if stopped:
+                raise KeyboardInterrupt
+        if "--json" in command:
+            Path(command[-1]).write_text(json.dumps({}))
+        done.append(what)
+        return {"step": what, "rc": 0, "cpu_s": 1.0, "stderr": ""}
+
+    monkeypatch.setattr(way, "step", step)
+    with pytest.raises(KeyboardInterrupt):
+        way.go("a ship", one, tmp_path, tmp_path / "out")
+    stopped = False
+    found = way.go("a ship", one, tmp_path, tmp_path / "out")
+    assert done == ["convert", "ingest", "voyages", "train", "evaluate", "diagnose"]
+    assert found.stopped == "" and found.cpu_s == 6.0
+
+
+def test_a_model_that_diverged_is_not_one_that_was_not_evaluated():
+    floors = {"hold": 90.0, "least_squares": None}
+    evaluated = {"evaluate": {"loss": None, "floors": floors}}
+    lines = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for answers in (evaluated, {})
+        for line in page.text([way.Way("kvlcc2", "stopped.", answers, 1.0, False)]).splitlines()
+        if line.startswith("| KVLCC2")
+    ]
+    assert [cells[4:8] for cells in lines] == [["50", "diverged", "90", "diverged"], ["-"] * 4]
