@@ -20,7 +20,7 @@ from typing import ParamSpec, TypeVar
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from shiplog.report.numbers import counted
+from shiplog.numbers import counted
 
 log = logging.getLogger(__name__)
 

@@ -19,6 +19,7 @@ from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.logs.write import Series, refuse_existing, write_log
+from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
 from shiplog.profile import Profile
 from shiplog.unexpected import unexpected
@@ -92,7 +93,7 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
-            done.lost[str(path)] = f"{damaged} damaged sentences"
+            done.lost[str(path)] = counted(damaged, "damaged sentence")
         yield _written(target, parts, profile, ship, path)
     else:
         profile = columns.required(profile, path)

@@ -16,9 +16,9 @@ from shiplog import files
 from shiplog.channels import VELOCITY
 from shiplog.exceptions import ShiplogError, listed
 from shiplog.logs.health_report import CONTRACT
+from shiplog.numbers import counted
 from shiplog.profile import Profile
 from shiplog.report import viewer
-from shiplog.report.numbers import counted
 from shiplog.report.paper import figures, report, sets, statements
 from shiplog.report.paper.report import Results
 from shiplog.report.text_table import inert

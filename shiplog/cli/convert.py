@@ -39,7 +39,7 @@ def convert(
 
     ship = profiles.load(profile) if profile else None
     from pipelines.convert import convert as convert_tables
-    from shiplog.report.numbers import counted
+    from shiplog.numbers import counted
 
     done = convert_tables(tables, ship, out)
     content = {"contract": 1, "logs": [str(path) for path in done.logs], "refused": done.refused}

@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import listed
+from shiplog.numbers import counted
 from shiplog.report import tables
 from shiplog.report.judgement import MEANING, Judgement, force_line, judge
-from shiplog.report.numbers import counted
 from shiplog.training.load_model import Run
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog.report.numbers import counted, figure
+from shiplog.numbers import counted, figure
 from shiplog.simulation import error_reduction
 
 FEWEST_WINDOWS = 6  # windows, fewer of which give no interval: three blocks of two are drawn from

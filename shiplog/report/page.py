@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shiplog.exceptions import listed
-from shiplog.report.numbers import counted, figure, percent
+from shiplog.numbers import counted, figure, percent
 from shiplog.report.verdict import HOPELESS, WHICH, Verdict
 from shiplog.report.verdict_sentence import less
 

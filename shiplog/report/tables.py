@@ -10,9 +10,9 @@ import polars as pl
 from shiplog.channels import WINDOW
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
+from shiplog.numbers import counted, percent
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
-from shiplog.report.numbers import counted, percent
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log

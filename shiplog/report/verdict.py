@@ -16,7 +16,7 @@ from shiplog.diagnosis.result import SIDE_THRUST, Decision, Named
 from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.models.causes import Cause, Setting, si
-from shiplog.report.numbers import figure
+from shiplog.numbers import figure
 from shiplog.simulation.error_reduction import Gain
 
 LEAST_SHARE = 0.01  # probability, below which an answer is not listed in the ranking

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.result import EXPLAIN_MORE, PATTERN, REFUTED, SIDE_THRUST
 from shiplog.exceptions import listed
-from shiplog.report.numbers import counted, percent
+from shiplog.numbers import counted, percent
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it

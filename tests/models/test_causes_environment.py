@@ -30,6 +30,13 @@ from shiplog.models.causes.environment import Bank, Current, WindForce, _nearest
 # --- current --------------------------------------------------------------------------------------
 
 
+def test_a_current_a_little_west_of_north_goes_towards_0_deg():
+    angle = math.radians(359.7)
+    p = 0.2 * np.array([math.cos(angle), math.sin(angle)])
+    reported = Current().estimates(p, np.diag([1e-6, 1e-6]))
+    assert Current().sentence(reported) == "A steady current of 0.2 m/s towards 0 deg."
+
+
 def free_body(state: np.ndarray, off: tuple[str, ...] = ("propeller", "rudder", "wind")):
     """Acceleration of a hull that no water holds, in a current, and its masses m_x, m_y, I."""
     model, values = extended([Current()], without=off)

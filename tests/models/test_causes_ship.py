@@ -218,3 +218,9 @@ def test_a_lost_units_words_name_it():
     assert not one.compatible("thrust_loss") and not one.compatible("thrust_loss:bow_1")
     assert not BY["thrust_loss"].compatible("thrust_loss:bow_1")
     assert BY["thrust_loss"].compatible("thrust_drift")
+
+
+def test_a_ships_load_is_written_out():
+    """1234.5 t, 2 m ahead of midship: no power of ten in a sentence."""
+    reported = BY["payload"].estimates(np.array([1.2345e6, 2.469e6]), np.diag([1e6, 1e6]))
+    assert BY["payload"].sentence(reported) == "A load of 1230000 kg, 2.00 m ahead of midship."

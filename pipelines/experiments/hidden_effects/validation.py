@@ -21,7 +21,8 @@ from pipelines.experiments.hidden_effects import (
     scores,
 )
 from pipelines.experiments.hidden_effects.score import FAILED, LEVEL, Answer, Score, attempt
-from shiplog.exceptions import ShiplogError
+from shiplog.exceptions import ShiplogError, listed
+from shiplog.numbers import counted
 from shiplog.report import tables
 
 SHIPMMG = "shipmmg"  # a type of ship of another package, and an MMG too
@@ -213,7 +214,7 @@ def _once(answers: Sequence[Answer]) -> None:
     twice = [p for p, count in Counter(answer.planned for answer in answers).items() if count > 1]
     if twice:
         raise Mixed(
-            f"Case {twice[0].label} and {len(twice) - 1} more are there twice.",
+            f"{counted(len(twice), 'case')} there twice: {listed(p.label for p in twice)}.",
             hint="give every test once: a replay holds the cases of the test it replays.",
         )
 

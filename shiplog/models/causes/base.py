@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shiplog.channels import DEGREE
+from shiplog.numbers import figure
 from shiplog.profile import Profile
 from shiplog.voyages.recording import Record
 
@@ -257,7 +258,9 @@ class Cause:
         return found
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
-        numbers = ", ".join(f"{k} {v.value:.3g} {v.unit}".strip() for k, v in estimates.items())
+        numbers = ", ".join(
+            f"{k} {figure(v.value, 3)} {v.unit}".strip() for k, v in estimates.items()
+        )
         return f"{self.story} {numbers}."
 
     def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:

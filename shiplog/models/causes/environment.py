@@ -42,7 +42,7 @@ class Current(Cause):
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         return (
             f"A steady current of {estimates['speed'].value:.3g} m/s towards "
-            f"{estimates['direction'].value % 360.0:.0f} deg."
+            f"{round(estimates['direction'].value) % 360} deg."
         )
 
 

@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
+from shiplog.numbers import figure
 from shiplog.profile import Profile
 from shiplog.voyages.recording import Record
 
@@ -236,7 +237,7 @@ class Payload(Cause):
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         at = estimates["position"].value
         return (
-            f"A load of {estimates['mass'].value:.3g} kg, {abs(at):.2f} m "
+            f"A load of {figure(estimates['mass'].value, 3)} kg, {abs(at):.2f} m "
             f"{'ahead of' if at >= 0 else 'abaft'} midship."
         )
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import polars as pl
 
 from shiplog.exceptions import listed
+from shiplog.numbers import counted
 from shiplog.report import tables
 from shiplog.report.evaluation import EvaluatedRuns
-from shiplog.report.numbers import counted
 from shiplog.report.paper import statements
 from shiplog.report.paper.style import named
 from shiplog.training.run_folder import RunFolder
