@@ -362,5 +362,8 @@ def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples)
     offset, factor = actuator.scale()[0]
     low, high = sorted((limit - offset) * factor for limit in actuator.limits)
     slack = 1e-3 * (high - low)
-    beyond = (column < low - slack) | (column > high + slack)
+    if actuator.circular:  # limits of 0 to 360 deg are all there is, wherever the angle is cut
+        beyond = np.mod(column - low + slack, 2.0 * np.pi) > high - low + 2.0 * slack
+    else:
+        beyond = (column < low - slack) | (column > high + slack)
     grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")

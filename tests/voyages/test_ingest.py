@@ -163,6 +163,23 @@ def test_a_rudder_beyond_its_limits_is_marked_not_clipped(voyage):
     assert done.table.filter(pl.col("quality") & int(Quality.LIMITS) != 0).height >= 4
 
 
+@pytest.mark.parametrize(
+    "limits, beyond", [("[0.0, 360.0]", 0), ("[-180.0, 180.0]", 0), ("[90.0, 270.0]", 300)]
+)
+def test_limits_of_an_azimuth_hold_wherever_its_turn_is_cut(voyage, limits, beyond):
+    """One turn in 60 s, 0.6 deg a row: half of the turn, 300 rows, is outside 90 to 270 deg."""
+    parts = sailing.series()
+    angle = 0.6 * np.arange(600.0)
+    turning = Series("/az", "shiplog.Azimuth", parts["/gyro"].time, {"angle_deg": angle})
+    text = sailing.PROFILE + (
+        '[[actuators]]\nname = "az"\nkind = "azimuth"\ntopic = "/az"\nfield = "angle_deg"\n'
+        f'unit = "deg"\nlimits = {limits}\n'
+    )
+    table = voyage({**parts, "/az": turning}, text).table
+    marked = table["quality"].to_numpy() & int(Quality.LIMITS) != 0
+    assert marked.sum() == pytest.approx(beyond, abs=4)
+
+
 def test_a_frozen_position_is_found_and_its_catching_up_is_no_jump(voyage):
     parts = sailing.series()
     x, y = (parts["/position"].columns[n].copy() for n in ("x_m", "y_m"))
