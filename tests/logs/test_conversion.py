@@ -278,6 +278,17 @@ def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path)
     assert topics["/gnss/velocity"]["cog_deg"].tolist() == [90.0]
 
 
+@pytest.mark.parametrize(
+    "where", [",,,", "6326.4000,N,,", ",N,01025.2000,E", "6326.4000,,01025.2000,E"]
+)
+def test_a_fix_without_a_position_is_no_position_off_africa(tmp_path, where):
+    """Dead reckoning (quality 6) that has begun nowhere yet: not 0 deg N, 0 deg E."""
+    lines = [f"$GPGGA,101011.00,{where},6,00,,,M,,M,,", *BURST]
+    fix = nmea_topics(tmp_path, lines)["/gnss/fix"]
+    assert np.isnan(fix.columns["latitude"]).tolist() == [True, False]
+    assert np.isnan(fix.columns["longitude"]).tolist() == [True, False]
+
+
 def test_headings_between_two_fixes_are_spread_over_the_time_between_them(tmp_path):
     lines = []
     for second in range(3):
