@@ -247,6 +247,14 @@ def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
     assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
 
 
+def test_a_maker_s_own_sentence_is_not_used_and_not_damaged(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+    own = ["$PFEC,GPatt,12.0,1.0,2.0*3A", "$PSRF103,00,00,01,01*25", "$PGRME,3.1,M,4.2,M,5.2,M"]
+    (tmp_path / "a.nmea").write_text("\n".join([*BURST, *own, "$GPRM"]))
+    assert read_nmea(tmp_path / "a.nmea")[1] == 1  # the last one: cut off
+    assert "PFEC (1)" in caplog.text and "PSRF103 (1)" in caplog.text
+
+
 def nmea_topics(tmp_path, lines):
     (tmp_path / "a.nmea").write_text("\n".join(lines))
     return {s.topic: s for s in read_nmea(tmp_path / "a.nmea")[0]}

@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 SUFFIXES = (".nmea", ".txt", ".log", ".nma", ".gps", ".csv", ".dat", ".raw")
 SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z]{3},[^$!\r\n*]*(?:\*[0-9A-Fa-f]{2})?")
 ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
+PROPRIETARY = re.compile(r"\$(P[A-Z0-9]{3,}),")  # a maker's own, after his three letters
 NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
 OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
 SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
@@ -100,7 +101,9 @@ class _Reader:
         """One line: its receive stamp, and the sentences in it."""
         found = list(SENTENCE.finditer(line))
         if not found:
-            self.damaged += "$" in line
+            own = PROPRIETARY.search(line)
+            self.unused.update([own[1]] if own else [])
+            self.damaged += "$" in line and own is None
             return
         if received is None:
             received = self._stamp(line[: found[0].start()] + " " + line[found[-1].end() :])
