@@ -152,18 +152,22 @@ def twins(seconds: pl.DataFrame) -> dict[str, str]:
 def shared_rows(seconds: pl.DataFrame, least: int = 10) -> pl.DataFrame:
     """Pairs of voyages with identical rows: left, right, rows. The same data under two names.
 
-    Two recordings never agree in all of surge, sway, heading and yaw rate to the last digit.
+    Two recordings never agree in all of surge, sway, heading and yaw rate to the last digit. Of a
+    row that a voyage has many times, as a simulated one on a straight course, as many are shared
+    as the other has.
     """
     key = pl.struct(*COMPARED).hash(seed=1)
-    keys = seconds.filter(
-        (pl.col("surge") != 0) | (pl.col("sway") != 0) | (pl.col("yaw_rate") != 0)
-    ).select("voyage", key=key)
+    keys = (
+        seconds.filter((pl.col("surge") != 0) | (pl.col("sway") != 0) | (pl.col("yaw_rate") != 0))
+        .group_by("voyage", key=key)
+        .agg(times=pl.len())
+    )
     pairs = keys.join(keys, on="key", suffix="_other").filter(
         pl.col("voyage") < pl.col("voyage_other")
     )
     return (
         pairs.group_by(left="voyage", right="voyage_other")
-        .agg(rows=pl.len())
+        .agg(rows=pl.min_horizontal("times", "times_other").sum())
         .filter(pl.col("rows") >= least)
         .sort("left", "right")
     )

@@ -120,6 +120,17 @@ def test_the_same_data_under_two_names_is_found():
     assert one_hertz.twins(pl.concat([all_rows, again])) == {"b": "a", "d": "a"}
 
 
+def test_a_row_that_two_voyages_have_many_times_is_shared_as_often_as_both_have_it():
+    """Simulated straight courses: 30 s and 20 s of one state share 20 s, not 30 times 20."""
+    steady = pl.DataFrame({"surge": [1.0], "sway": 0.0, "heading": 0.5, "yaw_rate": 0.0})
+
+    def sailed(name, count):
+        return pl.concat([steady] * count).with_columns(voyage=pl.lit(name))
+
+    found = one_hertz.shared_rows(pl.concat([sailed("a", 30), sailed("b", 20), sailed("c", 5)]))
+    assert found.rows() == [("a", "b", 20)]
+
+
 def test_two_halves_and_the_whole_of_one_log_are_one_group():
     noise = np.random.default_rng(0).normal(size=(4, 60))
     whole = pl.DataFrame(dict(zip(one_hertz.COMPARED, noise, strict=True)))
