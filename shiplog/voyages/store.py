@@ -179,7 +179,7 @@ class Store:
         chosen: Profile | None = None
         first = ""
         for name in names:
-            part = self._part(name)
+            part = self.part_of(name)
             facts = catalogue.facts(self._folder(part.whole if part else name))
             source = facts.get("profile_source", "")
             try:
@@ -225,7 +225,7 @@ class Store:
         return one_hertz.resample(self.tables(names), profile.columns, profile.circular)
 
     def _table(self, name: str) -> pl.LazyFrame:
-        part = self._part(name)
+        part = self.part_of(name)
         if part is not None:
             elapsed = (pl.col("time") - pl.col("time").min()).dt.total_nanoseconds() * 1e-9
             inside = (elapsed >= part.begin) & (elapsed < part.end)
@@ -238,14 +238,14 @@ class Store:
             )
         return pl.scan_parquet(folder / "table.parquet", hive_partitioning=False)
 
-    def _part(self, name: str) -> parts.Part | None:
+    def part_of(self, name: str) -> parts.Part | None:
         """None where the name is that of a whole voyage, whatever it looks like."""
         return None if self._folder(name).is_dir() else parts.parse(name)
 
     def hashes(self, names: Iterable[str]) -> dict[str, str | None]:
         """Name → SHA-256 of its log; of a part, that of its voyage."""
         known = {entry.name: entry.sha256 for entry in self.entries()}
-        of = {name: self._part(name) for name in names}
+        of = {name: self.part_of(name) for name in names}
         return {name: known.get(part.whole if part else name) for name, part in of.items()}
 
     def _folder(self, name: str) -> Path:
