@@ -47,6 +47,7 @@ SCHEMAS: Mapping[str, tuple[str, ...]] = {
         "x0_m", "y0_m", "heading_deg", "surge_mps", "sway_mps", "yaw_rate_degps",
     ),
 }  # fmt: skip
+THE_MESSAGES_OWN = ("timestamp", "frame_id")  # fields of every message, in addition
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _DOUBLE, _BYTES, _ENUM = 1, 2, 0  # wire types: 64 bit, length-delimited, varint
@@ -194,7 +195,7 @@ def _fields(one: Series) -> tuple[str, ...]:
                 f"{one.topic}: {listed(wrong)} cannot be the name of a protobuf message or field.",
                 hint="use letters, digits and underscores, and no digit first.",
             )
-        if reserved := {"timestamp", "frame_id"} & set(one.columns):
+        if reserved := set(THE_MESSAGES_OWN) & set(one.columns):
             raise ShiplogError(f"{one.topic}: the field {listed(reserved)} is the message's own.")
         return tuple(one.columns)
     allowed = (*known, COVARIANCE) if one.schema == LOCATION_FIX else known

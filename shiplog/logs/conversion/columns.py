@@ -6,6 +6,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,7 +127,9 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
             else:
                 si = table[name].fill_null(np.nan).to_numpy()
             columns[path] = si / factor + offset
-    return [_topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()]
+    return named_apart(
+        _topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()
+    )
 
 
 def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
@@ -144,6 +147,19 @@ def schema_of(topic: str, fields: Iterable[str]) -> str:
     if set(fields) <= set(SCHEMAS.get(contract, ())):
         return contract
     return "shiplog.table." + plain(topic.strip("/"))
+
+
+def named_apart(parts: Iterable[Series]) -> list[Series]:
+    """The topics with a schema's name for each layout: `a-b` and `a_b`, and all names of so many
+    Japanese letters, are one name in protobuf."""
+    layouts: dict[str, tuple[str, ...]] = {}
+    named = []
+    for one in parts:
+        schema, layout = one.schema, tuple(one.columns)
+        while schema not in SCHEMAS and layouts.setdefault(schema, layout) != layout:
+            schema += "_2"
+        named.append(replace(one, schema=schema))
+    return named
 
 
 def plain(name: str) -> str:

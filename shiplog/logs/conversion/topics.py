@@ -10,10 +10,10 @@ import polars as pl
 
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.conversion import clock
-from shiplog.logs.conversion.columns import plain, schema_of
+from shiplog.logs.conversion.columns import named_apart, plain, schema_of
 from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
-from shiplog.logs.write import Series
+from shiplog.logs.write import THE_MESSAGES_OWN, Series
 from shiplog.profile import Profile
 
 log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
             hint="give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table.",
         )
-    return parts, reasons
+    return named_apart(parts), reasons
 
 
 def _one(path: Path, profile: Profile | None) -> list[Series]:
@@ -116,7 +116,7 @@ def _numbers(frame: pl.DataFrame, path: Path) -> dict[str, np.ndarray]:
                     path.name, words, column.name,
                 )  # fmt: skip
             numbers[column.name] = number
-    fields = unlike([plain(name) for name in numbers])
+    fields = unlike([*THE_MESSAGES_OWN, *map(plain, numbers)])[len(THE_MESSAGES_OWN) :]
     for name, field in zip(numbers, fields, strict=True):
         if field != plain(name):
             log.warning("%s: the column %r becomes the field %s", path.name, name, field)
