@@ -5,9 +5,11 @@ the words and units of where it occurs, and knows nothing of what `convert` writ
 """
 
 import json
+from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pytest
 from circle_layouts import (
     COMMON,
     DATUM,
@@ -273,3 +275,11 @@ def test_a_column_called_as_the_messages_own_time_is_a_field_all_the_same(tmp_pa
     frame = read(done.logs[0]).frames["/gyro"]
     assert frame["timestamp_2"].to_list() == STEPS.tolist()
     assert frame["stamp"].diff().drop_nulls().unique().to_list() == [100_000_000]
+
+
+@pytest.mark.parametrize("way", [".", "..", "../trip.1"])
+def test_a_folder_gives_its_log_its_name_whatever_the_way_to_it(tmp_path, monkeypatch, way):
+    folder = tables_of_topics(tmp_path / "trip.1", gyro={"heading": STEPS})
+    (folder / "inside").mkdir()
+    monkeypatch.chdir(folder / "inside" if way == ".." else folder)
+    assert convert([Path(way)], None, tmp_path / "out").logs == [tmp_path / "out" / "trip.1.mcap"]
