@@ -107,6 +107,11 @@ def parsed(column: pl.Series) -> pl.Series:
     return number if number.null_count() == column.null_count() else column
 
 
+def is_number(dtype: pl.DataType) -> bool:
+    """Whether a field may hold numbers, as such, as truths or as texts; a list holds several."""
+    return not (dtype.is_nested() or dtype == pl.Binary)
+
+
 def stamp_leaves(layout: Mapping[str, pl.DataType]) -> tuple[str, ...]:
     """The paths a message's own measurement time is made of: (seconds, nanos), (one value,), ()."""
     for base in STAMP_FIELDS:

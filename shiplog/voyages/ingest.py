@@ -16,6 +16,7 @@ import polars as pl
 from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
+from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
@@ -195,6 +196,12 @@ def _require(reading: Reading, profile: Profile) -> None:
                     f"{log}: the topic {topic!r} has no field {path!r}{nearest(path, known)}. "
                     f"Fields found: {listed(known)}.",
                     hint="correct the field in the ship profile.",
+                )
+            if frame is not None and not is_number(frame.schema[path]):
+                raise ChannelMissing(
+                    f"{log}: the field {path!r} of the topic {topic!r} holds "
+                    f"{frame.schema[path]}, not one number.",
+                    hint=f'name one of its values in the ship profile, as field = "{path}[0]".',
                 )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.exceptions import LogUnreadable, ProfileError, listed
+from shiplog.logs.fields import is_number
 from shiplog.logs.read import Contents, contents, fields, read
 from shiplog.profile_units import DRIVEN
 from shiplog.voyages.draft_profile import facts, guesses, words
@@ -55,8 +56,8 @@ class Log:
         frame = self.data.get(choice.topic)
         if frame is None or not set(choice.paths) <= set(frame.columns):
             return False
-        numbers = [frame[p].cast(pl.Float64, strict=False).is_finite() for p in choice.paths]
-        return all(bool(finite.any()) for finite in numbers)
+        numbers = [self.column(choice.topic, path) for path in choice.paths]
+        return all(bool(number.is_finite().any()) for number in numbers)
 
     def rate(self, topic: str) -> str:
         frame = self.data.get(topic)
@@ -67,9 +68,9 @@ class Log:
         return facts.of_values(frame[path]) if frame is not None and path in frame else "unread"
 
     def column(self, topic: str, path: str) -> pl.Series:
-        """Numbers of a field; none where it was not read."""
+        """Numbers of a field; none where it was not read, or is a list of them."""
         frame = self.data.get(topic)
-        if frame is None or path not in frame:
+        if frame is None or path not in frame or not is_number(frame.schema[path]):
             return pl.Series(path, [], pl.Float64)
         return frame[path].cast(pl.Float64, strict=False)
 
@@ -78,7 +79,7 @@ class Log:
         frame = self.data.get(topic)
         if frame is None or path not in frame.columns or frame[path].dtype == pl.Boolean:
             return False
-        return bool(frame[path].cast(pl.Float64, strict=False).is_finite().any())
+        return bool(self.column(topic, path).is_finite().any())
 
     def unit(self, paths: Sequence[str], at: int, topic: str, takes: tuple[str, ...]) -> str | None:
         """What the field's own name says, or the channel's metadata, which has one unit."""
