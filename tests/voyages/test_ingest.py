@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 import sailing
 
+from shiplog import frames
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
 from shiplog.logs.write import Series
@@ -150,6 +151,24 @@ def test_a_lone_nan_is_blank(voyage):
     done = voyage(changed(parts, "/wind", speed_mps=wind))
     assert ("blank", "wind") in kinds(done.report)
     assert done.table.filter(pl.col("quality") & int(Quality.BLANK) != 0).height >= 10
+
+
+def test_a_quaternion_that_nobody_filled_in_is_blank(voyage):
+    """ROS sends (0, 0, 0, 0) before there is an orientation: no heading to the east."""
+    parts = sailing.series()
+    heading = 3.0 + sailing.SPEED / sailing.RADIUS * np.arange(600) * 0.1
+    half = 0.5 * (np.pi / 2.0 - heading)
+    z, w = np.sin(half), np.cos(half)
+    z[100:110] = w[100:110] = 0.0
+    turned = Series("/imu", "test.Imu", parts["/gyro"].time, {"z": z, "w": w})
+    text = sailing.PROFILE.replace(
+        '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"',
+        '[sensors.heading]\nkind = "quaternion_enu"\ntopic = "/imu"\nfields = ["z", "w"]',
+    )
+    done, clean = voyage({**parts, "/imu": turned}, text), voyage()
+    assert ("blank", "heading") in kinds(done.report)
+    off = frames.wrap((done.table["heading"] - clean.table["heading"]).drop_nulls().to_numpy())
+    assert np.abs(off).max() < 1e-6 and len(off) < clean.table.height
 
 
 def test_a_rudder_beyond_its_limits_is_marked_not_clipped(voyage):
