@@ -76,7 +76,8 @@ def resample(
 
     tables: 10 Hz rows, one lazy table a voyage. `segment` counts from 0 in each voyage; within
     one, the stamps are exactly 1 s apart. `elapsed` counts whole seconds from the voyage's first
-    row, usable or not, as the findings of its log and its parts do.
+    row, usable or not, as the findings of its log and its parts do; 0 is also what the first
+    average has that is centred up to 0.1 s before that row.
     """
     circular = frozenset(circular)
     return segments(pl.concat(_by_day(tables, columns, circular, least)))
@@ -97,7 +98,8 @@ def _by_day(
     """The averages of each voyage, a table a day, with `elapsed`."""
     for table in tables:
         begin = table.select(pl.col("time").min()).collect()["time"].to_physical().item()
-        elapsed = ((pl.col("time").cast(pl.Int64) - begin) // SECOND_NS).cast(pl.Float64)
+        since = (pl.col("time").cast(pl.Int64) - begin).clip(lower_bound=0)
+        elapsed = (since // SECOND_NS).cast(pl.Float64)
         for day in days(table):
             yield averages(day, columns, circular, least).with_columns(elapsed=elapsed)
 

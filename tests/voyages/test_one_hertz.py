@@ -144,6 +144,13 @@ def test_two_halves_and_the_whole_of_one_log_are_one_group():
     assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
 
 
+def test_no_second_is_before_the_first_row():
+    """From 0.05 s on, the first average has five rows, and its stamp is 0.05 s before them."""
+    result = seconds(rows(start=START + timedelta(milliseconds=50)))
+    assert (result["time"][0], result["samples"][0]) == (START, 5)
+    assert result["elapsed"].to_list()[:3] == [0.0, 0.0, 1.0]
+
+
 def test_seconds_count_from_the_first_row_even_where_it_cannot_be_used():
     quality = np.zeros(200, int)
     quality[:50] = int(Quality.GAP)
