@@ -76,7 +76,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
         usable_s=usable_s,
         windows=windows,
-        instruments=tuple(_instrument(*one) for one in aligned.samples),
+        instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
     )
     return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
 

@@ -153,6 +153,13 @@ def test_a_lone_nan_is_blank(voyage):
     assert done.table.filter(pl.col("quality") & int(Quality.BLANK) != 0).height >= 10
 
 
+@pytest.mark.parametrize("count", [0, 1])
+def test_an_instrument_without_two_samples_has_no_rate(voyage, count):
+    parts = sailing.series()
+    few = kept(parts, "/wind", np.arange(len(parts["/wind"].time)) < count)
+    assert "wind" not in {one.channel for one in voyage(few).report.instruments}
+
+
 def test_a_quaternion_that_nobody_filled_in_is_blank(voyage):
     """ROS sends (0, 0, 0, 0) before there is an orientation: no heading to the east."""
     parts = sailing.series()
