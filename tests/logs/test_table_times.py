@@ -38,6 +38,18 @@ def test_a_time_is_itself_in_every_form(values, unit):
     assert (found - pl.Series([NOON, NOON + 500_000_000])).abs().max() <= 5_000
 
 
+@pytest.mark.parametrize("end", ["\0\0\0", "END OF RECORD"])
+def test_a_word_among_times_costs_its_row_alone(tmp_path, end):
+    """A logger that lost its power, or a last line in words: as ISO texts have it, too."""
+    found = clock.instants(pl.Series("t", ["0.0", "0.1", "0.2", end])).to_list()
+    assert found == [0, 10**8, 2 * 10**8, None]
+    names = [*profiles.parse(PROFILE, "m").table]
+    rows = [",".join(str(0.1 * i) for _ in names) for i in range(3)]
+    (tmp_path / "t.csv").write_text("\n".join([",".join(names), *rows, end]))
+    done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path / "out")
+    assert not done.refused and len(done.logs) == 1
+
+
 def test_datetimes_keep_their_instant_and_count_from_start_keep_theirs():
     noon = datetime(2021, 4, 9, 12)
     assert clock.instants(pl.Series([noon])).to_list() == [NOON]

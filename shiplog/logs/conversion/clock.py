@@ -24,7 +24,7 @@ WIDTHS = {"%Y": 4, "%j": 3}  # digits of a form's parts; all others have two
 
 
 def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
-    """Times [Int64, ns], null where there is none.
+    """Times [Int64, ns], null where there is none, or a word among numbers.
 
     values  datetimes, ISO or other texts, or numbers
     unit    of numbers; without one, Unix seconds, ms, µs or ns by their size, times of day where
@@ -45,7 +45,7 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
         return past_midnight(values.to_physical())
     if dtype == pl.String:
         number = number_of(values)
-        if form is None and number.null_count() == _blank(values):
+        if form is None and _are_numbers(number, values):
             return _counted(number, unit)
         return _written(values, form)
     if dtype.is_numeric() and form is not None:
@@ -86,6 +86,12 @@ def number_of(texts: pl.Series) -> pl.Series:
     return comma.cast(pl.Float64, strict=False)
 
 
+def _are_numbers(number: pl.Series, texts: pl.Series) -> bool:
+    """Whether most texts are numbers: a line that was cut off, or a word, is not another form."""
+    filled = len(texts) - _blank(texts)
+    return filled == 0 or 2 * number.count() > filled
+
+
 def typical(values: pl.Series) -> float:
     """Median size of numbers, 0 where there is none."""
     sizes = values.fill_nan(None).abs().drop_nulls().to_numpy()
@@ -102,7 +108,7 @@ def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) 
     Raises ProfileError also where numbers are no seconds of a day, or can be two times of it.
     """
     number = number_of(values) if values.dtype == pl.String else values
-    words = number is not values and number.null_count() > _blank(values)
+    words = number is not values and not _are_numbers(number, values)
     stated = unit is not None or form is not None or not number.dtype.is_numeric()
     if stated or words:
         return instants(values, unit, form)
