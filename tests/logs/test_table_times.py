@@ -134,6 +134,17 @@ def test_a_number_beside_a_date_that_can_be_two_times_is_asked_for(numbers, word
     clock.of_day(pl.Series("t", numbers), unit="s")
 
 
+@pytest.mark.parametrize("between, end", [(" ", ""), ("T", ""), (" ", "Z"), (" ", " UTC")])
+def test_either_form_that_is_proposed_reads_the_times(between, end):
+    """3 April and 4 March 2024, 10:00 UTC: seconds of 1970 by a calendar."""
+    times = pl.Series("t", [f"03/04/2024{between}10:00:00{end}"])
+    with pytest.raises(ProfileError, match="day or with the month first") as asked:
+        clock.instants(times)
+    forms = asked.value.hint.split("format = ")[1].rstrip(".").split(" or ")
+    read_so = {clock.instants(times, form=form.strip("'"))[0] for form in forms}
+    assert read_so == {1_712_138_400 * 10**9, 1_709_546_400 * 10**9}
+
+
 def test_times_that_can_be_read_in_two_ways_are_asked_for():
     with pytest.raises(ProfileError, match="day or with the month first"):
         clock.instants(pl.Series("t", ["03/04/2024 10:00:00", "03/04/2024 10:00:01"]))

@@ -203,7 +203,8 @@ def _written(values: pl.Series, form: str | None) -> pl.Series:
     texts = texts.str.replace(r"^(\S+)[T ](\d{1,2}:)", "${1}T$2").str.replace(r" ?UTC$", "Z")
     zoned = texts.drop_nulls().head(50).str.contains(r"T.*(Z|[+-]\d\d:?\d\d)$").all()
     tail = "T%H:%M:%S%.f" + ("%#z" if zoned else "")
-    return _best(texts, [day + tail for day in (*DATE_FORMATS[:3], *SLASHED)], pl.Datetime)
+    forms = [day + tail for day in (*DATE_FORMATS[:3], *SLASHED)]
+    return _best(texts, forms, pl.Datetime, values)
 
 
 def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:
@@ -212,8 +213,11 @@ def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:
     return past_midnight(_best(dated, ["%Y-%m-%dT" + form for form in forms], pl.Datetime))
 
 
-def _best(texts: pl.Series, forms, kind) -> pl.Series:
-    """The texts by the form that reads most of them. Raises ProfileError."""
+def _best(texts: pl.Series, forms, kind, written: pl.Series | None = None) -> pl.Series:
+    """The texts by the form that reads most of them. Raises ProfileError.
+
+    written  the same as they stand in the table, if they were made alike: what a hint speaks of
+    """
     read: list[tuple[int, str, pl.Series]] = []
     for form in forms:
         try:
@@ -226,7 +230,7 @@ def _best(texts: pl.Series, forms, kind) -> pl.Series:
             continue  # a form that polars takes for nothing
         read.append((len(made) - made.null_count(), form, made.to_physical()))
     read.sort(key=lambda item: -item[0])
-    sample = next(iter(texts.drop_nulls()), "")
+    sample = next(iter((texts if written is None else written).drop_nulls()), "")
     if not read or read[0][0] == 0:
         raise ProfileError(
             f"The times of column {texts.name!r}, such as {sample!r}, are in no known form.",
@@ -236,6 +240,13 @@ def _best(texts: pl.Series, forms, kind) -> pl.Series:
         raise ProfileError(
             f"The times of column {texts.name!r}, such as {sample!r}, can be read with the day or "
             "with the month first.",
-            hint=f"say which in [table]: format = {read[0][1]!r} or {read[1][1]!r}.",
+            hint="say which in [table]: format = "
+            f"{_as_written(read[0][1], sample)!r} or {_as_written(read[1][1], sample)!r}.",
         )
     return read[0][2].rename(texts.name)
+
+
+def _as_written(form: str, sample: str) -> str:
+    """The form in which a text stands in the table, of the one that all were brought into."""
+    form = form if re.search(r"\dT\d", sample) else form.replace("T%H", " %H")
+    return form.replace("%#z", " UTC") if sample.endswith(" UTC") else form
