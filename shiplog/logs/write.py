@@ -175,7 +175,11 @@ def _clock(one: Series, name: str, values: np.ndarray) -> np.ndarray:
             hint="float seconds cannot hold a nanosecond of this century.",
         )
     if len(values) and int(values.min()) < 0:
-        raise ShiplogError(f"{one.topic}: {name} has times before 1970.")
+        raise ShiplogError(
+            f"{one.topic}: {name} has times before 1970.",
+            hint="a log counts from 1970 on; add the same number to all times, of a table that "
+            "counts from a negative number, too.",
+        )
     return values.astype(np.int64, copy=False)
 
 

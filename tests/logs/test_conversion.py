@@ -110,6 +110,26 @@ def test_rows_without_a_time_are_lost_and_blank_rows_are_none(tmp_path):
     assert done.lost == {str(tmp_path / "t.csv"): "1 row without a time"}
 
 
+@pytest.mark.parametrize("scaled", ["offset = -30.0", "sign = 0.001"])
+def test_a_time_with_an_offset_is_refused_and_not_taken_without_it(tmp_path, scaled):
+    text = PROFILE.replace('t = "time"', f't = {{ channel = "time", unit = "s", {scaled} }}')
+    assert text != PROFILE
+    profile = profiles.parse(text, "mine")
+    (tmp_path / "t.csv").write_text("t,x,y,u,v,psi\n0,0,0,1,0,5\n1,1,0,1,0,5\n")
+    refused = str(convert([tmp_path / "t.csv"], profile, tmp_path).refused)
+    assert "'t' has a `sign` or an `offset`, and is a time" in refused
+    (tmp_path / "dump").mkdir()
+    (tmp_path / "dump" / "gyro.csv").write_text("t,psi\n0,5\n1,5\n")
+    assert "is a time" in str(convert([tmp_path / "dump"], profile, tmp_path).refused)
+
+
+def test_times_that_begin_before_zero_are_refused_with_a_way_out(tmp_path):
+    """A manoeuvre whose clock is 0 at the execute."""
+    (tmp_path / "t.csv").write_text("t,x,y,u,v,psi\n-1,0,0,1,0,5\n0,1,0,1,0,5\n")
+    refused = str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path).refused)
+    assert "before 1970" in refused and "add the same number to all times" in refused
+
+
 def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     rows = [f"{i / 10},{i},0,1,0,5" for i in range(30)]
     (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *reversed(rows)]))

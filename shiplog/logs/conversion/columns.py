@@ -68,6 +68,7 @@ def voyages(
     present = {name: c for name, c in profile.table.items() if name in frame.columns}
     _require(present, profile, frame, path)
     _refuse_two(present, profile, path)
+    refuse_scaled(present, profile)
     frame = _of_one_vessel(frame, present, profile, path)
     time = _time(frame, present)
     columns = [time.rename("time")]
@@ -244,6 +245,17 @@ def _refuse_two(present: dict[str, Column], profile: Profile, path: Path) -> Non
             raise ProfileError(
                 f"{path.name}: the columns {listed(names)} are all {channel!r} in [table].",
                 hint=f"leave one of them in the [table] section of {profile.source}.",
+            )
+
+
+def refuse_scaled(present: dict[str, Column], profile: Profile) -> None:
+    """Raises ProfileError for a factor or an offset of a time or a name, which nobody would use."""
+    for name, column in present.items():
+        if column.channel in TABLE_LABELS and (column.sign != 1.0 or column.offset != 0.0):
+            raise ProfileError(
+                f"[table] {name!r} has a `sign` or an `offset`, and is a {column.channel}: they "
+                "are of channels that were measured.",
+                hint=f"leave them out in {profile.source}, and change the column in the table.",
             )
 
 

@@ -10,7 +10,7 @@ import polars as pl
 
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.conversion import clock
-from shiplog.logs.conversion.columns import named_apart, plain, schema_of
+from shiplog.logs.conversion.columns import named_apart, plain, refuse_scaled, schema_of
 from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.write import THE_MESSAGES_OWN, Series
@@ -63,6 +63,8 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
 def _one(path: Path, profile: Profile | None) -> list[Series]:
     frame = read_table(path).frame
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
+    if profile:
+        refuse_scaled(named, profile)
     by_profile = next((n for n in named if n in frame.columns), None)
     stamp_name = by_profile or _known(frame, STAMP_COLUMNS)
     logged_name = _known(frame, LOGGED)
