@@ -184,7 +184,7 @@ def _topic(
 
 
 def _turning(table: pl.DataFrame) -> np.ndarray:
-    """Yaw rate [rad/s] of the heading, NaN where either neighbour has none.
+    """Yaw rate [rad/s] of the heading, between the rows that have one; NaN where a row has none.
 
     Repeated times would divide by zero: a row of the same time takes part only once.
     """
