@@ -35,6 +35,7 @@ RESOLVED = {  # of a sensor: the channel whose unit its resolution has
 LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
 FARTHEST_DEG = (90.0, 360.0)  # latitude and longitude, whichever way the latter is counted
 NO_FIX_DEG = (91.0, 181.0)  # what AIS sends of a position that it does not know
+LARGEST = 1e12  # as the profile has it: what is beyond, as the largest float of all, is no value
 NEAR_DEG = 1.0  # from the median position: (0, 0) before the first fix is further away than that
 
 log = logging.getLogger(__name__)
@@ -206,17 +207,23 @@ def _require(reading: Reading, profile: Profile) -> None:
 
 
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
-    """Time [n] ns by the source's clock and SI values [n, k]."""
+    """Time [n] ns by the source's clock and SI values [n, k], NaN where there is none."""
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
     times = frame[clocks.of(frame, source)[0]]
     values = [
-        (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
+        (_numbers(frame[path]) - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)
     ]
     known = times.is_not_null().to_numpy()
     return times.fill_null(0).to_numpy()[known], np.stack(values, axis=1)[known]
+
+
+def _numbers(column: pl.Series) -> np.ndarray:
+    """A field's values [n], NaN where there is none."""
+    raw = column.cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
+    return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
 def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:

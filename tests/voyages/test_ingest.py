@@ -144,12 +144,15 @@ def test_a_spike_is_marked_and_left_as_it_is(voyage):
     assert (done.table["x0"] - voyage().table["x0"]).abs().max() > 2.0
 
 
-def test_a_lone_nan_is_blank(voyage):
+@pytest.mark.parametrize("no_value", [np.nan, -np.inf, 1.7976931348623157e308, -(2.0**63)])
+@pytest.mark.parametrize("field", ["speed_mps", "direction_deg"])
+def test_a_lone_value_that_is_none_is_blank(voyage, field, no_value):
+    """Also the largest float and the least whole number, which some programs write for it."""
     parts = sailing.series()
-    wind = parts["/wind"].columns["speed_mps"].copy()
-    wind[100:110] = np.nan
-    done = voyage(changed(parts, "/wind", speed_mps=wind))
-    assert ("blank", "wind") in kinds(done.report)
+    wind = parts["/wind"].columns[field].copy()
+    wind[100:110] = no_value
+    done = voyage(changed(parts, "/wind", **{field: wind}))
+    assert kinds(done.report) == [("blank", "wind")]
     assert done.table.filter(pl.col("quality") & int(Quality.BLANK) != 0).height >= 10
 
 
