@@ -37,7 +37,7 @@ UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", 
 
 def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
     """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
-    the reasons of the tables that had to be left out.
+    the reasons of the tables that had to be left out. Hidden files are none.
 
     A column `log_time_ns` (or of the names above) is the recorder's clock, `stamp_ns` the
     message's; other names and units come from the profile's [table], with channel = "time".
@@ -46,7 +46,7 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
     """
     parts: list[Series] = []
     reasons: list[str] = []
-    for path in sorted(p for p in folder.iterdir() if is_table(p)):
+    for path in sorted(p for p in folder.glob("[!.]*") if is_table(p)):
         try:
             parts += _one(path, profile)
         except ShiplogError as error:
