@@ -319,6 +319,16 @@ def test_a_position_is_of_one_receiver(tmp_path):
     assert (taken["latitude"], taken["longitude"]) == ("gps2_lat", "gps2_lon")
 
 
+@pytest.mark.parametrize("rows", [1, COUNT])
+def test_a_yaw_rate_without_a_turn_to_compare_it_with_keeps_its_usual_unit(tmp_path, rows):
+    """One row, or a heading that is blank: numpy warns of the median of nothing."""
+    heading = np.full(rows, np.nan if rows > 1 else 45.0)
+    table = {name: values[:rows] for name, values in SHIP.items()} | {"heading [deg]": heading}
+    pl.DataFrame({**table, "rot": np.ones(rows)}).write_parquet(tmp_path / "t.parquet")
+    text = draft_table(tmp_path / "t.parquet")
+    assert '"rot" = { channel = "yaw_rate", unit = "deg/s" }' in text and "unit not stated" in text
+
+
 def test_a_plain_x_does_not_say_where_north_is(tmp_path):
     path = tmp_path
     found = lines(path, {"X [m]": STEPS * 1.0, "Y [m]": STEPS * 2.0}, without=("lat", "lon"))

@@ -118,13 +118,19 @@ def _choose_turning(
     with np.errstate(all="ignore"):
         turned = np.abs(np.angle(np.exp(1j * np.diff(heading)))) / np.diff(seconds)
         # Medians: a table of several runs jumps between them.
-        ratio = float(np.nanmedian(rate[1:]) / np.nanmedian(turned))
+        ratio = float(_median(rate[1:]) / _median(turned))
     if not np.isfinite(ratio) or ratio <= 0:
         return
     unit = min(TURNING, key=lambda u: abs(np.log(ratio * units.factor(u))))
     doubts = tuple(d for d in rates[0].doubts if d != UNIT_UNSTATED)
     fits = "the unit fits how fast the heading turns"
     found["yaw_rate"][0] = replace(rates[0], unit=unit, doubts=(*doubts, fits))
+
+
+def _median(values: np.ndarray) -> np.float64:
+    """Of the numbers among them; NaN of none."""
+    known = values[np.isfinite(values)]
+    return np.float64(np.median(known) if len(known) else np.nan)
 
 
 def _kinds(
