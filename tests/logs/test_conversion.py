@@ -297,6 +297,13 @@ def test_the_clock_of_a_receiver_without_a_fix_is_not_believed(tmp_path):
     assert {int(t) for s in topics.values() for t in s.time} == {1_744_366_210_000_000_000}
 
 
+def test_a_date_beyond_every_log_is_a_damaged_sentence(tmp_path):
+    (tmp_path / "a.nmea").write_text("\n".join(["$GPZDA,101009.00,11,04,9999,00,00", *BURST]))
+    series, damaged = read_nmea(tmp_path / "a.nmea")
+    assert damaged == 1
+    assert {int(t) for s in series for t in s.time} == {1_744_366_210_000_000_000}
+
+
 def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path):
     """By hand: GLL and VTG differ from GGA and RMC, and stand before them."""
     lines = ["$GPGLL,6300.0000,N,01000.0000,E,101010.00,A,A", "$GPVTG,10.0,T,,M,9.0,N,,K,A", *BURST]
@@ -349,9 +356,14 @@ def test_long_work_speaks_and_short_work_does_not(caplog):
     assert heartbeat.EVERY_S <= 2.0
 
 
-@pytest.mark.parametrize("stamp", ["2016-12-31T23:59:60Z", "2024-02-30 00:00:00"])
+@pytest.mark.parametrize(
+    "stamp",
+    ["2016-12-31T23:59:60Z", "2024-02-30 00:00:00", "9999-12-31T23:59:59Z",
+     "0001-01-01T00:00:00+23:59"],
+)  # fmt: skip
 def test_a_receive_stamp_that_is_no_time_costs_no_log(tmp_path, stamp):
-    """A leap second, or a damaged digit: the line takes the time of those around it."""
+    """A leap second, a damaged digit, or what stands for no time at all: the line takes the time
+    of those around it."""
     lines = [f"2024-02-28T10:00:0{k}Z $HEHDT,{k}.0,T" for k in range(5)]
     lines.insert(2, f"{stamp} $HEHDT,9.0,T")
     (tmp_path / "a.nmea").write_text("\n".join(lines))
