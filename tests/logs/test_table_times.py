@@ -10,6 +10,7 @@ from test_conversion import PROFILE
 from pipelines.convert import convert
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
+from shiplog.logs import fields
 from shiplog.logs.conversion import clock
 from shiplog.logs.read import read
 
@@ -132,6 +133,24 @@ def test_a_number_beside_a_date_that_can_be_two_times_is_asked_for(numbers, word
         clock.of_day(pl.Series("t", numbers))
     assert 'format = "%H%M%S"' in str(asked.value)
     clock.of_day(pl.Series("t", numbers), unit="s")
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        [datetime(2021, 4, 9, 12), datetime(9999, 12, 31)],
+        ["2021-04-09 12:00:00", "9999-12-31 00:00:00"],
+        ["2021-04-09T12:00:00Z", "0001-01-01T00:00:00Z"],
+    ],
+)
+def test_a_date_that_stands_for_none_is_none(times):
+    """Of databases: 64 bits of nanoseconds do not hold it, and polars made one of 1816."""
+    assert clock.instants(pl.Series("t", times)).to_list() == [NOON, None]
+    if isinstance(times[0], datetime):
+        assert clock.dates(pl.Series("t", times)).null_count() == 1
+    else:
+        stamps = fields.stamps(pl.DataFrame({"stamp": times}), ("stamp",))
+        assert stamps[1] is None
 
 
 @pytest.mark.parametrize("between, end", [(" ", ""), ("T", ""), (" ", "Z"), (" ", " UTC")])

@@ -36,11 +36,11 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
     """
     dtype = values.dtype
     if isinstance(dtype, pl.Datetime):
-        return values.cast(pl.Datetime("ns", dtype.time_zone)).to_physical()
+        return values.cast(pl.Datetime("ns", dtype.time_zone), strict=False).to_physical()
     if isinstance(dtype, pl.Duration):
         return values.cast(pl.Duration("ns")).to_physical()
     if dtype == pl.Date:
-        return values.cast(pl.Datetime("ns")).to_physical()
+        return values.cast(pl.Datetime("ns"), strict=False).to_physical()
     if dtype == pl.Time:
         return past_midnight(values.to_physical())
     if dtype == pl.String:
@@ -61,7 +61,7 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
 def dates(values: pl.Series, form: str | None = None) -> pl.Series:
     """Midnights [Int64, ns] of a column of dates. Raises ProfileError."""
     if values.dtype == pl.Date or isinstance(values.dtype, pl.Datetime):
-        return values.cast(pl.Date).cast(pl.Datetime("ns")).to_physical()
+        return values.cast(pl.Date).cast(pl.Datetime("ns"), strict=False).to_physical()
     if values.dtype.is_numeric():
         values = values.fill_nan(None).cast(pl.Int64, strict=False).cast(pl.String).str.zfill(6)
     return _best(values, (form,) if form else (*DATE_FORMATS, *SLASHED), pl.Date)
@@ -222,13 +222,14 @@ def _best(texts: pl.Series, forms, kind, written: pl.Series | None = None) -> pl
     for form in forms:
         try:
             if kind is pl.Date:
-                made = texts.str.to_date(form, strict=False).cast(pl.Datetime("ns"))
+                day = texts.str.to_date(form, strict=False)
+                made = day.cast(pl.Datetime("ns"), strict=False).to_physical()
             else:
                 zone = "UTC" if "%#z" in form or "%z" in form or form == "%+" else None
-                made = texts.str.to_datetime(form, strict=False, time_unit="ns", time_zone=zone)
+                made = fields.written_as(texts, form, zone)
         except pl.exceptions.PolarsError:
             continue  # a form that polars takes for nothing
-        read.append((len(made) - made.null_count(), form, made.to_physical()))
+        read.append((len(made) - made.null_count(), form, made))
     read.sort(key=lambda item: -item[0])
     sample = next(iter((texts if written is None else written).drop_nulls()), "")
     if not read or read[0][0] == 0:
