@@ -230,8 +230,9 @@ class Store:
             elapsed = (pl.col("time") - pl.col("time").min()).dt.total_nanoseconds() * 1e-9
             inside = (elapsed >= part.begin) & (elapsed < part.end)
             return self._table(part.whole).filter(inside).with_columns(voyage=pl.lit(name))
-        folder = self._folder(name)
-        if not _whole(folder, catalogue.facts(folder)):
+        folder = catalogue.found_in(catalogue.place(self.path, name), _sound)
+        if folder is None:
+            catalogue.facts(self._folder(name))  # raises where that is what cannot be read
             raise StoreError(
                 f"The table of {name} in the store {self.path} is spoilt.",
                 hint="ingest its log again: shiplog ingest LOG --store DIR.",
@@ -306,6 +307,14 @@ def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:
             f"{lengths[part.whole]:.0f} s long.",
             hint=f"choose seconds from 0 to {lengths[part.whole]:.0f}.",
         )
+
+
+def _sound(folder: Path) -> Path | None:
+    """The folder, if both of its files can be read."""
+    try:
+        return folder if _whole(folder, catalogue.facts(folder)) else None
+    except StoreError:
+        return None
 
 
 def _whole(folder: Path, facts: dict) -> bool:
