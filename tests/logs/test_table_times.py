@@ -1,5 +1,7 @@
 """The times of a table, in every form in which they stand there."""
 
+import re
+import tomllib
 from datetime import datetime
 
 import numpy as np
@@ -162,6 +164,16 @@ def test_either_form_that_is_proposed_reads_the_times(between, end):
     forms = asked.value.hint.split("format = ")[1].rstrip(".").split(" or ")
     read_so = {clock.instants(times, form=form.strip("'"))[0] for form in forms}
     assert read_so == {1_712_138_400 * 10**9, 1_709_546_400 * 10**9}
+
+
+@pytest.mark.parametrize(
+    "asks, numbers", [(clock.of_day, [83401, 83402]), (clock.instants, [1_000_000, 1_100_000])]
+)
+def test_the_line_that_is_proposed_for_a_column_is_toml(asks, numbers):
+    with pytest.raises(ProfileError) as asked:
+        asks(pl.Series("UTC time [s]", numbers))
+    line = re.search(r"in \[table\]: (.*? \})", asked.value.hint)[1]
+    assert tomllib.loads(line)["UTC time [s]"]["channel"] == "time"
 
 
 def test_times_that_can_be_read_in_two_ways_are_asked_for():

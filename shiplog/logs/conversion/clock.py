@@ -123,7 +123,7 @@ def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) 
         raise ProfileError(
             f"The times of column {values.name!r}, such as {most:.10g}, are next to a date and "
             f"{can_be}.",
-            hint=f'say which in [table]: {values.name} = {{ channel = "time", unit = "s" }}, or '
+            hint=f'say which in [table]: "{values.name}" = {{ channel = "time", unit = "s" }}, or '
             f'"ms", or format = "{HHMMSS}".',
         )
     return instants(values, unit, form)
@@ -139,7 +139,7 @@ def _counted(values: pl.Series, unit: str | None) -> pl.Series:
             raise ProfileError(
                 f"The times of column {values.name!r}, such as {most:.15g}, step by {step:g}, and "
                 "are no Unix time.",
-                hint=f'say their unit in [table]: {values.name} = {{ channel = "time", '
+                hint=f'say their unit in [table]: "{values.name}" = {{ channel = "time", '
                 'unit = "us" }, or "ms", or "ns"; or their form, as format = "%Y%m%d%H%M%S".',
             )
         if unit is None and counts_minutes(values):
