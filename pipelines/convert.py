@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -76,8 +77,9 @@ def draft(path: Path, vessel: str | None = None) -> str:
 
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
     check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table per topic")
-    ship = profile.ship.name if profile else path.stem
-    target = out / f"{path.stem if path.is_file() else path.name}.mcap"
+    called = path.stem if path.is_file() else Path(os.path.abspath(path)).name  # of `.`, too
+    ship = profile.ship.name if profile else called
+    target = out / f"{called}.mcap"
     if is_bag(path):
         refuse_existing(target)
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -90,10 +90,12 @@ def ingest_logs(
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
-    """Folders stand for the logs in them; one without logs for itself, which no reader takes."""
+    """Folders stand for the logs in them, but for hidden files; one without logs for itself, which
+    no reader takes."""
     found: list[Path] = []
     for path in paths:
-        found += (sorted(path.glob("*.mcap")) or [path]) if path.is_dir() else [path]
+        logs = sorted(path.glob("[!.]*.mcap")) if path.is_dir() else []
+        found += logs or [path]
     return found
 
 

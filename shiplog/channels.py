@@ -64,7 +64,7 @@ class Quality(IntFlag):
 
     GOOD = 0
     GAP = 1  # no sample within the tolerance: the value is null
-    BLANK = 2  # a message came, but its value is null, NaN or infinite
+    BLANK = 2  # a message came, but its value is null, NaN, infinite or beyond 1e12
     LIMITS = 4  # an actuator beyond the limits in the profile
     SPIKE = 8  # one sample far off both neighbours, which agree with each other
     HELD = 16  # the instrument repeats itself although the ship moves

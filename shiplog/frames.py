@@ -84,11 +84,12 @@ def velocity_at_midship(
 
 
 def quaternion_heading(z: np.ndarray, w: np.ndarray, east_north_up: bool) -> np.ndarray:
-    """Heading [rad, clockwise from north] of a level quaternion (0, 0, z, w).
+    """Heading [rad, clockwise from north] of a level quaternion (0, 0, z, w); NaN of z = w = 0,
+    which is no rotation but a message that nobody filled in.
 
     In east-north-up axes (ROS, REP 103) yaw is counter-clockwise from east: ψ = π/2 - yaw.
     """
-    yaw = 2.0 * np.arctan2(z, w)
+    yaw = np.where((z == 0.0) & (w == 0.0), np.nan, 2.0 * np.arctan2(z, w))
     return np.pi / 2.0 - yaw if east_north_up else yaw
 
 

@@ -107,6 +107,11 @@ def parsed(column: pl.Series) -> pl.Series:
     return number if number.null_count() == column.null_count() else column
 
 
+def is_number(dtype: pl.DataType) -> bool:
+    """Whether a field may hold numbers, as such, as truths or as texts; a list holds several."""
+    return not (dtype.is_nested() or dtype == pl.Binary)
+
+
 def stamp_leaves(layout: Mapping[str, pl.DataType]) -> tuple[str, ...]:
     """The paths a message's own measurement time is made of: (seconds, nanos), (one value,), ()."""
     for base in STAMP_FIELDS:
@@ -138,11 +143,20 @@ def stamps(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series:
 
 
 def _written(column: pl.Series) -> pl.Series:
-    when = column.str.to_datetime("%+", strict=False, time_unit="ns", time_zone="UTC").to_physical()
-    local = column.str.to_datetime(
-        "%Y-%m-%dT%H:%M:%S%.f", strict=False, time_unit="ns"
-    ).to_physical()  # without a zone: taken as UTC
+    when = written_as(column, "%+", "UTC")
+    local = written_as(column, "%Y-%m-%dT%H:%M:%S%.f")  # without a zone: taken as UTC
     return when.fill_null(local)
+
+
+def written_as(texts: pl.Series, form: str, zone: str | None = None) -> pl.Series:
+    """Texts in one form as ns [Int64]; null where they are in another, or beyond the years that 64
+    bits hold, 1677 to 2262: polars makes a date of another century of those. Raises PolarsError."""
+    in_ns, in_us = (
+        texts.str.to_datetime(form, strict=False, time_unit=unit, time_zone=zone)
+        for unit in ("ns", "us")
+    )
+    beyond = in_us.cast(pl.Datetime("ns", zone), strict=False).is_null()
+    return in_ns.to_physical().set(beyond, None)
 
 
 def counted(frame: pl.DataFrame, paths: tuple[str, ...]) -> pl.Series | None:

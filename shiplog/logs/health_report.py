@@ -57,6 +57,7 @@ class Instrument:
 class VoyageReport:
     """The contract's answer of `check` and `ingest` for one log.
 
+    instruments that have two samples at least: of fewer no rate is known
     usable_s    seconds that can be averaged to 1 Hz; None where the log was not ingested
     windows     of `channels.WINDOW` such seconds in a row; None likewise
     """

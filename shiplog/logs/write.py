@@ -47,6 +47,7 @@ SCHEMAS: Mapping[str, tuple[str, ...]] = {
         "x0_m", "y0_m", "heading_deg", "surge_mps", "sway_mps", "yaw_rate_degps",
     ),
 }  # fmt: skip
+THE_MESSAGES_OWN = ("timestamp", "frame_id")  # fields of every message, in addition
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _DOUBLE, _BYTES, _ENUM = 1, 2, 0  # wire types: 64 bit, length-delimited, varint
@@ -174,7 +175,11 @@ def _clock(one: Series, name: str, values: np.ndarray) -> np.ndarray:
             hint="float seconds cannot hold a nanosecond of this century.",
         )
     if len(values) and int(values.min()) < 0:
-        raise ShiplogError(f"{one.topic}: {name} has times before 1970.")
+        raise ShiplogError(
+            f"{one.topic}: {name} has times before 1970.",
+            hint="a log counts from 1970 on; add the same number to all times, of a table that "
+            "counts from a negative number, too.",
+        )
     return values.astype(np.int64, copy=False)
 
 
@@ -194,7 +199,7 @@ def _fields(one: Series) -> tuple[str, ...]:
                 f"{one.topic}: {listed(wrong)} cannot be the name of a protobuf message or field.",
                 hint="use letters, digits and underscores, and no digit first.",
             )
-        if reserved := {"timestamp", "frame_id"} & set(one.columns):
+        if reserved := set(THE_MESSAGES_OWN) & set(one.columns):
             raise ShiplogError(f"{one.topic}: the field {listed(reserved)} is the message's own.")
         return tuple(one.columns)
     allowed = (*known, COVARIANCE) if one.schema == LOCATION_FIX else known

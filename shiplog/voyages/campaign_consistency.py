@@ -63,7 +63,7 @@ def seasons(begins: Mapping[str, float]) -> list[list[str]]:
 
 def together(motions: Sequence[Motion]) -> Motion:
     """Voyages one after another, each beginning a stretch of its own. Long ones give their first
-    rows, so that all together have MOST_ROWS at most."""
+    rows, so that all together have CAMPAIGN_ROWS at most."""
     most = max(CAMPAIGN_ROWS // max(len(motions), 1), 1)
     parts = [motion.beginning(most) for motion in motions]
     arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Motion)}

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import logging
 import unicodedata
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 from urllib.parse import quote, unquote
 
 from shiplog.exceptions import StoreError, listed
@@ -16,6 +18,8 @@ FACTS = ("sha256", "fingerprint", "source", "start", "profile", "report")  # eve
 NEW, OLD = ".new", ".old"  # of a voyage's folder, hidden: while it is written, or replaced
 UNSHOWN = ("Cc", "Zl", "Zp")  # Unicode's categories of control characters and line ends
 LONGEST = 240  # letters; file systems have room for 255, and NEW or OLD takes some
+
+Found = TypeVar("Found")
 
 log = logging.getLogger(__name__)
 
@@ -49,10 +53,9 @@ def entries(store: Path) -> list[CatalogueEntry]:
         )
     found = []
     for place in sorted(_places(store)):
-        folder = whole(place)
-        row = _entry(folder)
+        row = found_in(place, _entry)
         if row is None:
-            log.warning("%s cannot be read and is left out: ingest its log again.", folder)
+            log.warning("%s cannot be read and is left out: ingest its log again.", whole(place))
         else:
             found.append(row)
     return sorted(found, key=lambda entry: entry.name)
@@ -67,7 +70,11 @@ def _places(store: Path) -> set[Path]:
     """Where the folders of voyages are, or will be again."""
     places = set(store.glob("voyage=*"))
     places |= {place_of(old) for old in store.glob(f".voyage=*{OLD}")}
-    return {place for place in places if (whole(place) / "voyage.json").is_file()}
+    return {place for place in places if found_in(place, _has_facts)}
+
+
+def _has_facts(folder: Path) -> bool:
+    return (folder / "voyage.json").is_file()
 
 
 def place(store: Path, name: str) -> Path:
@@ -112,6 +119,12 @@ def whole(place: Path) -> Path:
     """The folder to read a voyage from: while it is replaced, the one that was there before."""
     old = hidden(place, OLD)
     return old if not place.is_dir() and old.is_dir() else place
+
+
+def found_in(place: Path, look: Callable[[Path], Found | None]) -> Found | None:
+    """What is found in a voyage's folder; once more where it was moved since it was looked up, as
+    by a process that replaces it."""
+    return look(whole(place)) or look(whole(place))
 
 
 def name_of(folder: Path) -> str:

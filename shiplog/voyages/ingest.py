@@ -16,6 +16,7 @@ import polars as pl
 from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
+from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
@@ -34,6 +35,7 @@ RESOLVED = {  # of a sensor: the channel whose unit its resolution has
 LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
 FARTHEST_DEG = (90.0, 360.0)  # latitude and longitude, whichever way the latter is counted
 NO_FIX_DEG = (91.0, 181.0)  # what AIS sends of a position that it does not know
+LARGEST = 1e12  # as the profile has it: what is beyond, as the largest float of all, is no value
 NEAR_DEG = 1.0  # from the median position: (0, 0) before the first fix is further away than that
 
 log = logging.getLogger(__name__)
@@ -75,7 +77,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
         usable_s=usable_s,
         windows=windows,
-        instruments=tuple(_instrument(*one) for one in aligned.samples),
+        instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
     )
     return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
 
@@ -196,20 +198,32 @@ def _require(reading: Reading, profile: Profile) -> None:
                     f"Fields found: {listed(known)}.",
                     hint="correct the field in the ship profile.",
                 )
+            if frame is not None and not is_number(frame.schema[path]):
+                raise ChannelMissing(
+                    f"{log}: the field {path!r} of the topic {topic!r} holds "
+                    f"{frame.schema[path]}, not one number.",
+                    hint=f'name one of its values in the ship profile, as field = "{path}[0]".',
+                )
 
 
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
-    """Time [n] ns by the source's clock and SI values [n, k]."""
+    """Time [n] ns by the source's clock and SI values [n, k], NaN where there is none."""
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
     times = frame[clocks.of(frame, source)[0]]
     values = [
-        (frame[path].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy() - offset) * factor
+        (_numbers(frame[path]) - offset) * factor
         for path, (offset, factor) in zip(source.paths, source.scale(), strict=True)
     ]
     known = times.is_not_null().to_numpy()
     return times.fill_null(0).to_numpy()[known], np.stack(values, axis=1)[known]
+
+
+def _numbers(column: pl.Series) -> np.ndarray:
+    """A field's values [n], NaN where there is none."""
+    raw = column.cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
+    return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
 def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
@@ -362,5 +376,8 @@ def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples)
     offset, factor = actuator.scale()[0]
     low, high = sorted((limit - offset) * factor for limit in actuator.limits)
     slack = 1e-3 * (high - low)
-    beyond = (column < low - slack) | (column > high + slack)
+    if actuator.circular:  # limits of 0 to 360 deg are all there is, wherever the angle is cut
+        beyond = np.mod(column - low + slack, 2.0 * np.pi) > high - low + 2.0 * slack
+    else:
+        beyond = (column < low - slack) | (column > high + slack)
     grid.note(beyond, Quality.LIMITS, "limits", actuator.name, "stands beyond its limits")

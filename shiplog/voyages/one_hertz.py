@@ -76,7 +76,8 @@ def resample(
 
     tables: 10 Hz rows, one lazy table a voyage. `segment` counts from 0 in each voyage; within
     one, the stamps are exactly 1 s apart. `elapsed` counts whole seconds from the voyage's first
-    row, usable or not, as the findings of its log and its parts do.
+    row, usable or not, as the findings of its log and its parts do; 0 is also what the first
+    average has that is centred up to 0.1 s before that row.
     """
     circular = frozenset(circular)
     return segments(pl.concat(_by_day(tables, columns, circular, least)))
@@ -97,7 +98,8 @@ def _by_day(
     """The averages of each voyage, a table a day, with `elapsed`."""
     for table in tables:
         begin = table.select(pl.col("time").min()).collect()["time"].to_physical().item()
-        elapsed = ((pl.col("time").cast(pl.Int64) - begin) // SECOND_NS).cast(pl.Float64)
+        since = (pl.col("time").cast(pl.Int64) - begin).clip(lower_bound=0)
+        elapsed = (since // SECOND_NS).cast(pl.Float64)
         for day in days(table):
             yield averages(day, columns, circular, least).with_columns(elapsed=elapsed)
 
@@ -152,18 +154,22 @@ def twins(seconds: pl.DataFrame) -> dict[str, str]:
 def shared_rows(seconds: pl.DataFrame, least: int = 10) -> pl.DataFrame:
     """Pairs of voyages with identical rows: left, right, rows. The same data under two names.
 
-    Two recordings never agree in all of surge, sway, heading and yaw rate to the last digit.
+    Two recordings never agree in all of surge, sway, heading and yaw rate to the last digit. Of a
+    row that a voyage has many times, as a simulated one on a straight course, as many are shared
+    as the other has.
     """
     key = pl.struct(*COMPARED).hash(seed=1)
-    keys = seconds.filter(
-        (pl.col("surge") != 0) | (pl.col("sway") != 0) | (pl.col("yaw_rate") != 0)
-    ).select("voyage", key=key)
+    keys = (
+        seconds.filter((pl.col("surge") != 0) | (pl.col("sway") != 0) | (pl.col("yaw_rate") != 0))
+        .group_by("voyage", key=key)
+        .agg(times=pl.len())
+    )
     pairs = keys.join(keys, on="key", suffix="_other").filter(
         pl.col("voyage") < pl.col("voyage_other")
     )
     return (
         pairs.group_by(left="voyage", right="voyage_other")
-        .agg(rows=pl.len())
+        .agg(rows=pl.min_horizontal("times", "times_other").sum())
         .filter(pl.col("rows") >= least)
         .sort("left", "right")
     )

@@ -94,7 +94,7 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
         groups.setdefault(twin.get(name, name), []).append(name)
     _say_what_is_left_out(rows, names, usable, size)
     if len(groups) == 1:
-        return _in_time(rows, usable[0], size)
+        return _in_time(rows, store, usable[0], size)
     if not groups:
         raise StoreError(
             f"No voyage has a window of {size} s without a gap.",
@@ -122,16 +122,18 @@ def _deal(store: Store, names: list[str], size: int) -> Split:
     )
 
 
-def _in_time(rows: pl.DataFrame, name: str, size: int) -> Split:
-    """One voyage by time: its first part trains, then validates, its last part tests. Windows are
-    cut in each part by itself, so that none crosses."""
+def _in_time(rows: pl.DataFrame, store: Store, name: str, size: int) -> Split:
+    """One voyage, or a part of one, by time: what comes first trains, what comes last tests.
+    Windows are cut in each part by itself, so that none crosses."""
     own = rows.filter(pl.col("voyage") == name)
     # parts count from the first row, which may be long before the first usable one
     elapsed = own["elapsed"].to_numpy()
     used = np.arange(1, len(elapsed) + 1) / len(elapsed)  # share of the usable seconds
     ends = [1.0 - 2.0 * HELD_OUT_SHARE, 1.0 - HELD_OUT_SHARE]
     at = [0, *(int(elapsed[np.searchsorted(used, end)]) for end in ends), int(elapsed[-1]) + 1]
-    named = [str(Part(name, begin, end)) for begin, end in pairwise(at) if begin < end]
+    of = store.part_of(name) or Part(name, 0, at[-1])
+    at[-1] = min(at[-1], of.end - of.begin)
+    named = [str(Part(of.whole, of.begin + a, of.begin + b)) for a, b in pairwise(at) if a < b]
     longest = [
         _longest(own.filter(pl.col("elapsed").is_between(a, b, closed="left")))
         for a, b in pairwise(at)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
     from shiplog.voyages.ingest import Voyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
-INGEST_VERSION = 9  # raised when the same log would become another table or report
+INGEST_VERSION = 10  # raised when the same log would become another table or report
 SILENT_WAIT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)
@@ -179,7 +179,7 @@ class Store:
         chosen: Profile | None = None
         first = ""
         for name in names:
-            part = self._part(name)
+            part = self.part_of(name)
             facts = catalogue.facts(self._folder(part.whole if part else name))
             source = facts.get("profile_source", "")
             try:
@@ -225,27 +225,28 @@ class Store:
         return one_hertz.resample(self.tables(names), profile.columns, profile.circular)
 
     def _table(self, name: str) -> pl.LazyFrame:
-        part = self._part(name)
+        part = self.part_of(name)
         if part is not None:
             elapsed = (pl.col("time") - pl.col("time").min()).dt.total_nanoseconds() * 1e-9
             inside = (elapsed >= part.begin) & (elapsed < part.end)
             return self._table(part.whole).filter(inside).with_columns(voyage=pl.lit(name))
-        folder = self._folder(name)
-        if not _whole(folder, catalogue.facts(folder)):
+        folder = catalogue.found_in(catalogue.place(self.path, name), _sound)
+        if folder is None:
+            catalogue.facts(self._folder(name))  # raises where that is what cannot be read
             raise StoreError(
                 f"The table of {name} in the store {self.path} is spoilt.",
                 hint="ingest its log again: shiplog ingest LOG --store DIR.",
             )
         return pl.scan_parquet(folder / "table.parquet", hive_partitioning=False)
 
-    def _part(self, name: str) -> parts.Part | None:
+    def part_of(self, name: str) -> parts.Part | None:
         """None where the name is that of a whole voyage, whatever it looks like."""
         return None if self._folder(name).is_dir() else parts.parse(name)
 
     def hashes(self, names: Iterable[str]) -> dict[str, str | None]:
         """Name → SHA-256 of its log; of a part, that of its voyage."""
         known = {entry.name: entry.sha256 for entry in self.entries()}
-        of = {name: self._part(name) for name in names}
+        of = {name: self.part_of(name) for name in names}
         return {name: known.get(part.whole if part else name) for name, part in of.items()}
 
     def _folder(self, name: str) -> Path:
@@ -306,6 +307,14 @@ def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:
             f"{lengths[part.whole]:.0f} s long.",
             hint=f"choose seconds from 0 to {lengths[part.whole]:.0f}.",
         )
+
+
+def _sound(folder: Path) -> Path | None:
+    """The folder, if both of its files can be read."""
+    try:
+        return folder if _whole(folder, catalogue.facts(folder)) else None
+    except StoreError:
+        return None
 
 
 def _whole(folder: Path, facts: dict) -> bool:

@@ -110,6 +110,26 @@ def test_rows_without_a_time_are_lost_and_blank_rows_are_none(tmp_path):
     assert done.lost == {str(tmp_path / "t.csv"): "1 row without a time"}
 
 
+@pytest.mark.parametrize("scaled", ["offset = -30.0", "sign = 0.001"])
+def test_a_time_with_an_offset_is_refused_and_not_taken_without_it(tmp_path, scaled):
+    text = PROFILE.replace('t = "time"', f't = {{ channel = "time", unit = "s", {scaled} }}')
+    assert text != PROFILE
+    profile = profiles.parse(text, "mine")
+    (tmp_path / "t.csv").write_text("t,x,y,u,v,psi\n0,0,0,1,0,5\n1,1,0,1,0,5\n")
+    refused = str(convert([tmp_path / "t.csv"], profile, tmp_path).refused)
+    assert "'t' has a `sign` or an `offset`, and is a time" in refused
+    (tmp_path / "dump").mkdir()
+    (tmp_path / "dump" / "gyro.csv").write_text("t,psi\n0,5\n1,5\n")
+    assert "is a time" in str(convert([tmp_path / "dump"], profile, tmp_path).refused)
+
+
+def test_times_that_begin_before_zero_are_refused_with_a_way_out(tmp_path):
+    """A manoeuvre whose clock is 0 at the execute."""
+    (tmp_path / "t.csv").write_text("t,x,y,u,v,psi\n-1,0,0,1,0,5\n0,1,0,1,0,5\n")
+    refused = str(convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path).refused)
+    assert "before 1970" in refused and "add the same number to all times" in refused
+
+
 def test_rows_that_go_back_in_time_are_sorted_and_reported(tmp_path, caplog):
     rows = [f"{i / 10},{i},0,1,0,5" for i in range(30)]
     (tmp_path / "t.csv").write_text("\n".join(["t,x,y,u,v,psi", *reversed(rows)]))
@@ -247,6 +267,14 @@ def test_what_nmea_says_in_its_own_units(tmp_path, caplog):
     assert "1 damaged" in done.lost[str(tmp_path / "a.nmea")]
 
 
+def test_a_maker_s_own_sentence_is_not_used_and_not_damaged(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+    own = ["$PFEC,GPatt,12.0,1.0,2.0*3A", "$PSRF103,00,00,01,01*25", "$PGRME,3.1,M,4.2,M,5.2,M"]
+    (tmp_path / "a.nmea").write_text("\n".join([*BURST, *own, "$GPRM"]))
+    assert read_nmea(tmp_path / "a.nmea")[1] == 1  # the last one: cut off
+    assert "PFEC (1)" in caplog.text and "PSRF103 (1)" in caplog.text
+
+
 def nmea_topics(tmp_path, lines):
     (tmp_path / "a.nmea").write_text("\n".join(lines))
     return {s.topic: s for s in read_nmea(tmp_path / "a.nmea")[0]}
@@ -269,6 +297,13 @@ def test_the_clock_of_a_receiver_without_a_fix_is_not_believed(tmp_path):
     assert {int(t) for s in topics.values() for t in s.time} == {1_744_366_210_000_000_000}
 
 
+def test_a_date_beyond_every_log_is_a_damaged_sentence(tmp_path):
+    (tmp_path / "a.nmea").write_text("\n".join(["$GPZDA,101009.00,11,04,9999,00,00", *BURST]))
+    series, damaged = read_nmea(tmp_path / "a.nmea")
+    assert damaged == 1
+    assert {int(t) for s in series for t in s.time} == {1_744_366_210_000_000_000}
+
+
 def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path):
     """By hand: GLL and VTG differ from GGA and RMC, and stand before them."""
     lines = ["$GPGLL,6300.0000,N,01000.0000,E,101010.00,A,A", "$GPVTG,10.0,T,,M,9.0,N,,K,A", *BURST]
@@ -276,6 +311,17 @@ def test_the_best_sentence_says_where_the_ship_is_whatever_comes_first(tmp_path)
     topics = {s.topic: s.columns for s in read_nmea(tmp_path / "a.nmea")[0]}
     assert topics["/gnss/fix"]["altitude"].tolist() == [2.9]  # only GGA has one
     assert topics["/gnss/velocity"]["cog_deg"].tolist() == [90.0]
+
+
+@pytest.mark.parametrize(
+    "where", [",,,", "6326.4000,N,,", ",N,01025.2000,E", "6326.4000,,01025.2000,E"]
+)
+def test_a_fix_without_a_position_is_no_position_off_africa(tmp_path, where):
+    """Dead reckoning (quality 6) that has begun nowhere yet: not 0 deg N, 0 deg E."""
+    lines = [f"$GPGGA,101011.00,{where},6,00,,,M,,M,,", *BURST]
+    fix = nmea_topics(tmp_path, lines)["/gnss/fix"]
+    assert np.isnan(fix.columns["latitude"]).tolist() == [True, False]
+    assert np.isnan(fix.columns["longitude"]).tolist() == [True, False]
 
 
 def test_headings_between_two_fixes_are_spread_over_the_time_between_them(tmp_path):
@@ -310,9 +356,14 @@ def test_long_work_speaks_and_short_work_does_not(caplog):
     assert heartbeat.EVERY_S <= 2.0
 
 
-@pytest.mark.parametrize("stamp", ["2016-12-31T23:59:60Z", "2024-02-30 00:00:00"])
+@pytest.mark.parametrize(
+    "stamp",
+    ["2016-12-31T23:59:60Z", "2024-02-30 00:00:00", "9999-12-31T23:59:59Z",
+     "0001-01-01T00:00:00+23:59"],
+)  # fmt: skip
 def test_a_receive_stamp_that_is_no_time_costs_no_log(tmp_path, stamp):
-    """A leap second, or a damaged digit: the line takes the time of those around it."""
+    """A leap second, a damaged digit, or what stands for no time at all: the line takes the time
+    of those around it."""
     lines = [f"2024-02-28T10:00:0{k}Z $HEHDT,{k}.0,T" for k in range(5)]
     lines.insert(2, f"{stamp} $HEHDT,9.0,T")
     (tmp_path / "a.nmea").write_text("\n".join(lines))

@@ -5,9 +5,11 @@ the words and units of where it occurs, and knows nothing of what `convert` writ
 """
 
 import json
+from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pytest
 from circle_layouts import (
     COMMON,
     DATUM,
@@ -21,8 +23,11 @@ from circle_layouts import (
     same,
 )
 
+from pipelines.convert import convert
 from shiplog import profile_file as profiles
-from shiplog.logs.read import contents
+from shiplog.logs.read import contents, read
+
+STEPS = np.arange(20.0)
 
 
 def test_1_csv_of_a_gnss_receiver(tmp_path):
@@ -241,3 +246,41 @@ def test_a_converted_log_says_in_json_what_became_of_it(tmp_path):
     code, output, _ = call("convert", tmp_path / "empty.csv", "--out", tmp_path, "--json", "-")
     assert code == 1
     assert list(json.loads(output)["refused"]) == [str(tmp_path / "empty.csv")]
+
+
+def tables_of_topics(folder, **columns):
+    """A table a topic, 10 Hz: name → its columns beside the clock."""
+    folder.mkdir()
+    (folder / "._gyro.csv").write_bytes(b"\0\5\x16\7")  # as macOS leaves it on a memory stick
+    stamp = 1_700_000_000_000_000_000 + 100_000_000 * np.arange(20)
+    for name, values in columns.items():
+        pl.DataFrame({"stamp_ns": stamp, **values}).write_csv(folder / f"{name}.csv")
+    return folder
+
+
+def test_topics_whose_names_are_alike_in_protobuf_keep_their_columns(tmp_path):
+    names = {"方位": {"heading": STEPS}, "速度": {"sog": 2.0 * STEPS}, "風速": {"sog": 3.0 * STEPS}}
+    done = convert([tables_of_topics(tmp_path / "trip", **names)], None, tmp_path / "out")
+    assert not done.refused and not done.lost
+    frames = read(done.logs[0]).frames
+    assert frames["/方位"]["heading"].to_list() == STEPS.tolist()
+    assert frames["/速度"]["sog"].to_list() == (2.0 * STEPS).tolist()
+    assert frames["/風速"]["sog"].to_list() == (3.0 * STEPS).tolist()
+
+
+def test_a_column_called_as_the_messages_own_time_is_a_field_all_the_same(tmp_path):
+    """A device's own counter next to the recorder's stamp."""
+    columns = {"timestamp": STEPS, "heading": 2.0 * STEPS}
+    done = convert([tables_of_topics(tmp_path / "trip", gyro=columns)], None, tmp_path / "out")
+    assert not done.refused
+    frame = read(done.logs[0]).frames["/gyro"]
+    assert frame["timestamp_2"].to_list() == STEPS.tolist()
+    assert frame["stamp"].diff().drop_nulls().unique().to_list() == [100_000_000]
+
+
+@pytest.mark.parametrize("way", [".", "..", "../trip.1"])
+def test_a_folder_gives_its_log_its_name_whatever_the_way_to_it(tmp_path, monkeypatch, way):
+    folder = tables_of_topics(tmp_path / "trip.1", gyro={"heading": STEPS})
+    (folder / "inside").mkdir()
+    monkeypatch.chdir(folder / "inside" if way == ".." else folder)
+    assert convert([Path(way)], None, tmp_path / "out").logs == [tmp_path / "out" / "trip.1.mcap"]

@@ -1,5 +1,7 @@
 """The times of a table, in every form in which they stand there."""
 
+import re
+import tomllib
 from datetime import datetime
 
 import numpy as np
@@ -10,6 +12,7 @@ from test_conversion import PROFILE
 from pipelines.convert import convert
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ProfileError
+from shiplog.logs import fields
 from shiplog.logs.conversion import clock
 from shiplog.logs.read import read
 
@@ -36,6 +39,18 @@ def test_a_time_is_itself_in_every_form(values, unit):
     found = clock.instants(pl.Series("t", values, strict=False), unit)
     # A float of seconds or minutes holds this century to a fraction of a microsecond.
     assert (found - pl.Series([NOON, NOON + 500_000_000])).abs().max() <= 5_000
+
+
+@pytest.mark.parametrize("end", ["\0\0\0", "END OF RECORD"])
+def test_a_word_among_times_costs_its_row_alone(tmp_path, end):
+    """A logger that lost its power, or a last line in words: as ISO texts have it, too."""
+    found = clock.instants(pl.Series("t", ["0.0", "0.1", "0.2", end])).to_list()
+    assert found == [0, 10**8, 2 * 10**8, None]
+    names = [*profiles.parse(PROFILE, "m").table]
+    rows = [",".join(str(0.1 * i) for _ in names) for i in range(3)]
+    (tmp_path / "t.csv").write_text("\n".join([",".join(names), *rows, end]))
+    done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "m"), tmp_path / "out")
+    assert not done.refused and len(done.logs) == 1
 
 
 def test_datetimes_keep_their_instant_and_count_from_start_keep_theirs():
@@ -120,6 +135,45 @@ def test_a_number_beside_a_date_that_can_be_two_times_is_asked_for(numbers, word
         clock.of_day(pl.Series("t", numbers))
     assert 'format = "%H%M%S"' in str(asked.value)
     clock.of_day(pl.Series("t", numbers), unit="s")
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        [datetime(2021, 4, 9, 12), datetime(9999, 12, 31)],
+        ["2021-04-09 12:00:00", "9999-12-31 00:00:00"],
+        ["2021-04-09T12:00:00Z", "0001-01-01T00:00:00Z"],
+    ],
+)
+def test_a_date_that_stands_for_none_is_none(times):
+    """Of databases: 64 bits of nanoseconds do not hold it, and polars made one of 1816."""
+    assert clock.instants(pl.Series("t", times)).to_list() == [NOON, None]
+    if isinstance(times[0], datetime):
+        assert clock.dates(pl.Series("t", times)).null_count() == 1
+    else:
+        stamps = fields.stamps(pl.DataFrame({"stamp": times}), ("stamp",))
+        assert stamps[1] is None
+
+
+@pytest.mark.parametrize("between, end", [(" ", ""), ("T", ""), (" ", "Z"), (" ", " UTC")])
+def test_either_form_that_is_proposed_reads_the_times(between, end):
+    """3 April and 4 March 2024, 10:00 UTC: seconds of 1970 by a calendar."""
+    times = pl.Series("t", [f"03/04/2024{between}10:00:00{end}"])
+    with pytest.raises(ProfileError, match="day or with the month first") as asked:
+        clock.instants(times)
+    forms = asked.value.hint.split("format = ")[1].rstrip(".").split(" or ")
+    read_so = {clock.instants(times, form=form.strip("'"))[0] for form in forms}
+    assert read_so == {1_712_138_400 * 10**9, 1_709_546_400 * 10**9}
+
+
+@pytest.mark.parametrize(
+    "asks, numbers", [(clock.of_day, [83401, 83402]), (clock.instants, [1_000_000, 1_100_000])]
+)
+def test_the_line_that_is_proposed_for_a_column_is_toml(asks, numbers):
+    with pytest.raises(ProfileError) as asked:
+        asks(pl.Series("UTC time [s]", numbers))
+    line = re.search(r"in \[table\]: (.*? \})", asked.value.hint)[1]
+    assert tomllib.loads(line)["UTC time [s]"]["channel"] == "time"
 
 
 def test_times_that_can_be_read_in_two_ways_are_asked_for():

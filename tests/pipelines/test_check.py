@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import sailing
 
-from pipelines.prepare import check_logs
+from pipelines.prepare import check_logs, expand
 from shiplog import profile_file as profiles
 from shiplog.logs.check import check, expected_s, health_of
 from shiplog.logs.read import read
@@ -69,6 +69,16 @@ def test_a_check_finds_what_reading_everything_and_ingesting_find(tmp_path, make
     consistency = sensor_consistency.findings(voyage.estimates, voyage.table.height, profile)
     assert report == replace(everything, findings=(*everything.findings, *consistency))
     assert {finding.kind for finding in report.findings} >= kinds
+
+
+def test_hidden_files_of_a_folder_are_no_logs(tmp_path):
+    """macOS leaves `._a.mcap` next to `a.mcap` on a memory stick."""
+    for name in ("b.mcap", "._a.mcap", "a.mcap"):
+        (tmp_path / name).write_bytes(b"")
+    assert expand([tmp_path]) == [tmp_path / "a.mcap", tmp_path / "b.mcap"]
+    (tmp_path / "none").mkdir()
+    (tmp_path / "none" / ".mcap").write_bytes(b"")
+    assert expand([tmp_path / "none"]) == [tmp_path / "none"]
 
 
 def test_the_time_that_a_check_takes_is_expected_from_what_the_log_says(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from mcap.writer import Writer
 
 from shiplog import profile_file as profiles
+from shiplog.exceptions import ChannelMissing
 from shiplog.voyages.draft_profile import draft
 from shiplog.voyages.ingest import ingest
 
@@ -134,6 +135,22 @@ def test_a_description_and_a_text_drive_no_ship(tmp_path):
     }  # fmt: skip
     assert "<link/>" * 10 not in text
     assert (ingest(path, drafted).report.usable_s or 0) > 50
+
+
+def test_a_list_of_numbers_is_no_number(tmp_path):
+    """ROS's JointState has its positions in a list: a profile names one of them."""
+    path = log_of(tmp_path / "joints.mcap", PX4 | {
+        "/rudder/joints": ("sensor_msgs/msg/JointState", lambda t: {"position": [0.1, 0.2]}),
+        "/rudder/main": ("own/Rudder", lambda t: {"angle_deg": 5.0}),
+    })  # fmt: skip
+    text = draft(path)
+    drafted = profiles.parse(text, "draft")
+    assert [a.topic for a in drafted.actuators] == ["/rudder/main"]
+    listed = text.replace('"/rudder/main"', '"/rudder/joints"').replace("angle_deg", "position")
+    with pytest.raises(ChannelMissing, match=r"'position' .* holds List\(Float64\), not one"):
+        ingest(path, profiles.parse(listed, "own"))
+    second = profiles.parse(listed.replace('field = "position"', 'field = "position[1]"'), "own")
+    assert ingest(path, second).table["rudder_main"][0] == pytest.approx(math.radians(0.2))
 
 
 def test_an_order_is_drafted_where_what_measures_holds_nothing(tmp_path):

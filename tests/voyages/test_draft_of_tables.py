@@ -319,6 +319,16 @@ def test_a_position_is_of_one_receiver(tmp_path):
     assert (taken["latitude"], taken["longitude"]) == ("gps2_lat", "gps2_lon")
 
 
+@pytest.mark.parametrize("rows", [1, COUNT])
+def test_a_yaw_rate_without_a_turn_to_compare_it_with_keeps_its_usual_unit(tmp_path, rows):
+    """One row, or a heading that is blank: numpy warns of the median of nothing."""
+    heading = np.full(rows, np.nan if rows > 1 else 45.0)
+    table = {name: values[:rows] for name, values in SHIP.items()} | {"heading [deg]": heading}
+    pl.DataFrame({**table, "rot": np.ones(rows)}).write_parquet(tmp_path / "t.parquet")
+    text = draft_table(tmp_path / "t.parquet")
+    assert '"rot" = { channel = "yaw_rate", unit = "deg/s" }' in text and "unit not stated" in text
+
+
 def test_a_plain_x_does_not_say_where_north_is(tmp_path):
     path = tmp_path
     found = lines(path, {"X [m]": STEPS * 1.0, "Y [m]": STEPS * 2.0}, without=("lat", "lon"))
@@ -330,3 +340,18 @@ def test_a_plain_x_does_not_say_where_north_is(tmp_path):
 def test_a_long_text_is_cut_in_a_comment():
     comment = facts.of_values(pl.Series(["<robot>\n" * 100]))
     assert len(comment) < 80 and "\n" not in comment
+
+
+def test_a_name_with_quotation_marks_or_a_line_end_is_drafted_as_it_is(tmp_path):
+    """As of a spreadsheet whose headers have two lines."""
+    path = tmp_path / 'trial "A" \\ 1.parquet'
+    odd = {"rudder\n[deg]": SHIP["rudder [deg]"], 'note\n"x"': STEPS * 2.0}
+    ship = {name: values for name, values in SHIP.items() if name != "rudder [deg]"}
+    pl.DataFrame({**ship, **odd}).write_parquet(path)
+    profile = profiles.parse(draft_table(path), "draft")
+    assert profile.ship.name == 'trial "A" \\ 1'
+    assert profile.table["rudder\n[deg]"].channel == profile.actuators[0].name
+    vessels = pl.DataFrame({**SHIP, "vessel": ['the "B"', "C"] * (COUNT // 2)})
+    vessels.write_parquet(tmp_path / "fleet.parquet")
+    profile = profiles.parse(draft_table(tmp_path / "fleet.parquet", 'the "B"'), "draft")
+    assert (profile.ship.name, profile.table["vessel"].only) == ('the "B"', 'the "B"')

@@ -82,6 +82,29 @@ def section(text: str, name: str) -> str:
     return text.split(f"[{name}]")[1].split("\n\n")[0]
 
 
+def test_names_that_toml_or_a_column_cannot_have_as_they_are(tmp_path):
+    """Two rudders in Japanese letters are two columns; a ship's name keeps its marks."""
+    turning = {"angle_deg": [1.0, 2.0, 3.0]}
+    topics = {
+        "/fix": {"latitude": [59.0] * 3, "longitude": [10.0] * 3},
+        "/gnss/vel": {"sog_mps": [1.0] * 3, "cog_deg": [2.0] * 3},
+        "/gyro": {"heading_deg": [3.0] * 3},
+        "/rudder/右舷": turning, "/rudder/左舷": turning, '/"x"': {"y": [0.0] * 3},
+    }  # fmt: skip
+    log = log_of(tmp_path / "a.mcap", topics)
+    write_log(
+        tmp_path / "b.mcap",
+        [Series(t, f"foreign.T{i}", np.arange(3) * 10**8, {n: np.array(v) for n, v in c.items()})
+         for i, (t, c) in enumerate(topics.items())],
+        ship='M/V "Foo" \\ 2',
+    )  # fmt: skip
+    profile = profiles.parse(draft(tmp_path / "b.mcap"), "draft")
+    assert profile.ship.name == 'M/V "Foo" \\ 2'
+    assert profile.actuator_names == ("rudder", "rudder_2")
+    assert {a.topic for a in profile.actuators} == {"/rudder/右舷", "/rudder/左舷"}
+    assert ingest(log, profiles.parse(draft(log), "draft")).table.height == 3
+
+
 def test_set_points_come_last_and_instruments_before_estimates(tmp_path):
     path = log_of(
         tmp_path / "rich.mcap",

@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 import sailing
 
+from shiplog import frames
 from shiplog.channels import Quality
 from shiplog.exceptions import ChannelMissing, LogUnreadable, ProfileError
 from shiplog.logs.write import Series
@@ -143,13 +144,41 @@ def test_a_spike_is_marked_and_left_as_it_is(voyage):
     assert (done.table["x0"] - voyage().table["x0"]).abs().max() > 2.0
 
 
-def test_a_lone_nan_is_blank(voyage):
+@pytest.mark.parametrize("no_value", [np.nan, -np.inf, 1.7976931348623157e308, -(2.0**63)])
+@pytest.mark.parametrize("field", ["speed_mps", "direction_deg"])
+def test_a_lone_value_that_is_none_is_blank(voyage, field, no_value):
+    """Also the largest float and the least whole number, which some programs write for it."""
     parts = sailing.series()
-    wind = parts["/wind"].columns["speed_mps"].copy()
-    wind[100:110] = np.nan
-    done = voyage(changed(parts, "/wind", speed_mps=wind))
-    assert ("blank", "wind") in kinds(done.report)
+    wind = parts["/wind"].columns[field].copy()
+    wind[100:110] = no_value
+    done = voyage(changed(parts, "/wind", **{field: wind}))
+    assert kinds(done.report) == [("blank", "wind")]
     assert done.table.filter(pl.col("quality") & int(Quality.BLANK) != 0).height >= 10
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_an_instrument_without_two_samples_has_no_rate(voyage, count):
+    parts = sailing.series()
+    few = kept(parts, "/wind", np.arange(len(parts["/wind"].time)) < count)
+    assert "wind" not in {one.channel for one in voyage(few).report.instruments}
+
+
+def test_a_quaternion_that_nobody_filled_in_is_blank(voyage):
+    """ROS sends (0, 0, 0, 0) before there is an orientation: no heading to the east."""
+    parts = sailing.series()
+    heading = 3.0 + sailing.SPEED / sailing.RADIUS * np.arange(600) * 0.1
+    half = 0.5 * (np.pi / 2.0 - heading)
+    z, w = np.sin(half), np.cos(half)
+    z[100:110] = w[100:110] = 0.0
+    turned = Series("/imu", "test.Imu", parts["/gyro"].time, {"z": z, "w": w})
+    text = sailing.PROFILE.replace(
+        '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"',
+        '[sensors.heading]\nkind = "quaternion_enu"\ntopic = "/imu"\nfields = ["z", "w"]',
+    )
+    done, clean = voyage({**parts, "/imu": turned}, text), voyage()
+    assert ("blank", "heading") in kinds(done.report)
+    off = frames.wrap((done.table["heading"] - clean.table["heading"]).drop_nulls().to_numpy())
+    assert np.abs(off).max() < 1e-6 and len(off) < clean.table.height
 
 
 def test_a_rudder_beyond_its_limits_is_marked_not_clipped(voyage):
@@ -161,6 +190,23 @@ def test_a_rudder_beyond_its_limits_is_marked_not_clipped(voyage):
     assert finding.channel == "rudder"
     assert done.table["rudder"].min() == pytest.approx(-np.radians(50.0))
     assert done.table.filter(pl.col("quality") & int(Quality.LIMITS) != 0).height >= 4
+
+
+@pytest.mark.parametrize(
+    "limits, beyond", [("[0.0, 360.0]", 0), ("[-180.0, 180.0]", 0), ("[90.0, 270.0]", 300)]
+)
+def test_limits_of_an_azimuth_hold_wherever_its_turn_is_cut(voyage, limits, beyond):
+    """One turn in 60 s, 0.6 deg a row: half of the turn, 300 rows, is outside 90 to 270 deg."""
+    parts = sailing.series()
+    angle = 0.6 * np.arange(600.0)
+    turning = Series("/az", "shiplog.Azimuth", parts["/gyro"].time, {"angle_deg": angle})
+    text = sailing.PROFILE + (
+        '[[actuators]]\nname = "az"\nkind = "azimuth"\ntopic = "/az"\nfield = "angle_deg"\n'
+        f'unit = "deg"\nlimits = {limits}\n'
+    )
+    table = voyage({**parts, "/az": turning}, text).table
+    marked = table["quality"].to_numpy() & int(Quality.LIMITS) != 0
+    assert marked.sum() == pytest.approx(beyond, abs=4)
 
 
 def test_a_frozen_position_is_found_and_its_catching_up_is_no_jump(voyage):

@@ -120,6 +120,17 @@ def test_the_same_data_under_two_names_is_found():
     assert one_hertz.twins(pl.concat([all_rows, again])) == {"b": "a", "d": "a"}
 
 
+def test_a_row_that_two_voyages_have_many_times_is_shared_as_often_as_both_have_it():
+    """Simulated straight courses: 30 s and 20 s of one state share 20 s, not 30 times 20."""
+    steady = pl.DataFrame({"surge": [1.0], "sway": 0.0, "heading": 0.5, "yaw_rate": 0.0})
+
+    def sailed(name, count):
+        return pl.concat([steady] * count).with_columns(voyage=pl.lit(name))
+
+    found = one_hertz.shared_rows(pl.concat([sailed("a", 30), sailed("b", 20), sailed("c", 5)]))
+    assert found.rows() == [("a", "b", 20)]
+
+
 def test_two_halves_and_the_whole_of_one_log_are_one_group():
     noise = np.random.default_rng(0).normal(size=(4, 60))
     whole = pl.DataFrame(dict(zip(one_hertz.COMPARED, noise, strict=True)))
@@ -131,6 +142,13 @@ def test_two_halves_and_the_whole_of_one_log_are_one_group():
     assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
     voyages = [named("a", whole[:30]), named("b", whole[30:]), named("c", whole)]
     assert one_hertz.twins(pl.concat(voyages)) == {"b": "a", "c": "a"}
+
+
+def test_no_second_is_before_the_first_row():
+    """From 0.05 s on, the first average has five rows, and its stamp is 0.05 s before them."""
+    result = seconds(rows(start=START + timedelta(milliseconds=50)))
+    assert (result["time"][0], result["samples"][0]) == (START, 5)
+    assert result["elapsed"].to_list()[:3] == [0.0, 0.0, 1.0]
 
 
 def test_seconds_count_from_the_first_row_even_where_it_cannot_be_used():

@@ -76,6 +76,17 @@ def test_one_voyage_is_split_in_time(tmp_path):
     assert whole.height - 3 <= rows.height <= whole.height  # a second at each seam may be cut
 
 
+def test_a_part_of_the_only_voyage_is_split_into_parts_of_the_voyage(tmp_path):
+    """From 100 s on 200 s: 70 % of them train, up to 240 s; the last 15 % begin at 270 s."""
+    store = sailing.store_of(tmp_path, ["trip"], seconds=320.0)
+    split = choose_split(store, ["trip[100:300]"], (), "ref", 20)
+    parts = [parse(side) for (side,) in (split.training, split.validation, split.test)]
+    assert {part.whole for part in parts} == {"trip"}
+    bounds = [parts[0].begin, *(part.end for part in parts)]
+    assert bounds == pytest.approx([100, 240, 270, 300], abs=2) and bounds[-1] <= 300
+    assert store.profile([str(part) for part in parts]).ship.name == "circle"
+
+
 def test_parts_in_time_count_from_the_voyages_first_row(tmp_path):
     """300 s without a velocity in the first 100: of the other 200, 70 % train and 15 % test."""
     logged = sailing.series(300.0)

@@ -14,6 +14,7 @@ import sailing
 from filelock import FileLock
 
 from shiplog.exceptions import StoreError
+from shiplog.voyages import catalogue
 from shiplog.voyages import store as stores
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.store import Store, fingerprint_of
@@ -231,6 +232,31 @@ def test_readers_do_not_wait_for_a_replacement(tmp_path, voyage):
         assert not place.exists()
     assert store.entries() == [entry]  # nobody writes now: the next call puts it in order
     assert [p.name for p in store.path.glob("*voyage=*")] == [place.name]
+
+
+@pytest.mark.parametrize("moved_at", [1, 2])
+@pytest.mark.parametrize("what", ["entries", "tables"])
+def test_a_voyage_that_is_moved_while_it_is_looked_up_is_found(
+    tmp_path, voyage, monkeypatch, what, moved_at
+):
+    """Another process begins to replace it right after its folder was looked up."""
+    store = Store(tmp_path / "store")
+    store.add(voyage())
+    calls, whole = [], catalogue.whole
+
+    def looked_up(place):
+        found = whole(place)
+        calls.append(place)
+        if len(calls) == moved_at:
+            place.rename(catalogue.hidden(place, catalogue.OLD))
+        return found
+
+    monkeypatch.setattr(catalogue, "whole", looked_up)
+    if what == "entries":
+        assert [entry.name for entry in catalogue.entries(store.path)] == ["one"]
+    else:
+        assert store.tables(["one"])[0].collect().height > 0
+    assert len(calls) > moved_at
 
 
 def test_what_an_interrupted_ingest_left_waits_for_no_new_voyage(tmp_path, voyage):

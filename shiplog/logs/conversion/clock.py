@@ -24,7 +24,7 @@ WIDTHS = {"%Y": 4, "%j": 3}  # digits of a form's parts; all others have two
 
 
 def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
-    """Times [Int64, ns], null where there is none.
+    """Times [Int64, ns], null where there is none, or a word among numbers.
 
     values  datetimes, ISO or other texts, or numbers
     unit    of numbers; without one, Unix seconds, ms, µs or ns by their size, times of day where
@@ -36,16 +36,16 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
     """
     dtype = values.dtype
     if isinstance(dtype, pl.Datetime):
-        return values.cast(pl.Datetime("ns", dtype.time_zone)).to_physical()
+        return values.cast(pl.Datetime("ns", dtype.time_zone), strict=False).to_physical()
     if isinstance(dtype, pl.Duration):
         return values.cast(pl.Duration("ns")).to_physical()
     if dtype == pl.Date:
-        return values.cast(pl.Datetime("ns")).to_physical()
+        return values.cast(pl.Datetime("ns"), strict=False).to_physical()
     if dtype == pl.Time:
         return past_midnight(values.to_physical())
     if dtype == pl.String:
         number = number_of(values)
-        if form is None and number.null_count() == _blank(values):
+        if form is None and _are_numbers(number, values):
             return _counted(number, unit)
         return _written(values, form)
     if dtype.is_numeric() and form is not None:
@@ -61,7 +61,7 @@ def instants(values: pl.Series, unit: str | None = None, form: str | None = None
 def dates(values: pl.Series, form: str | None = None) -> pl.Series:
     """Midnights [Int64, ns] of a column of dates. Raises ProfileError."""
     if values.dtype == pl.Date or isinstance(values.dtype, pl.Datetime):
-        return values.cast(pl.Date).cast(pl.Datetime("ns")).to_physical()
+        return values.cast(pl.Date).cast(pl.Datetime("ns"), strict=False).to_physical()
     if values.dtype.is_numeric():
         values = values.fill_nan(None).cast(pl.Int64, strict=False).cast(pl.String).str.zfill(6)
     return _best(values, (form,) if form else (*DATE_FORMATS, *SLASHED), pl.Date)
@@ -86,6 +86,12 @@ def number_of(texts: pl.Series) -> pl.Series:
     return comma.cast(pl.Float64, strict=False)
 
 
+def _are_numbers(number: pl.Series, texts: pl.Series) -> bool:
+    """Whether most texts are numbers: a line that was cut off, or a word, is not another form."""
+    filled = len(texts) - _blank(texts)
+    return filled == 0 or 2 * number.count() > filled
+
+
 def typical(values: pl.Series) -> float:
     """Median size of numbers, 0 where there is none."""
     sizes = values.fill_nan(None).abs().drop_nulls().to_numpy()
@@ -102,7 +108,7 @@ def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) 
     Raises ProfileError also where numbers are no seconds of a day, or can be two times of it.
     """
     number = number_of(values) if values.dtype == pl.String else values
-    words = number is not values and number.null_count() > _blank(values)
+    words = number is not values and not _are_numbers(number, values)
     stated = unit is not None or form is not None or not number.dtype.is_numeric()
     if stated or words:
         return instants(values, unit, form)
@@ -117,7 +123,7 @@ def of_day(values: pl.Series, unit: str | None = None, form: str | None = None) 
         raise ProfileError(
             f"The times of column {values.name!r}, such as {most:.10g}, are next to a date and "
             f"{can_be}.",
-            hint=f'say which in [table]: {values.name} = {{ channel = "time", unit = "s" }}, or '
+            hint=f'say which in [table]: "{values.name}" = {{ channel = "time", unit = "s" }}, or '
             f'"ms", or format = "{HHMMSS}".',
         )
     return instants(values, unit, form)
@@ -133,7 +139,7 @@ def _counted(values: pl.Series, unit: str | None) -> pl.Series:
             raise ProfileError(
                 f"The times of column {values.name!r}, such as {most:.15g}, step by {step:g}, and "
                 "are no Unix time.",
-                hint=f'say their unit in [table]: {values.name} = {{ channel = "time", '
+                hint=f'say their unit in [table]: "{values.name}" = {{ channel = "time", '
                 'unit = "us" }, or "ms", or "ns"; or their form, as format = "%Y%m%d%H%M%S".',
             )
         if unit is None and counts_minutes(values):
@@ -197,7 +203,8 @@ def _written(values: pl.Series, form: str | None) -> pl.Series:
     texts = texts.str.replace(r"^(\S+)[T ](\d{1,2}:)", "${1}T$2").str.replace(r" ?UTC$", "Z")
     zoned = texts.drop_nulls().head(50).str.contains(r"T.*(Z|[+-]\d\d:?\d\d)$").all()
     tail = "T%H:%M:%S%.f" + ("%#z" if zoned else "")
-    return _best(texts, [day + tail for day in (*DATE_FORMATS[:3], *SLASHED)], pl.Datetime)
+    forms = [day + tail for day in (*DATE_FORMATS[:3], *SLASHED)]
+    return _best(texts, forms, pl.Datetime, values)
 
 
 def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:
@@ -206,21 +213,25 @@ def _of_day(texts: pl.Series, forms: tuple[str, ...]) -> pl.Series:
     return past_midnight(_best(dated, ["%Y-%m-%dT" + form for form in forms], pl.Datetime))
 
 
-def _best(texts: pl.Series, forms, kind) -> pl.Series:
-    """The texts by the form that reads most of them. Raises ProfileError."""
+def _best(texts: pl.Series, forms, kind, written: pl.Series | None = None) -> pl.Series:
+    """The texts by the form that reads most of them. Raises ProfileError.
+
+    written  the same as they stand in the table, if they were made alike: what a hint speaks of
+    """
     read: list[tuple[int, str, pl.Series]] = []
     for form in forms:
         try:
             if kind is pl.Date:
-                made = texts.str.to_date(form, strict=False).cast(pl.Datetime("ns"))
+                day = texts.str.to_date(form, strict=False)
+                made = day.cast(pl.Datetime("ns"), strict=False).to_physical()
             else:
                 zone = "UTC" if "%#z" in form or "%z" in form or form == "%+" else None
-                made = texts.str.to_datetime(form, strict=False, time_unit="ns", time_zone=zone)
+                made = fields.written_as(texts, form, zone)
         except pl.exceptions.PolarsError:
             continue  # a form that polars takes for nothing
-        read.append((len(made) - made.null_count(), form, made.to_physical()))
+        read.append((len(made) - made.null_count(), form, made))
     read.sort(key=lambda item: -item[0])
-    sample = next(iter(texts.drop_nulls()), "")
+    sample = next(iter((texts if written is None else written).drop_nulls()), "")
     if not read or read[0][0] == 0:
         raise ProfileError(
             f"The times of column {texts.name!r}, such as {sample!r}, are in no known form.",
@@ -230,6 +241,13 @@ def _best(texts: pl.Series, forms, kind) -> pl.Series:
         raise ProfileError(
             f"The times of column {texts.name!r}, such as {sample!r}, can be read with the day or "
             "with the month first.",
-            hint=f"say which in [table]: format = {read[0][1]!r} or {read[1][1]!r}.",
+            hint="say which in [table]: format = "
+            f"{_as_written(read[0][1], sample)!r} or {_as_written(read[1][1], sample)!r}.",
         )
     return read[0][2].rename(texts.name)
+
+
+def _as_written(form: str, sample: str) -> str:
+    """The form in which a text stands in the table, of the one that all were brought into."""
+    form = form if re.search(r"\dT\d", sample) else form.replace("T%H", " %H")
+    return form.replace("%#z", " UTC") if sample.endswith(" UTC") else form

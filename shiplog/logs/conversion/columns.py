@@ -6,6 +6,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,7 @@ def voyages(
     present = {name: c for name, c in profile.table.items() if name in frame.columns}
     _require(present, profile, frame, path)
     _refuse_two(present, profile, path)
+    refuse_scaled(present, profile)
     frame = _of_one_vessel(frame, present, profile, path)
     time = _time(frame, present)
     columns = [time.rename("time")]
@@ -126,7 +128,9 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
             else:
                 si = table[name].fill_null(np.nan).to_numpy()
             columns[path] = si / factor + offset
-    return [_topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()]
+    return named_apart(
+        _topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()
+    )
 
 
 def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
@@ -144,6 +148,19 @@ def schema_of(topic: str, fields: Iterable[str]) -> str:
     if set(fields) <= set(SCHEMAS.get(contract, ())):
         return contract
     return "shiplog.table." + plain(topic.strip("/"))
+
+
+def named_apart(parts: Iterable[Series]) -> list[Series]:
+    """The topics with a schema's name for each layout: `a-b` and `a_b`, and all names of so many
+    Japanese letters, are one name in protobuf."""
+    layouts: dict[str, tuple[str, ...]] = {}
+    named = []
+    for one in parts:
+        schema, layout = one.schema, tuple(one.columns)
+        while schema not in SCHEMAS and layouts.setdefault(schema, layout) != layout:
+            schema += "_2"
+        named.append(replace(one, schema=schema))
+    return named
 
 
 def plain(name: str) -> str:
@@ -167,7 +184,7 @@ def _topic(
 
 
 def _turning(table: pl.DataFrame) -> np.ndarray:
-    """Yaw rate [rad/s] of the heading, NaN where either neighbour has none.
+    """Yaw rate [rad/s] of the heading, between the rows that have one; NaN where a row has none.
 
     Repeated times would divide by zero: a row of the same time takes part only once.
     """
@@ -228,6 +245,17 @@ def _refuse_two(present: dict[str, Column], profile: Profile, path: Path) -> Non
             raise ProfileError(
                 f"{path.name}: the columns {listed(names)} are all {channel!r} in [table].",
                 hint=f"leave one of them in the [table] section of {profile.source}.",
+            )
+
+
+def refuse_scaled(present: dict[str, Column], profile: Profile) -> None:
+    """Raises ProfileError for a factor or an offset of a time or a name, which nobody would use."""
+    for name, column in present.items():
+        if column.channel in TABLE_LABELS and (column.sign != 1.0 or column.offset != 0.0):
+            raise ProfileError(
+                f"[table] {name!r} has a `sign` or an `offset`, and is a {column.channel}: they "
+                "are of channels that were measured.",
+                hint=f"leave them out in {profile.source}, and change the column in the table.",
             )
 
 

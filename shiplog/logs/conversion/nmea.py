@@ -35,11 +35,13 @@ log = logging.getLogger(__name__)
 SUFFIXES = (".nmea", ".txt", ".log", ".nma", ".gps", ".csv", ".dat", ".raw")
 SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z]{3},[^$!\r\n*]*(?:\*[0-9A-Fa-f]{2})?")
 ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
+PROPRIETARY = re.compile(r"\$(P[A-Z0-9]{3,}),")  # a maker's own, after his three letters
 NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
 OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
 SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
 LATE_S = 0.5  # clocks that differ by more are reported: at 10 m/s a ship is 5 m further by then
 EPOCH = date(1970, 1, 1)
+LAST_YEAR = 2261  # whose nanoseconds since 1970 still have 64 bits
 
 
 @dataclass(slots=True)
@@ -100,7 +102,9 @@ class _Reader:
         """One line: its receive stamp, and the sentences in it."""
         found = list(SENTENCE.finditer(line))
         if not found:
-            self.damaged += "$" in line
+            own = PROPRIETARY.search(line)
+            self.unused.update([own[1]] if own else [])
+            self.damaged += "$" in line and own is None
             return
         if received is None:
             received = self._stamp(line[: found[0].start()] + " " + line[found[-1].end() :])
@@ -131,7 +135,7 @@ class _Reader:
             rows.values.append(values)
 
     def _own(self, message) -> int:
-        """The UTC in a sentence [ns], -1 in one without."""
+        """The UTC in a sentence [ns], -1 in one without. Raises ValueError for a date of no log."""
         time = getattr(message, "timestamp", None)
         if not time or isinstance(time, str):
             return -1
@@ -144,6 +148,8 @@ class _Reader:
         elif message.sentence_type == "ZDA":
             day = date(message.year, message.month, message.day)
         if isinstance(day, date):
+            if not EPOCH.year <= day.year <= LAST_YEAR:
+                raise ValueError(f"the year {day.year}")
             true = (day - EPOCH).days * DAY_NS + of_day
             if self.dated is None:
                 self.dated = self.place, true - utc
@@ -167,7 +173,9 @@ class _Reader:
             zone = (iso[4] or "Z").replace("Z", "+00:00")
             try:
                 whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
-            except ValueError:
+            except (ValueError, OverflowError):
+                return None
+            if not EPOCH.year <= whole.year <= LAST_YEAR:
                 return None
             return int(whole.timestamp()) * SECOND_NS + _fraction(iso[3])
         if (number := NUMBER.search(around)) and (unit := unix_unit(int(number[1]))):

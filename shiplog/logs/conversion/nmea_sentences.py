@@ -67,20 +67,27 @@ def _knots(value) -> float:
     return _number(value) * units.factor("kn")
 
 
+def _where(m) -> tuple[float, float]:
+    """Latitude and longitude [deg]; NaN without a number or its hemisphere, where pynmea2 has 0."""
+    if not (m.lat and m.lon and m.lat_dir in ("N", "S") and m.lon_dir in ("E", "W")):
+        return math.nan, math.nan
+    return m.latitude, m.longitude
+
+
 def _rmc(m) -> Iterator[Fact]:
     _require(m.status == "A")
-    yield "rmc", (m.latitude, m.longitude)
+    yield "rmc", _where(m)
     yield "rmc_velocity", (_knots(m.spd_over_grnd), _number(m.true_course))
 
 
 def _gga(m) -> Iterator[Fact]:
     _require(bool(m.gps_qual))
-    yield "gga", (m.latitude, m.longitude, _number(m.altitude))
+    yield "gga", (*_where(m), _number(m.altitude))
 
 
 def _gll(m) -> Iterator[Fact]:
     _require(m.status == "A")
-    yield "gll", (m.latitude, m.longitude)
+    yield "gll", _where(m)
 
 
 def _vtg(m) -> Iterator[Fact]:

@@ -10,10 +10,10 @@ import polars as pl
 
 from shiplog.exceptions import ChannelMissing, ShiplogError, listed
 from shiplog.logs.conversion import clock
-from shiplog.logs.conversion.columns import plain, schema_of
+from shiplog.logs.conversion.columns import named_apart, plain, refuse_scaled, schema_of
 from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
-from shiplog.logs.write import Series
+from shiplog.logs.write import THE_MESSAGES_OWN, Series
 from shiplog.profile import Profile
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", 
 
 def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
     """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
-    the reasons of the tables that had to be left out.
+    the reasons of the tables that had to be left out. Hidden files are none.
 
     A column `log_time_ns` (or of the names above) is the recorder's clock, `stamp_ns` the
     message's; other names and units come from the profile's [table], with channel = "time".
@@ -46,7 +46,7 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
     """
     parts: list[Series] = []
     reasons: list[str] = []
-    for path in sorted(p for p in folder.iterdir() if is_table(p)):
+    for path in sorted(p for p in folder.glob("[!.]*") if is_table(p)):
         try:
             parts += _one(path, profile)
         except ShiplogError as error:
@@ -57,12 +57,14 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
             hint="give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table.",
         )
-    return parts, reasons
+    return named_apart(parts), reasons
 
 
 def _one(path: Path, profile: Profile | None) -> list[Series]:
     frame = read_table(path).frame
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
+    if profile:
+        refuse_scaled(named, profile)
     by_profile = next((n for n in named if n in frame.columns), None)
     stamp_name = by_profile or _known(frame, STAMP_COLUMNS)
     logged_name = _known(frame, LOGGED)
@@ -116,7 +118,7 @@ def _numbers(frame: pl.DataFrame, path: Path) -> dict[str, np.ndarray]:
                     path.name, words, column.name,
                 )  # fmt: skip
             numbers[column.name] = number
-    fields = unlike([plain(name) for name in numbers])
+    fields = unlike([*THE_MESSAGES_OWN, *map(plain, numbers)])[len(THE_MESSAGES_OWN) :]
     for name, field in zip(numbers, fields, strict=True):
         if field != plain(name):
             log.warning("%s: the column %r becomes the field %s", path.name, name, field)

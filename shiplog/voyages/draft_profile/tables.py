@@ -25,6 +25,7 @@ from shiplog.voyages.draft_profile.column_names import (
 from shiplog.voyages.draft_profile.coordinates import on_earth
 from shiplog.voyages.draft_profile.driven import found_actuators
 from shiplog.voyages.draft_profile.labels import found_labels
+from shiplog.voyages.draft_profile.toml_text import in_comment, quoted
 from shiplog.voyages.draft_profile.topics import NO_ACTUATOR, OPTIONAL
 
 SINGLE = {  # where the contract puts a sensor of a table: topic, fields, units
@@ -66,8 +67,10 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     taken |= {f.column for columns in found.values() for f in columns}
     actuators = found_actuators(rows, table, taken)
     parts = [
-        f"# Drafted from {path.name}, {rows.height} rows. Look over every line that says CHECK.\n\n"
-        f'[ship]\nname = "{vessel or path.stem}"\nlength_m = 1.0  # CHECK: the table does not say\n'
+        f"# Drafted from {in_comment(path.name)}, {rows.height} rows. "
+        "Look over every line that says CHECK.\n\n"
+        f"[ship]\nname = {quoted(vessel or path.stem)}\n"
+        "length_m = 1.0  # CHECK: the table does not say\n"
     ]
     parts += [_sensor(name, kind) for name, kind, _ in chosen]
     there = {name for name, _, _ in chosen}
@@ -80,7 +83,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     parts.append(_table(listed_columns, rows, second))
     mentioned = {f.column for f in (*listed_columns, *second)}
     if unused := [n for n in frame.columns if n not in mentioned]:
-        parts.append("# Columns not used: " + listed(unused, most=60) + "\n")
+        parts.append("# Columns not used: " + in_comment(listed(unused, most=60)) + "\n")
     return "\n".join(parts)
 
 
@@ -115,13 +118,19 @@ def _choose_turning(
     with np.errstate(all="ignore"):
         turned = np.abs(np.angle(np.exp(1j * np.diff(heading)))) / np.diff(seconds)
         # Medians: a table of several runs jumps between them.
-        ratio = float(np.nanmedian(rate[1:]) / np.nanmedian(turned))
+        ratio = float(_median(rate[1:]) / _median(turned))
     if not np.isfinite(ratio) or ratio <= 0:
         return
     unit = min(TURNING, key=lambda u: abs(np.log(ratio * units.factor(u))))
     doubts = tuple(d for d in rates[0].doubts if d != UNIT_UNSTATED)
     fits = "the unit fits how fast the heading turns"
     found["yaw_rate"][0] = replace(rates[0], unit=unit, doubts=(*doubts, fits))
+
+
+def _median(values: np.ndarray) -> np.float64:
+    """Of the numbers among them; NaN of none."""
+    known = values[np.isfinite(values)]
+    return np.float64(np.median(known) if len(known) else np.nan)
 
 
 def _kinds(
@@ -158,9 +167,9 @@ def _kinds(
 
 def _sensor(name: str, kind: str) -> str:
     topic, fields, unit_names = SINGLE[name, kind]
-    quoted = ", ".join(f'"{f}"' for f in fields)
+    named = ", ".join(map(quoted, fields))
     lines = [f"[sensors.{name}]", f'kind = "{kind}"', f'topic = "{topic}"']
-    lines.append(f"fields = [{quoted}]" if len(fields) > 1 else f"field = {quoted}")
+    lines.append(f"fields = [{named}]" if len(fields) > 1 else f"field = {named}")
     if len(unit_names) == 1:
         lines.append(f'unit = "{unit_names[0]}"')
     else:
@@ -203,15 +212,14 @@ def _table(columns: list[FoundColumn], rows: pl.DataFrame, second: list[FoundCol
 
 def _line(one: FoundColumn, rows: pl.DataFrame) -> str:
     unit = f', unit = "{one.unit}"' if one.unit else ""
-    more = f', only = "{one.only}"' if one.only else ""
+    more = f", only = {quoted(one.only)}" if one.only else ""
     more += f", sign = {one.sign:g}" if one.sign != 1.0 else ""
     more += f", offset = {one.offset}" if one.offset else ""
     check = f"CHECK: {'; '.join(one.doubts)}; " if one.doubts else ""
-    key = one.column.replace("\\", "\\\\").replace('"', '\\"')
     what = facts.of_values(rows[one.column])
     if one.channel == "time":
         what = f"{what}; {_rate(rows[one.column], one.unit)}"
-    return f'"{key}" = {{ channel = "{one.channel}"{unit}{more} }}  # {check}{what}'
+    return f'{quoted(one.column)} = {{ channel = "{one.channel}"{unit}{more} }}  # {check}{what}'
 
 
 def _rate(values: pl.Series, unit: str | None) -> str:

@@ -10,10 +10,12 @@ from pathlib import Path
 import polars as pl
 
 from shiplog.exceptions import LogUnreadable, ProfileError, listed
+from shiplog.logs.fields import is_number
 from shiplog.logs.read import Contents, contents, fields, read
 from shiplog.profile_units import DRIVEN
 from shiplog.voyages.draft_profile import facts, guesses, words
 from shiplog.voyages.draft_profile.guesses import ACTUATOR_TOPICS, GUESSES, Guess
+from shiplog.voyages.draft_profile.toml_text import in_comment, quoted
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
 LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted
@@ -54,8 +56,8 @@ class Log:
         frame = self.data.get(choice.topic)
         if frame is None or not set(choice.paths) <= set(frame.columns):
             return False
-        numbers = [frame[p].cast(pl.Float64, strict=False).is_finite() for p in choice.paths]
-        return all(bool(finite.any()) for finite in numbers)
+        numbers = [self.column(choice.topic, path) for path in choice.paths]
+        return all(bool(number.is_finite().any()) for number in numbers)
 
     def rate(self, topic: str) -> str:
         frame = self.data.get(topic)
@@ -66,9 +68,9 @@ class Log:
         return facts.of_values(frame[path]) if frame is not None and path in frame else "unread"
 
     def column(self, topic: str, path: str) -> pl.Series:
-        """Numbers of a field; none where it was not read."""
+        """Numbers of a field; none where it was not read, or is a list of them."""
         frame = self.data.get(topic)
-        if frame is None or path not in frame:
+        if frame is None or path not in frame or not is_number(frame.schema[path]):
             return pl.Series(path, [], pl.Float64)
         return frame[path].cast(pl.Float64, strict=False)
 
@@ -77,7 +79,7 @@ class Log:
         frame = self.data.get(topic)
         if frame is None or path not in frame.columns or frame[path].dtype == pl.Boolean:
             return False
-        return bool(frame[path].cast(pl.Float64, strict=False).is_finite().any())
+        return bool(self.column(topic, path).is_finite().any())
 
     def unit(self, paths: Sequence[str], at: int, topic: str, takes: tuple[str, ...]) -> str | None:
         """What the field's own name says, or the channel's metadata, which has one unit."""
@@ -98,7 +100,7 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
     if near:  # what else the same receiver sends is of GNSS too, whatever its topic is called
         choices["velocity"] = _choices("velocity", log.leaves, near)
         choices["heading"] = _choices("heading", log.leaves, near)
-    log.look(_fields_of(choice for found in choices.values() for choice in found[:LOOKED_AT]))
+    log.look(_joinedof(choice for found in choices.values() for choice in found[:LOOKED_AT]))
     choices = {
         name: [c for c in found[:LOOKED_AT] if log.holds(c)]
         or [c for c in found[:1] if name not in OPTIONAL]
@@ -108,12 +110,13 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
     driven = _actuators(log, {choice.topic for choice in best})
     parts = [_ship(log.contents)]
     parts += [_sensor(name, found, log) for name, found in choices.items()]
-    parts += [_actuator(*one, log=log) for one in driven] or [NO_ACTUATOR]
+    names: set[str] = set()
+    parts += [_actuator(*one, names, log=log) for one in driven] or [NO_ACTUATOR]
     listed_first = [choice for found in choices.values() for choice in found[:2]]
     used = {*(choice.topic for choice in listed_first), *(topic for _, topic, _, _ in driven)}
     unused = sorted(set(log.leaves) - used)
     if unused:
-        parts.append("# Topics not used: " + listed(unused, most=40) + "\n")
+        parts.append("# Topics not used: " + in_comment(listed(unused, most=40)) + "\n")
     return "\n".join(parts)
 
 
@@ -125,7 +128,7 @@ NO_ACTUATOR = (
 )
 
 
-def _fields_of(choices: Iterable[Choice]) -> dict[str, set[str]]:
+def _joinedof(choices: Iterable[Choice]) -> dict[str, set[str]]:
     wanted: dict[str, set[str]] = {}
     for choice in choices:
         wanted.setdefault(choice.topic, set()).update(choice.paths)
@@ -159,8 +162,8 @@ def _of_one_vessel(
 def _ship(found: Contents) -> str:
     name = found.metadata.get("voyage", {}).get("ship") or found.path.stem
     return (
-        f"# Drafted from {found.path.name}. Look over every line that says CHECK.\n\n"
-        f'[ship]\nname = "{name}"\nlength_m = 1.0  # CHECK: the log does not say\n'
+        f"# Drafted from {in_comment(found.path.name)}. Look over every line that says CHECK.\n\n"
+        f"[ship]\nname = {quoted(name)}\nlength_m = 1.0  # CHECK: the log does not say\n"
     )
 
 
@@ -204,11 +207,11 @@ def _sensor(name: str, choices: list[Choice], log: Log) -> str:
     for second in choices[1:2]:
         kind, _ = guesses.kind_of(second.guess, second.topic)
         seen = _axes(second, log)
-        quoted = ", ".join(f'"{p}"' for p in seen.paths)
+        joined = ", ".join(map(quoted, seen.paths))
         sign = f", sign = {_toml(seen.sign)}" if seen.sign else ""
         text += (
-            f'# Second choice: kind = "{kind}", topic = "{second.topic}", '
-            f"fields = [{quoted}]{sign}  # {log.rate(second.topic)}\n"
+            f'# Second choice: kind = "{kind}", topic = {quoted(second.topic)}, '
+            f"fields = [{joined}]{sign}  # {log.rate(second.topic)}\n"
         )
     return text
 
@@ -226,11 +229,12 @@ def _section(name: str, choice: Choice, log: Log) -> str:
     ordered = "CHECK: a set-point, not a measurement; " if words.is_set_point(topic) else ""
     lines = [f"[sensors.{name}]"]
     lines.append(f'kind = "{kind}"' + (f"  # {of_kind}" if of_kind else ""))
-    lines.append(f'topic = "{topic}"  # {ordered}{_doubt(name, topic, paths)}{log.rate(topic)}')
-    quoted = ", ".join(f'"{p}"' for p in paths)
-    named = f"fields = [{quoted}]" if len(paths) > 1 else f"field = {quoted}"
+    doubt = f"{ordered}{_doubt(name, topic, paths)}"
+    lines.append(f"topic = {quoted(topic)}  # {doubt}{log.rate(topic)}")
+    joined = ", ".join(map(quoted, paths))
+    named = f"fields = [{joined}]" if len(paths) > 1 else f"field = {joined}"
     lines.append(named + (f"  # {seen.check}" if seen.check and not seen.sign else ""))
-    lines += [f"#   {path}: {log.values(topic, path)}" for path in paths]
+    lines += [f"#   {in_comment(path)}: {log.values(topic, path)}" for path in paths]
     if name == "heading" and (blank := facts.unavailable(name, log.column(topic, choice.paths[0]))):
         lines.append(f"# CHECK: {blank}")
     check = "" if sure else "  # CHECK: the log does not say"
@@ -294,15 +298,18 @@ def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
     return chosen
 
 
-def _actuator(kind: str, topic: str, path: str, fallback: str, *, log: Log) -> str:
+def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], *, log: Log) -> str:
     unit = log.unit((path,), 0, topic, DRIVEN[kind])
     check = "" if unit else "  # CHECK: the log does not say"
     ordered = "CHECK: a set-point, what was ordered; " if words.is_set_point(topic) else ""
-    name = re.sub(r"\W+", "_", topic.strip("/")).strip("_").lower()
+    name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_").lower() or kind
     if name[:1].isdigit():
         name = f"{kind}_{name}"
+    while name in names:  # topics that differ in other letters than a column's name has
+        name += "_2"
+    names.add(name)
     return (
         f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\n'
-        f'topic = "{topic}"  # {ordered}{log.rate(topic)}\n'
-        f'field = "{path}"  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
+        f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
+        f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
     )
