@@ -46,7 +46,11 @@ def local_plane(
 
 
 def earth_velocity(speed: np.ndarray, course: np.ndarray) -> np.ndarray:
-    """Speed [m/s] and course over ground [rad, clockwise from north] to (north, east) [n, 2]."""
+    """Speed [m/s] and course over ground [rad, clockwise from north] to (north, east) [n, 2].
+
+    At no speed a receiver has no course, and sends none: the velocity is zero all the same.
+    """
+    course = np.where(speed == 0.0, 0.0, course)
     return np.stack((speed * np.cos(course), speed * np.sin(course)), axis=-1)
 
 

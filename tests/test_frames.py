@@ -26,6 +26,12 @@ def test_over_ground_to_body_and_leeway_sign():
     assert body[0] == pytest.approx([2 * np.cos(np.pi / 6), 2 * np.sin(np.pi / 6)])
 
 
+def test_a_ship_at_rest_has_a_velocity_though_no_course():
+    speed, course = np.array([0.0, 0.0, 0.5, np.nan]), np.array([np.nan, 1.0, np.nan, 1.0])
+    earth = frames.earth_velocity(speed, course)
+    assert (earth[:2] == 0.0).all() and np.isnan(earth[2:]).all()
+
+
 def test_the_local_plane_has_the_ellipsoids_radii():
     a, e2, latitude = 6378137.0, 6.69437999014e-3, np.radians(34.82)
     root = np.sqrt(1 - e2 * np.sin(latitude) ** 2)

@@ -100,7 +100,7 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
     if near:  # what else the same receiver sends is of GNSS too, whatever its topic is called
         choices["velocity"] = _choices("velocity", log.leaves, near)
         choices["heading"] = _choices("heading", log.leaves, near)
-    log.look(_joinedof(choice for found in choices.values() for choice in found[:LOOKED_AT]))
+    log.look(_fields_of(choice for found in choices.values() for choice in found[:LOOKED_AT]))
     choices = {
         name: [c for c in found[:LOOKED_AT] if log.holds(c)]
         or [c for c in found[:1] if name not in OPTIONAL]
@@ -128,7 +128,7 @@ NO_ACTUATOR = (
 )
 
 
-def _joinedof(choices: Iterable[Choice]) -> dict[str, set[str]]:
+def _fields_of(choices: Iterable[Choice]) -> dict[str, set[str]]:
     wanted: dict[str, set[str]] = {}
     for choice in choices:
         wanted.setdefault(choice.topic, set()).update(choice.paths)
