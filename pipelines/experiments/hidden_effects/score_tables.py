@@ -304,6 +304,12 @@ def hidden(answer: Answer) -> str:
     return " + ".join(causes) + (f" ({family})" if family else "")
 
 
+def marked(answer: Answer) -> str:
+    """What the verdict says, and whether it is wrong or not right."""
+    mark = "" if answer.right else " (wrong name)" if answer.misnamed else " (not right)"
+    return reported(answer) + mark
+
+
 def reported(answer: Answer) -> str:
     """What the verdict says."""
     if answer.word == "failed":

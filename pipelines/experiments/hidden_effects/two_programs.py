@@ -138,14 +138,9 @@ def _differences(pairs: Sequence[Pair]) -> str:
             pair.present.planned.label,
             f"{pair.present.planned.seconds} s",
             score_tables.hidden(pair.present),
-            _reported(pair.former),
-            _reported(pair.present),
+            score_tables.marked(pair.former),
+            score_tables.marked(pair.present),
         )
         for pair in ordered
     ]
     return tables.table(("case", "trial", "hidden", FORMER, PRESENT), rows)
-
-
-def _reported(answer: Answer) -> str:
-    mark = "" if answer.right else " (wrong name)" if answer.misnamed else " (not right)"
-    return score_tables.reported(answer) + mark

@@ -4,17 +4,16 @@ python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
     as `shiplog diagnose RUN ...`, without that part
 python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
     the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/,
-    and a table: how many are right and how many are misnamed; with --every 7 the first of each
-    seven cases
+    and a page: how many are right, how many are misnamed, and which answers change; with --every 7
+    the first of each seven cases, with --markdown FILE into a file
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -22,11 +21,12 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pipelines.experiments.hidden_effects import replay, score
+from pipelines.experiments.hidden_effects import ablation, replay, score
+from pipelines.experiments.hidden_effects.ablation import WHOLE
 from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT
 from pipelines.experiments.hidden_effects.run import Settings
-from shiplog import cli
+from shiplog import cli, files
 from shiplog.diagnosis import (
     baseline_check,
     campaign_characteristics,
@@ -43,9 +43,6 @@ from shiplog.diagnosis import (
     voyage_effects,
 )
 from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.report import tables
-
-WHOLE = "nothing"  # the decision as it is
 
 
 def _no_placebo(stack: ExitStack) -> None:
@@ -186,39 +183,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--every", type=positive, default=1, metavar="N", help="one case of so many"
     )
+    parser.add_argument("--markdown", type=Path, metavar="FILE")
     asked = parser.parse_args(given)
-    print(table(asked.ablate, asked.only, asked.jobs, asked.every))
+    parts = dict.fromkeys((WHOLE, *asked.only))
+    text = ablation.page(without_each(asked.ablate, parts, asked.jobs, asked.every), asked.every)
+    if asked.markdown is None:
+        print(text)
+    else:
+        files.write_text(asked.markdown, text + "\n")
     return 0
 
 
-def table(source: Path, parts: Sequence[str], jobs: int, every: int = 1) -> str:
-    """One line a part: cases, right, misnamed, and how many answers differ from the whole's."""
-    rows, whole = [], {}
+def without_each(
+    source: Path, parts: Iterable[str], jobs: int, every: int = 1
+) -> dict[str, tuple[score.Answer, ...]]:
+    """Part → the answers of a test's kept cases without it, one case of so many."""
+    found = {}
     for part in parts:
         out = source.with_name(f"{source.name}-without") / part
         command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
         with patch.dict(os.environ, PYTHONPATH=_with_this_source()):
             replay.replay(source, out, Settings(jobs=jobs, shiplog=command), every)
-        answers = {a.planned.label: a for a in score.read(out).answers}
-        if part == WHOLE:
-            whole = {label: _reported(a) for label, a in answers.items()}
-        other = sum(label in whole and _reported(a) != whole[label] for label, a in answers.items())
-        rows.append((
-            part, len(answers), sum(a.right for a in answers.values()),
-            sum(a.misnamed for a in answers.values()), other,
-        ))  # fmt: skip
-    head = ("without", "cases", "right", "misnamed", "other answer than as it is")
-    return f"{shlex.join(sys.argv)}\n\n{tables.table(head, rows)}"
+        found[part] = score.read(out).answers
+    return found
 
 
 def _with_this_source() -> str:
     """Where Python looks for modules: here first, since a step runs in the folder of its case and
     an installed shiplog has no experiments."""
     return os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
-
-
-def _reported(answer: score.Answer) -> tuple:
-    return answer.word, answer.named, answer.family
 
 
 if __name__ == "__main__":
