@@ -104,8 +104,8 @@ class Hybrid:
     def features(self, state: Array, actuator: Array, true_wind: Array) -> Array:
         """z [..., Z], standardised."""
         u, v, heading, r = state[..., 1], state[..., 3], state[..., 4], state[..., 5]
-        azimuths = {unit.turned_by for unit in self.physics.geometry.thrusters} - {None}
-        actuator = within_a_turn(actuator, sorted(azimuths))
+        turned_by = {unit.turned_by for unit in self.physics.geometry.thrusters}
+        actuator = within_a_turn(actuator, sorted(i for i in turned_by if i is not None))
         parts = [u[..., None], v[..., None], r[..., None], actuator]
         if self.physics.geometry.wind:
             wind = apparent(true_wind, heading, u, v)
