@@ -50,7 +50,8 @@ def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, mon
     asked, found = [], []
     monkeypatch.delenv("PYTHONPATH", raising=False)
 
-    def settings(jobs, shiplog):
+    def settings(jobs, shiplog, called):
+        assert called.endswith("placebo") == (shiplog[-1] == "placebo")
         asked.append(shiplog[-1])
         found.append(found_from(tmp_path, shiplog[-2]))
         monkeypatch.setenv("SAYS", "coverage" if shiplog[-1] == "placebo" else "none")

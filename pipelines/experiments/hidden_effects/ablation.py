@@ -57,7 +57,7 @@ def page(found: Mapping[str, Sequence[Answer]], every: int) -> str:
         TITLE,
         COMMAND.format(every=every),
         INTRODUCTION.format(every=every),
-        f"{place}, {counted(len(whole), 'case')}; the program is {of}.",
+        f"{place}: {counted(len(whole), 'case')}, answered by {of}.",
         _counts(pairs),
         "## Where an answer becomes another",
         _changes(pairs),

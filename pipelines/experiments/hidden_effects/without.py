@@ -24,7 +24,7 @@ import numpy as np
 from pipelines.experiments.hidden_effects import ablation, replay, score
 from pipelines.experiments.hidden_effects.ablation import WHOLE
 from pipelines.experiments.hidden_effects.plan import positive
-from pipelines.experiments.hidden_effects.program import ROOT
+from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
 from shiplog import cli, files
 from shiplog.diagnosis import (
@@ -198,12 +198,14 @@ def without_each(
     source: Path, parts: Iterable[str], jobs: int, every: int = 1
 ) -> dict[str, tuple[score.Answer, ...]]:
     """Part → the answers of a test's kept cases without it, one case of so many."""
-    found = {}
+    found, source_of = {}, name(identity())
     for part in parts:
         out = source.with_name(f"{source.name}-without") / part
         command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
         with patch.dict(os.environ, PYTHONPATH=_with_this_source()):
-            replay.replay(source, out, Settings(jobs=jobs, shiplog=command), every)
+            called = source_of if part == WHOLE else f"{source_of} without {part}"
+            settings = Settings(jobs=jobs, shiplog=command, called=called)
+            replay.replay(source, out, settings, every)
         found[part] = score.read(out).answers
     return found
 
