@@ -58,7 +58,8 @@ def test_an_ablation_counts_the_answers_that_a_part_changes(tmp_path, stubs, mon
         return stubs(jobs=jobs)
 
     monkeypatch.setattr(without, "Settings", settings)
-    displayed = ablation.page(without.without_each(out, ("nothing", "placebo"), 1), 1)
+    without.without_each(out, ("nothing", "placebo"), 1)
+    displayed = ablation.page([ablation.answers_in(tmp_path / "out-without")])
     rows = [
         [cell.strip() for cell in line.split("|")[1:-1]]
         for line in displayed.splitlines() if line.startswith(("| nothing", "| placebo"))

@@ -1,16 +1,18 @@
 """What each part of the decision is for: the answers without it, next to those of all parts.
 
-Written by `python -m pipelines.experiments.hidden_effects.without --ablate`.
+Written by `python -m pipelines.experiments.hidden_effects.without --page`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from pipelines.experiments.hidden_effects import goals, score_tables
+from pipelines.experiments.hidden_effects import goals, score, score_tables
 from pipelines.experiments.hidden_effects.score import Answer
 from pipelines.experiments.hidden_effects.two_programs import Pair
 from pipelines.experiments.hidden_effects.validation import heading, one_program
+from shiplog.exceptions import ShiplogError
 from shiplog.numbers import counted
 from shiplog.report import tables
 
@@ -19,13 +21,16 @@ TITLE = "# The decision without one of its parts"
 COMMAND = """\
     tar -xf docs/validation-answers.tar.xz -C test
     python -m pipelines.experiments.hidden_effects remake test/goals --share --jobs 2
-    python -m pipelines.experiments.hidden_effects.without --ablate test/goals --every {every} \\
-        --jobs 2 --markdown docs/results/ablation.md"""
+    python -m pipelines.experiments.hidden_effects remake test/abroad --jobs 2
+    python -m pipelines.experiments.hidden_effects.without --ablate test/goals --every 17 --jobs 2
+    python -m pipelines.experiments.hidden_effects.without --ablate test/abroad --every 3 --first 7
+    python -m pipelines.experiments.hidden_effects.without --page test/goals-without \\
+        test/abroad-without --markdown docs/results/ablation.md"""
 INTRODUCTION = """\
-Some cases of [validation](../validation.md) were diagnosed once as they are, and again without each
-part of the decision in turn: one case of each {every}, counted before any was diagnosed. `remake`
-makes their logs and models again. With so few cases, a part that changes no answer may still be
-needed elsewhere; one that changes an answer is needed there."""
+Some cases of [validation](../validation.md) were diagnosed once as they are, and again without a
+part of the decision, one part after the other. The cases are every so many of the test, not chosen
+by what was answered. `remake` makes their logs and models again; `--only` takes some of the parts.
+With so few cases, a part that changes no answer here may still be needed elsewhere."""
 MEANING = {
     WHOLE: "the decision as it is",
     "placebo": "what a cause gains on nominal voyages is not subtracted",
@@ -43,25 +48,38 @@ MEANING = {
 }
 
 
-def page(found: Mapping[str, Sequence[Answer]], every: int) -> str:
-    """Markdown; `found` are the answers without each part, those of `WHOLE` among them. Raises
-    `validation.Mixed` where the answers as they are are of several programs."""
-    whole = {answer.planned: answer for answer in found[WHOLE]}
-    of = one_program(found[WHOLE])
-    pairs = {
-        part: [Pair(whole[a.planned], a) for a in answers if a.planned in whole]
-        for part, answers in found.items()
+def answers_in(folder: Path) -> dict[str, tuple[Answer, ...]]:
+    """Part → the answers without it that an ablation has left there. Raises ShiplogError where
+    there are none of the decision as it is."""
+    found = {
+        part: score.read(folder / part).answers for part in MEANING if (folder / part).exists()
     }
-    place = heading(goals.OTHER if all(a.abroad for a in found[WHOLE]) else goals.SAME)
-    parts = [
-        TITLE,
-        COMMAND.format(every=every),
-        INTRODUCTION.format(every=every),
-        f"{place}: {counted(len(whole), 'case')}, answered by {of}.",
-        _counts(pairs),
-        "## Where an answer becomes another",
-        _changes(pairs),
-    ]
+    if not found.get(WHOLE):
+        raise ShiplogError(
+            f"{folder} has no answers of the decision as it is.",
+            hint="give the folder that --ablate writes, DIR-without.",
+        )
+    return found
+
+
+def page(tests: Sequence[Mapping[str, Sequence[Answer]]]) -> str:
+    """Markdown; of each test the answers without each part, those of `WHOLE` among them. Raises
+    `validation.Mixed` where those are of several programs."""
+    parts = [TITLE, COMMAND, INTRODUCTION]
+    for found in tests:
+        whole = {answer.planned: answer for answer in found[WHOLE]}
+        pairs = {
+            part: [Pair(whole[a.planned], a) for a in answers if a.planned in whole]
+            for part, answers in found.items()
+        }
+        place = heading(goals.OTHER if all(a.abroad for a in found[WHOLE]) else goals.SAME)
+        parts += [
+            f"## {place}: {counted(len(whole), 'case')}",
+            f"Answered by {one_program(found[WHOLE])}.",
+            _counts(pairs),
+            "### Where an answer becomes another",
+            _changes(pairs),
+        ]
     return "\n\n".join(parts)
 
 

@@ -3,9 +3,10 @@
 python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
     as `shiplog diagnose RUN ...`, without that part
 python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
-    the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/,
-    and a page: how many are right, how many are misnamed, and which answers change; with --every 7
-    the first of each seven cases, with --markdown FILE into a file
+    the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/;
+    with --every 7 the first of each seven cases, with --first 20 so many of these
+python -m pipelines.experiments.hidden_effects.without --page DIR-without ... [--markdown FILE]
+    a page of what was found: how many are right, how many are misnamed, and which answers change
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pipelines.experiments.hidden_effects import ablation, replay, score
+from pipelines.experiments.hidden_effects import ablation, replay
 from pipelines.experiments.hidden_effects.ablation import WHOLE
 from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT, identity, name
@@ -177,16 +178,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--ablate", type=Path, required=True, metavar="DIR")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--ablate", type=Path, metavar="DIR")
+    what.add_argument("--page", type=Path, nargs="+", metavar="DIR-without")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
     parser.add_argument(
         "--every", type=positive, default=1, metavar="N", help="one case of so many"
     )
+    parser.add_argument("--first", type=positive, metavar="N", help="of these, so many")
     parser.add_argument("--markdown", type=Path, metavar="FILE")
     asked = parser.parse_args(given)
-    parts = dict.fromkeys((WHOLE, *asked.only))
-    text = ablation.page(without_each(asked.ablate, parts, asked.jobs, asked.every), asked.every)
+    if asked.ablate:
+        parts = dict.fromkeys((WHOLE, *asked.only))
+        without_each(asked.ablate, parts, asked.jobs, asked.every, asked.first)
+        return 0
+    text = ablation.page([ablation.answers_in(folder) for folder in asked.page])
     if asked.markdown is None:
         print(text)
     else:
@@ -195,19 +202,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def without_each(
-    source: Path, parts: Iterable[str], jobs: int, every: int = 1
-) -> dict[str, tuple[score.Answer, ...]]:
-    """Part → the answers of a test's kept cases without it, one case of so many."""
-    found, source_of = {}, name(identity())
+    source: Path, parts: Iterable[str], jobs: int, every: int = 1, first: int | None = None
+) -> None:
+    """Ask a test's kept cases again without each part, one case of so many, into a folder next to
+    it: a folder a part."""
+    source_of = name(identity())
     for part in parts:
         out = source.with_name(f"{source.name}-without") / part
         command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
         with patch.dict(os.environ, PYTHONPATH=_with_this_source()):
             called = source_of if part == WHOLE else f"{source_of} without {part}"
             settings = Settings(jobs=jobs, shiplog=command, called=called)
-            replay.replay(source, out, settings, every)
-        found[part] = score.read(out).answers
-    return found
+            replay.replay(source, out, settings, every, first)
 
 
 def _with_this_source() -> str:
