@@ -10,7 +10,7 @@ import numpy as np
 
 from shiplog.diagnosis import fits, sign_conventions, thresholds
 from shiplog.diagnosis.network_base import Own
-from shiplog.diagnosis.result import Decision
+from shiplog.diagnosis.result import Decision, Named
 from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
 from shiplog.simulation.error_reduction import Gain, diverged, gain, parts
@@ -18,6 +18,7 @@ from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
 
 Half = tuple[float, bool] | None  # s into the voyage, and whether it is the later half
+ROUNDING = 1e-6  # of L: two rollouts that differ by no more are the same
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,15 @@ class HeldOut(Rollouts):
     trial: Trial
     own: Own | None = None
 
-    def states_after(self, decision: Decision) -> np.ndarray:
-        """[N, I, 6] by the extended model, with numbers fitted without each window's voyage."""
+    def states_after(self, decision: Decision, absent: str = "") -> np.ndarray:
+        """[N, I, 6] by the extended model, with numbers fitted without each window's voyage;
+        those of a cause that is `absent` are zero."""
         states = np.empty(self.cut.state.shape)
         needed = self._constants(decision)
         for voyage, half, rows in self.folds():
             numbers, coefficients = self.without(decision, voyage, half)
+            if absent:
+                numbers = numbers | {absent: np.zeros_like(numbers[absent])}
             simulator = self.before.with_causes(
                 [n.cause for n in decision.named], numbers, None, needed, coefficients
             )
@@ -90,6 +94,14 @@ class HeldOut(Rollouts):
 
     def gain(self, decision: Decision) -> Gain:
         return self.gain_between(self.losses_before, self.parts(self.states_after(decision)))
+
+    def felt(self, decision: Decision, one: Named) -> bool:
+        """Whether a named cause itself changes the velocities that the windows compare. The clock
+        of the position does not; numbers that are fitted together with it may."""
+        present = self.parts(self.states_after(decision))
+        return not np.allclose(
+            self.parts(self.states_after(decision, one.cause.label)), present, rtol=ROUNDING
+        )
 
     def adapted(self, decision: Decision) -> Gain:
         """Gain of fitting the model's own coefficients again, with no cause named."""

@@ -3,8 +3,10 @@
 The numbers of a hypothesis are fitted without each fold in turn. A cause is refuted if the 90 %
 interval of its gain on held-out windows lies below zero. The search then goes on without it, and
 probabilities are those of the hypotheses that do not contain it. Its gain is that over the other
-names. If one of them is an alias in the catalogue (`separated_by`), either may do the work of both:
-only the two together are refuted.
+names, whose numbers are fitted again. If one of them is an alias in the catalogue
+(`separated_by`), either may do the work of both: only the two together are refuted. The windows
+compare velocities. What does not itself change them, as the clock of the position, they cannot
+refute: the loss is that of other numbers.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
 are then named only if the interval of their joint gain lies above zero. A remainder so slight that
@@ -17,8 +19,9 @@ gain of each of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from shiplog.diagnosis import posterior as posteriors
@@ -45,6 +48,10 @@ class Judge(Protocol):
         """Of a decision over one with a cause less."""
         ...
 
+    def felt(self, decision: Decision, one: Named) -> bool:
+        """Whether the cause itself changes what is compared."""
+        ...
+
 
 def _why_in_doubt(
     search: Search, found: Posterior, decision: Decision, first: Collection[str]
@@ -69,10 +76,12 @@ def _why_in_doubt(
     return ""
 
 
-def _refuted(asked: Sequence[tuple[Named, Gain]]) -> tuple[frozenset[str], str] | None:
-    """Of causes whose whole interval is a loss the one whose loss is most certain, and why;
-    together with another one from which it is hard to separate."""
-    worse = [pair for pair in asked if pair[1].high < 0.0]
+def _refuted(
+    asked: Sequence[tuple[Named, Gain]], felt: Callable[[Named], bool]
+) -> tuple[frozenset[str], str] | None:
+    """Of causes whose whole interval is a loss, and that are `felt`, the one whose loss is most
+    certain, and why; together with another one from which it is hard to separate."""
+    worse = [pair for pair in asked if pair[1].high < 0.0 and felt(pair[0])]
     if not worse:
         return None
     one, worth = min(worse, key=lambda pair: pair[1].high)
@@ -130,7 +139,8 @@ def judged(
             ]
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
-        if refutable := _refuted(asked) or _unproved(asked, first):
+        felt = partial(held.felt, decision)
+        if refutable := _refuted(asked, felt) or _unproved(asked, first):
             names, why = refutable
             bans[names] = why
             search.without(*names)

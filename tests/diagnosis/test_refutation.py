@@ -20,16 +20,20 @@ def gain(low: float, high: float) -> Gain:
 
 
 class HeldOut:
-    """Gains by what is named, and by the name that is taken away; what was tested is kept."""
+    """Gains by what is named, and by the name that is taken away; what was tested is kept. Of the
+    names that are `hidden` the windows feel nothing."""
 
-    def __init__(self, gains, worths=None):
-        self.gains, self.worths, self.asked = gains, worths or {}, []
+    def __init__(self, gains, worths=None, hidden=()):
+        self.gains, self.worths, self.asked, self.hidden = gains, worths or {}, [], hidden
 
     def gain(self, decision):
         labels = tuple(one.cause.label for one in decision.named)
         self.asked.append(labels)
         assert len(self.asked) < 20, "it never ends"
         return gain(*self.gains[labels])
+
+    def felt(self, decision, one):
+        return one.cause.label not in self.hidden
 
     def worth(self, rest, decision):
         kept = {one.cause.label for one in rest.named}
@@ -282,6 +286,17 @@ def test_of_two_each_is_judged_over_the_other_alone(trial):
     decision, _, _, refuted = judged(made, held)
     assert [one.cause.label for one in decision.named] == ["drag"]
     assert list(refuted) == ["load"]
+
+
+def test_what_the_windows_do_not_feel_they_do_not_refute(trial):
+    """The load's numbers are worse together with the drag, and that is not the drag's fault."""
+    given = {(("drag", "load"), NOMINAL): 0.97, (LOAD, NOMINAL): 0.03}
+    gains, worths = {("drag", "load"): BETTER, LOAD: BETTER}, {"drag": WORSE, "load": UNSURE}
+    for hidden, named in (((), ["load"]), (("drag",), ["drag", "load"])):
+        held = HeldOut(gains, worths, hidden)
+        decision, _, _, refuted = judged(weighed.search(trial, given), held)
+        assert sorted(one.cause.label for one in decision.named) == named
+        assert list(refuted) == [name for name in ("drag",) if name not in named]
 
 
 def test_a_gain_without_bounds_refutes_nothing(trial):

@@ -21,6 +21,7 @@ from shiplog.diagnosis import (
     setup,
     sign_conventions,
 )
+from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.relinearisation import converge
 from shiplog.diagnosis.remainder import Remainder
@@ -171,6 +172,20 @@ def test_whole_voyages_are_left_out_and_of_one_alone_its_halves(sea):
         for row in alone.cut.plan[rows].to_dicts():
             inside = (row["elapsed"], row["elapsed"] + size)
             assert min(inside) >= middle - 1.0 if late else max(inside) <= middle + 1.0
+
+
+def test_windows_feel_a_current_and_not_the_clock_of_the_position(sea):
+    trial, decision, clock = sea.done.trial, sea.done.decision, "clock_offset:position"
+    (current,) = decision.named
+    both = tuple(sorted((current.cause.label, clock)))
+    numbers = {current.cause.label: current.numbers, clock: np.array([0.3])}
+    point, found = converge(trial, both, numbers, decision.fit.point.path)
+    by = {c.label: c for c in sea.campaign.reference.model.causes}
+    late = replace(current, cause=by[clock], numbers=found.numbers[clock])
+    joint = replace(decision, fit=Fit(point, found, Remainder()), named=(current, late))
+    assert abs(found.numbers[clock]).max() > 0.0
+    assert sea.done.held.felt(joint, current)
+    assert not sea.done.held.felt(joint, late)
 
 
 def test_the_manoeuvre_that_separates_is_the_seamans(sea):
