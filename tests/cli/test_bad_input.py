@@ -196,7 +196,7 @@ TABLES = {
                                   lambda d: d.convert(d.table(), profile=d.profile())),
     "a good table and a bad one": (3, ["bad.csv refused"], lambda d: d.convert(
         d.table(), d.file("bad.csv", "a,b\n1,2\n"))),
-    "a voyage that is there already": (3, ["t.csv: z1 refused", "exists already", "1 logs in"],
+    "a voyage that is there already": (3, ["t.csv: z1 refused", "exists already", "1 log in"],
         lambda d: [*d.convert(d.table(run_id=["z1", "z1", "z2"]))[:-1],
                    d.file("z1.mcap").parent]),
     "two voyages of one file name": (3, ["2 logs in", "t.csv: a_1 refused: Two voyages of t.csv",
