@@ -51,7 +51,7 @@ def earth_velocity(speed: np.ndarray, course: np.ndarray) -> np.ndarray:
     At no speed a receiver has no course, and sends none: the velocity is zero all the same.
     """
     course = np.where(speed == 0.0, 0.0, course)
-    return np.stack((speed * np.cos(course), speed * np.sin(course)), axis=-1)
+    return np.stack((speed * np.cos(course), speed * np.sin(course))).T
 
 
 def in_body_axes(north: Any, east: Any, cos: Any, sin: Any) -> tuple[Any, Any]:
@@ -97,6 +97,6 @@ def quaternion_heading(z: np.ndarray, w: np.ndarray, east_north_up: bool) -> np.
     return np.pi / 2.0 - yaw if east_north_up else yaw
 
 
-def wrap(angle: np.ndarray) -> np.ndarray:
-    """Angles in (-π, π]."""
-    return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
+def wrap(angle: Any) -> Any:
+    """Angles [rad] in (-π, π], of numpy or JAX."""
+    return np.pi - (np.pi - angle) % (2.0 * np.pi)

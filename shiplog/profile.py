@@ -367,6 +367,11 @@ class Profile(Section):
         return tuple(c.name for c in channels.WIND) if self.has_wind else ()
 
     @property
+    def azimuths(self) -> tuple[int, ...]:
+        """Columns of the actuators that turn through ±180 deg."""
+        return tuple(i for i, one in enumerate(self.actuators) if one.circular)
+
+    @property
     def circular(self) -> frozenset[str]:
         """Columns whose mean is a circular one."""
         states = {c.name for c in (*channels.STATE, *channels.WIND) if c.circular}

@@ -8,9 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from shiplog.frames import wrap
+
 
 def within_a_turn(actuator: Array, turning: Sequence[int]) -> Array:
-    """Actuators [..., A] with the azimuths, columns `turning`, in (-π, π].
+    """Actuators [..., A] with the azimuths [rad], columns `turning`, in (-π, π].
 
     The rows that a network was trained on have them so. In a record they count on past ±180 deg,
     and a network knows nothing of 350 deg.
@@ -18,5 +20,4 @@ def within_a_turn(actuator: Array, turning: Sequence[int]) -> Array:
     if not turning:
         return actuator
     actuator, columns = jnp.asarray(actuator), np.array(turning)
-    angle = actuator[..., columns]
-    return actuator.at[..., columns].set(np.pi - jnp.mod(np.pi - angle, 2.0 * np.pi))
+    return actuator.at[..., columns].set(wrap(actuator[..., columns]))

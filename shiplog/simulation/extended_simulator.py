@@ -220,7 +220,7 @@ def as_record(
     counts on."""
     count, size, _ = windows.state.shape
     actuator = windows.actuator.copy()
-    turning = _circular(profile)
+    turning = list(profile.azimuths)
     actuator[..., turning] = np.unwrap(actuator[..., turning], axis=1)
     starts = np.zeros((count, size), dtype=bool)
     starts[:, 0] = True
@@ -258,14 +258,9 @@ def _acted(was: Record, recorded: Record, windows: Windows) -> np.ndarray:
     """Actuators [n, A] as they acted, azimuths in (-π, π] as the windows have them."""
     if was.actuator is recorded.actuator:  # no cause is about them
         return windows.actuator.reshape(was.actuator.shape)
-    acted, turning = was.actuator.copy(), _circular(was.profile)
+    acted, turning = was.actuator.copy(), list(was.profile.azimuths)
     acted[:, turning] = wrap(acted[:, turning])
     return acted
-
-
-def _circular(profile: Profile) -> list[int]:
-    """Columns of the actuators that turn through ±180 deg."""
-    return [i for i, one in enumerate(profile.actuators) if one.circular]
 
 
 def campaign(record: Record) -> tuple[dict[str, tuple[float, float]], dict[str, float]]:

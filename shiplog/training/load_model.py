@@ -196,8 +196,7 @@ class NetworkRun(Run):
         return None
 
     def _numbers(self, seed: int) -> tuple[Any, np.ndarray, np.ndarray]:
-        azimuths = tuple(i for i, one in enumerate(self.profile.actuators) if one.circular)
-        model = compiled_network.compiled(self.simulator(seed), azimuths)
+        model = compiled_network.compiled(self.simulator(seed), self.profile.azimuths)
         return model, np.zeros(0), np.zeros((0, 0))
 
     def _plain_base(self) -> Base:

@@ -249,7 +249,7 @@ def test_a_converted_log_says_in_json_what_became_of_it(tmp_path):
 
 
 def tables_of_topics(folder, **columns):
-    """A table a topic, 10 Hz: name → its columns beside the clock."""
+    """A table a topic, 10 Hz: name → its columns next to the stamps."""
     folder.mkdir()
     (folder / "._gyro.csv").write_bytes(b"\0\5\x16\7")  # as macOS leaves it on a memory stick
     stamp = 1_700_000_000_000_000_000 + 100_000_000 * np.arange(20)

@@ -41,7 +41,7 @@ def test_a_voyage_without_a_window_is_no_observation_of_the_band():
     )  # fmt: skip
     config = Config(split=Split(training=("t",), validation=names), window=SECONDS)
     run = SimpleNamespace(config=config, profile=profile, models=lambda: {0: Wrong()})
-    band = _band(run, one_hertz.segments(rows))  # type: ignore[arg-type]
+    band = _band(run, one_hertz.segments(rows))  # type: ignore[arg-type]  # a stand-in for a run
     error = Wrong().simulate(SimpleNamespace(state=np.zeros((COUNT, SECONDS, 6))))
     half = band.half_width(np.zeros_like(error))
     inside = prediction_interval.coverage(error, half)

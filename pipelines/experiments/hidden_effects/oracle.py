@@ -34,8 +34,8 @@ Truth = Mapping[str, Any]  # a cause of a key: name, and parameters as the contr
 
 def true_cause(truth: Truth, setting: Setting) -> tuple[Cause, np.ndarray] | None:
     """The catalogue's cause and the numbers that show what the key says; None where none does."""
-    told = {k: p["value"] for k, p in truth["parameters"].items()}
-    channel, unit = told.pop("channel", None), told.pop("unit", "")
+    hidden = {k: p["value"] for k, p in truth["parameters"].items()}
+    channel, unit = hidden.pop("channel", None), hidden.pop("unit", "")
     for one in CATALOGUE:
         if one.name != truth["name"] or getattr(one, "channel", None) != channel:
             continue
@@ -43,11 +43,11 @@ def true_cause(truth: Truth, setting: Setting) -> tuple[Cause, np.ndarray] | Non
             return None
         for cause in one.each(setting):  # of one unit alone, or of all together
             if getattr(cause, "actuator", "") == unit:
-                return cause, numbers(cause, told, setting)
+                return cause, numbers(cause, hidden, setting)
     return None
 
 
-def numbers(cause: Cause, told: Mapping[str, float], setting: Setting) -> np.ndarray:
+def numbers(cause: Cause, hidden: Mapping[str, float], setting: Setting) -> np.ndarray:
     """[count] whose `shown` equals the known values; every other number is zero."""
     size = cause.sizes(setting)
 
@@ -55,13 +55,13 @@ def numbers(cause: Cause, told: Mapping[str, float], setting: Setting) -> np.nda
         shown = cause.displayed(x * size)
         away = []
         for name, (value, unit) in shown.items():
-            if name not in told:
+            if name not in hidden:
                 away.append(0.0)
             elif unit == "deg":  # on the circle, so that 359 is near 1
-                apart = np.radians(float(value) - told[name])
+                apart = np.radians(float(value) - hidden[name])
                 away += [np.sin(apart), 1.0 - np.cos(apart)]
             else:
-                away.append(float(value) - told[name])
+                away.append(float(value) - hidden[name])
         return np.array(away)
 
     starts = [sign * np.ones(cause.count) for sign in (0.5, -0.5)]
@@ -69,7 +69,7 @@ def numbers(cause: Cause, told: Mapping[str, float], setting: Setting) -> np.nda
         starts += [np.array([0.5, -0.5]), np.array([-0.5, 0.5])]
     found = min((least_squares(off, at, xtol=1e-12) for at in starts), key=lambda f: f.cost)
     if found.cost > 1e-6:
-        raise ShiplogError(f"No numbers of {cause.label} show {dict(told)}.")
+        raise ShiplogError(f"No numbers of {cause.label} show {dict(hidden)}.")
     return found.x * size
 
 
