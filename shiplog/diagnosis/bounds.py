@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from scipy.special import log_ndtr
+from scipy.special import log_ndtr, logsumexp
+
+REACH = 12.0  # standard deviations, over which a probability is integrated
 
 
 def within(
@@ -36,6 +38,47 @@ def log_share(
     """
     after = _log_within((low - mean) / deviation, (high - mean) / deviation)
     return float((after - _log_within(low / size, high / size)).sum())
+
+
+def on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float, at: int = 0) -> np.ndarray:
+    """[Q] a Gaussian's most probable numbers of which the one after `at` is at most `farthest`
+    times that one, either way; those that are, stay. One that moves, moves others."""
+    if abs(mean[at + 1]) <= farthest * abs(mean[at]):
+        return mean
+    found = []
+    for way in (-farthest, farthest):
+        normal = np.zeros(len(mean))
+        normal[at : at + 2] = way, -1.0  # second = way · first
+        pull = covariance @ normal
+        moved = mean - pull * (normal @ mean) / (normal @ pull)
+        found.append((float((normal @ mean) ** 2 / (normal @ pull)), tuple(moved)))
+    return np.array(min(found)[1])
+
+
+def log_on_board(
+    mean: np.ndarray, covariance: np.ndarray, size: np.ndarray, farthest: float
+) -> float:
+    """What it adds to the log evidence of two numbers that the second is at most `farthest` times
+    the first one: the posterior probability of that, over the prior one.
+
+    mean, covariance  of the posterior without this bound
+    size              [2] standard deviations of the prior, about zero
+    """
+    return _log_on_board(mean, covariance, farthest) - _log_on_board(
+        np.zeros(2), np.diag(size**2), farthest
+    )
+
+
+def _log_on_board(mean: np.ndarray, covariance: np.ndarray, farthest: float) -> float:
+    deviation = float(np.sqrt(covariance[0, 0]))
+    first = mean[0] + deviation * np.linspace(-REACH, REACH, 2000)
+    slope = covariance[0, 1] / covariance[0, 0]
+    rest = np.sqrt(max(covariance[1, 1] - slope * covariance[0, 1], 1e-12 * covariance[1, 1]))
+    middle, most = mean[1] + slope * (first - mean[0]), farthest * np.abs(first)
+    with np.errstate(divide="ignore"):  # nothing is between a bound and itself
+        inside = _log_within((-most - middle) / rest, (most - middle) / rest)
+    density = -0.5 * ((first - mean[0]) / deviation) ** 2
+    return float(np.subtract(logsumexp(density + inside), logsumexp(density)))
 
 
 def _log_within(low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ of weights of its remainder.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -193,6 +194,10 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
     left = np.linalg.inv(own)
     low, high = (bound / unit for bound in trial.bounds(label))
     gained += bounds.log_share(value, _deviation(left), np.ones(len(unit)), low, high)
+    farthest = trial.farthest(label) * unit[0] / unit[-1]
+    if np.isfinite(farthest):
+        gained += bounds.log_on_board(value, left, np.ones(len(unit)), farthest)
+        value = bounds.on_board(value, left, farthest)
     value = bounds.within(value, left, low, high)
     information = own - np.eye(len(columns))
     shrunk = information @ left
@@ -214,8 +219,12 @@ def numbers_of(
         return {}, covariance
     limits = [trial.bounds(name) for name in included]
     low, high = (np.concatenate(of) for of in zip(*limits, strict=True))
-    found = bounds.within(mean, covariance, low, high)
     ends = np.cumsum([len(of) for of, _ in limits])[:-1]
+    if np.isfinite(covariance).all():
+        for name, at in zip(included, (0, *ends), strict=True):
+            if math.isfinite(trial.farthest(name)):
+                mean = bounds.on_board(mean, covariance, trial.farthest(name), int(at))
+    found = bounds.within(mean, covariance, low, high)
     return dict(zip(included, np.split(found, ends), strict=True)), covariance
 
 
@@ -252,4 +261,8 @@ def _within(trial: Trial, one: Level, point: Point, included: Sequence[str]) -> 
         own, at = slice(at, at + len(size)), at + len(size)
         if name not in trial.fixed:
             share += bounds.log_share(mean[own], deviation[own], size, *trial.bounds(name))
+            if math.isfinite(trial.farthest(name)) and np.isfinite(deviation[own]).all():
+                share += bounds.log_on_board(
+                    mean[own], covariance[own, own], size, trial.farthest(name)
+                )
     return share

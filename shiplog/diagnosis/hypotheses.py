@@ -115,8 +115,8 @@ class Hypotheses:
                 self.found[key] = replace(one, point=place)
 
     @cached_property
-    def nominal_side_force(self) -> np.ndarray | None:
-        """Acceleration [3] that the nominal process noise has at one place."""
+    def nominal_side_force(self) -> Remainder | None:
+        """As `intermittent.nominal_side_force`."""
         return intermittent.nominal_side_force(self.trial.campaign, self.trial.grid)
 
     def intermittent(self, fit: Fit) -> SideForce:

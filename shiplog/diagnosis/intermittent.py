@@ -14,6 +14,7 @@ from shiplog.diagnosis import fits, likelihood, raised_noise, thresholds, unreco
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.nominal_campaign import Campaign
 from shiplog.diagnosis.raised_noise import Left
+from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
@@ -27,9 +28,9 @@ NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by i
 VARIES = 1.0  # time between over time on, from which a force merely varies: a Gaussian one has 1.13
 
 
-def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
-    """Acceleration [3], root mean square, of nominal process noise that acts at one place; None
-    where independent noise in each channel is more probable.
+def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
+    """Nominal process noise that acts at one place; None where independent noise in each channel is
+    more probable.
 
     Each part's numbers are predicted by the other voyages and itself, as a trial's are.
     """
@@ -51,10 +52,10 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> np.ndarray | None:
         left, none, reference.process_noise, campaign.weight, reference.counts
     )
     found = unrecorded_thruster.estimate_side_force(kept, reference)
-    return found.unit * found.force if found.gain > 0.0 else None
+    return found.remainder if found.gain > 0.0 else None
 
 
-def side_force(trial: Trial, fit: Fit, at_one_place: np.ndarray | None = None) -> SideForce:
+def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) -> SideForce:
     """Of what a hypothesis leaves; `at_one_place` as `raised_noise.by_channel` has it."""
     left = noise_left(trial, fit)
     return unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)

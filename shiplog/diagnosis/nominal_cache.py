@@ -30,7 +30,7 @@ from shiplog.models.starting_values import Start
 from shiplog.voyages.recording import Record
 
 PROCESS_NOISE = ("noise", "acceleration", "start", "coloured", "fade")
-TIME_FIELDS = ("time", "bin", "knot")
+TIME_FIELDS = ("time", "bin", "knot", "intermittent_time")
 LIBRARIES = (jax, numba, np, scipy)
 
 log = logging.getLogger(__name__)

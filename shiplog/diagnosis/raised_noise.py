@@ -1,7 +1,8 @@
 """Process noise that is raised in each channel by itself: rougher weather, with nothing at work.
 
 Waves and gusts do not raise the noise of surge, sway and yaw rate alike. Were all three raised by
-one factor, whatever acts on one of them more than on the others would look like a force.
+one factor, whatever acts on one of them more than on the others would look like a force. So would
+noise that lasts longer than that of the nominal voyages: swell and squalls do.
 """
 
 from __future__ import annotations
@@ -53,29 +54,31 @@ def left_by(
     return Left(startless, nominal, weight, counts)
 
 
-def by_channel(left: Left, at_one_place: np.ndarray | None = None) -> tuple[float, Remainder]:
-    """Log likelihood of the most probable factors of surge, sway and yaw rate, and these factors.
+def by_channel(left: Left, at_one_place: Remainder | None = None) -> tuple[float, Remainder]:
+    """Log likelihood of the most probable factors of surge, sway and yaw rate and of the
+    correlation time, and these factors.
 
-    at_one_place  acceleration [3] of nominal process noise that acts at one place: it is raised
-                  with the others; None without any
+    at_one_place  nominal process noise that acts at one place: it is raised, and lasts longer, with
+                  the others; None without any
     """
 
     def raised(factors: np.ndarray) -> Remainder:
-        channels = np.exp(factors)
-        force = None
-        if at_one_place is not None:
-            ahead, across, turning = at_one_place * math.sqrt(channels[1] * channels[2])
-            force = (float(ahead), float(across), float(turning))
-        surge, sway, yaw_rate = map(float, channels)
-        return Remainder(RAISED, channels=(surge, sway, yaw_rate), intermittent=force)
+        surge, sway, yaw_rate, lasts = map(float, np.exp(factors))
+        found = Remainder(RAISED, channels=(surge, sway, yaw_rate), noise_lasts=lasts)
+        if at_one_place is None or at_one_place.intermittent is None:
+            return found
+        ahead, across, turning = at_one_place.intermittent
+        by, force_lasts = math.sqrt(sway * yaw_rate), lasts * at_one_place.force_lasts
+        force = (by * ahead, by * across, by * turning)
+        return replace(found, intermittent=force, force_lasts=force_lasts)
 
     def value(factors: np.ndarray) -> float:
         return left.likelihood(raised(factors).in_noise(left.nominal))
 
     alike = max(FACTORS, key=lambda factor: left.likelihood(left.nominal.times(factor)))
-    first = np.full(3, math.log(alike))
+    first = np.append(np.full(3, math.log(alike)), 0.0)
     found = minimize(
         lambda at: -value(at), first, method="Nelder-Mead",
-        options={"initial_simplex": first + 0.3 * np.eye(4, 3), "xatol": 0.02, "fatol": 0.1},
+        options={"initial_simplex": first + 0.3 * np.eye(5, 4), "xatol": 0.02, "fatol": 0.1},
     )  # fmt: skip
     return -float(found.fun), raised(found.x)

@@ -25,7 +25,9 @@ AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 LOST_NATS = 10.0  # of the numbers' log density: a step that loses more may be rejected
 MOST_HALVINGS = 3  # of one step, at most
 LEFT = 0.2  # standard deviations: expected distance from the optimum, at which a fit has converged
-RATE = 0.1  # of convergence, until two steps give it: length of a step over that of the last one
+# Of convergence, until two steps give it: length of a step over that of the last one. Lags and
+# clocks reach 0.8; with this, a first step of more than half a standard deviation is not the last.
+RATE = 0.3
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 
 
@@ -99,7 +101,8 @@ def converge(
             if halvings == MOST_HALVINGS or not free:
                 break
             halvings, damping = halvings + 1, 0.5 * damping
-            numbers = _half_way(numbers, last.point.numbers if last else None, free[-1])
+            half = _half_way(numbers, last.point.numbers if last else None, free[-1])
+            numbers = trial.on_board(half)
             continue
         converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
@@ -109,7 +112,7 @@ def converge(
         if best is None or base.density >= best.base.density:
             best = here
         near, noise_factor = point, base.noise_factor
-        numbers = _towards(base.numbers, point.numbers, damping)
+        numbers = trial.on_board(_towards(base.numbers, point.numbers, damping))
         lately = noise_factor
         if not all(np.isfinite(values).all() for values in numbers.values()):
             return point, replace(base, name="+".join(included), evidence=-np.inf)

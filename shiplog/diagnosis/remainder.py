@@ -14,6 +14,7 @@ CHANGE_SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of
 LEAST_SPREAD = 0.05  # of the logarithm of the process noise: two campaigns are never alike
 SHAPE_NUMBERS = 3  # of a noise of its own in each channel, or of a force, its place and λ
 RAISED_SPREAD = 1.0  # the same where the process noise is raised: by e, either way
+TIME_SPREAD = 1.0  # the same of its correlation time: other weather lasts longer or shorter by e
 
 
 @dataclass(frozen=True)
@@ -25,20 +26,24 @@ class Remainder:
     noisy         whether process noise is raised together with that change
     channels      factors of the process noise in surge, sway and yaw rate, in addition to the
                   common one
+    noise_lasts   factor of the correlation time of the process noise
     intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force at one
                   place, in addition to the process noise
+    force_lasts   factor of the correlation time of that force
     """
 
     kind: str = NOMINAL
     size: float = 1.0
     noisy: bool = False
     channels: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    noise_lasts: float = 1.0
     intermittent: tuple[float, float, float] | None = None
+    force_lasts: float = 1.0
 
     @property
     def shape(self) -> tuple:
         """What of it makes the process noise more than a multiple of the nominal one."""
-        return self.channels, self.intermittent
+        return self.channels, self.noise_lasts, self.intermittent, self.force_lasts
 
     @property
     def shaped(self) -> bool:
@@ -61,12 +66,17 @@ class Remainder:
         return float(np.prod(np.hypot(channels, force) / acceleration) ** (1.0 / len(channels)))
 
     def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
-        """The process noise with each channel's factor and the intermittent force in it."""
+        """The process noise with the factors of its channels and of its time, and the intermittent
+        force in it."""
         if not self.shaped:
             return process_noise
         force = None if self.intermittent is None else np.array(self.intermittent)
         acceleration = process_noise.acceleration * self.channels
-        return replace(process_noise, acceleration=acceleration, intermittent=force)
+        return replace(
+            process_noise, acceleration=acceleration, time=self.noise_lasts * process_noise.time,
+            intermittent=force,
+            intermittent_time=self.force_lasts * process_noise.intermittent_time,
+        )  # fmt: skip
 
 
 def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
@@ -82,4 +92,6 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     square, cost = by_channel @ by_channel, math.log(RAISED_SPREAD / nominal)
     if not remainder.shaped:  # one number for all three
         return float(-0.5 * square / len(by_channel) - cost)
-    return float(-0.5 * square - SHAPE_NUMBERS * cost)
+    times = np.log([t for t in (remainder.noise_lasts, remainder.force_lasts) if t != 1.0])
+    square += float(times @ times) / TIME_SPREAD**2
+    return float(-0.5 * square - (SHAPE_NUMBERS + len(times)) * cost)

@@ -20,7 +20,7 @@ from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis, holds_one, name_of
 from shiplog.diagnosis.remainder import NOMINAL
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.weighing import SEARCH_NATS, weigh
+from shiplog.diagnosis.weighing import SEARCH_NATS, weigh, weigh_as
 from shiplog.models.causes import Cause
 
 MOST_CAUSES = 5  # of a hypothesis; of a ship with more the given coefficients are another ship's
@@ -96,6 +96,12 @@ class Search:
         self._tried.add(labels)
         weigh(self.table, labels, numbers, at)
 
+    def _weigh_again(self, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> None:
+        """A set with one cause less than the best hypothesis, with that one's noise: it may have
+        been weighed with noise that was less probable, which is no evidence for the cause."""
+        if one is self.table.ranked()[0] and weigh_as(self.table, labels, one, fit):
+            self._expanded.discard((labels, one.kind))
+
     def _expand(self, one: Hypothesis) -> None:
         """The sets with one cause more or less than a hypothesis has."""
         self._expanded.add((one.causes, one.kind))
@@ -108,7 +114,9 @@ class Search:
                 self._weigh(labels, numbers, fit.point)
         for label in one.causes if len(one.causes) > 1 else ():
             labels = tuple(n for n in one.causes if n != label)
-            if labels not in self._tried and len(self._tried) < self._most:
+            if labels in self._tried:
+                self._weigh_again(labels, one, fit)
+            elif len(self._tried) < self._most:
                 self._weigh(labels, {n: one.found.numbers[n] for n in labels}, fit.point)
 
     def _additions(

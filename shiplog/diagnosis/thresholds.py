@@ -1,6 +1,6 @@
 """The thresholds between verdicts: name, unit, reason. Settings of one method are in its module.
 
-Eleven decide between hypotheses. The others say when there is nothing to decide on, and what is
+Twelve decide between hypotheses. The others say when there is nothing to decide on, and what is
 listed with a verdict. Priors are shares before any data. Nats are natural logarithms of a Bayes
 factor.
 """
@@ -51,6 +51,10 @@ ORDINARY_NOISE = 1.5
 # more than ORDINARY_NOISE, noise that is raised by less than this is an ordinary day's, too: 95 %
 # of nominal voyages are nearer.
 ORDINARY_SPREADS = 2.0
+
+# Share of the variance by which process noise is raised. No spectrum is known better than to a
+# tenth: a change of the discrepancy that explains less of that noise is an error of its spectrum.
+SPECTRUM = 0.1
 
 # Ratio of times. An unrecorded thruster is on or off: it is between for less than this share of the
 # time that it is on. A force that merely varies is between as long as above; where a force is less

@@ -6,6 +6,7 @@ cause's numbers as a change from nominal, or a family of the discrepancy as a ch
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,6 +33,7 @@ from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.remainder import LEAST_SPREAD, Remainder
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial_products import Products
+from shiplog.models.causes import Cause
 from shiplog.voyages.recording import Record
 
 Read = tuple[segments.Cut, np.ndarray, np.ndarray]  # see `measurement_correction.read`
@@ -142,8 +144,25 @@ class Trial:
 
     def bounds(self, label: str) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest numbers [Q] of a cause, SI."""
+        return self._cause(label).bounds(self.reference.setting)
+
+    def farthest(self, label: str) -> float:
+        """As `Cause.farthest` of this ship."""
+        return self._cause(label).farthest(self.reference.setting)
+
+    def on_board(self, numbers: Numbers) -> Numbers:
+        """These numbers, each moment as large as its force or mass can make it at most."""
+        found = dict(numbers)
+        for label, values in numbers.items():
+            farthest = self.farthest(label)
+            if math.isfinite(farthest):
+                most = farthest * abs(values[0])
+                found[label] = np.append(values[:1], np.clip(values[1:], -most, most))
+        return found
+
+    def _cause(self, label: str) -> Cause:
         (cause,) = (c for c in self.reference.model.causes if c.label == label)
-        return cause.bounds(self.reference.setting)
+        return cause
 
     def process_noise(self, remainder: Remainder) -> ProcessNoise:
         """The nominal one; with an intermittent force in it, where one remains."""

@@ -21,6 +21,8 @@ REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
 # To start from: places in ship lengths; forces in multiples of the one that accelerates the ship
 # sideways as much as the nominal process noise does
 LEVERS = np.linspace(-0.45, 0.45, 7)
+STEPS = (0.05, 0.3, 0.3)  # the first ones, of place and logarithms of force and correlation time
+LASTS = math.log(4.0)  # of its correlation time over that of bursts, at most: it comes and goes
 SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
 
@@ -34,6 +36,7 @@ class SideForce:
     force   root mean square [N]
     unit    [3] acceleration of 1 N
     device  probability, by its pattern, that it is the force of one device
+    lasts   its correlation time, over the usual one
     """
 
     value: float
@@ -42,15 +45,17 @@ class SideForce:
     force: float
     unit: np.ndarray
     device: float = 0.0
+    lasts: float = 1.0
 
     @property
     def remainder(self) -> Remainder:
         surge, sway, yaw = map(float, self.unit * self.force)
-        return Remainder(INTERMITTENT, intermittent=(surge, sway, yaw))
+        of = (surge, sway, yaw)
+        return Remainder(INTERMITTENT, intermittent=of, force_lasts=self.lasts)
 
 
 def estimate_side_force(
-    left: Left, ref: Reference, at_one_place: np.ndarray | None = None
+    left: Left, ref: Reference, at_one_place: Remainder | None = None
 ) -> SideForce:
     """The most probable intermittent side force at one place along the ship, from the residual.
     It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
@@ -59,20 +64,24 @@ def estimate_side_force(
     ship, length = ref.model.stand_in, ref.setting.scale["length"]
     across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
 
-    def of(lever: float, force: float) -> float:
-        unit = across + lever * length * turning
-        return left.likelihood(replace(left.nominal, intermittent=unit * force))
+    def of(lever: float, force: float, lasts: float = 1.0) -> float:
+        unit, time = across + lever * length * turning, lasts * left.nominal.intermittent_time
+        return left.likelihood(
+            replace(left.nominal, intermittent=unit * force, intermittent_time=time)
+        )
 
     sizes = left.nominal.acceleration[1] / abs(across[1]) * SIZES  # N
     lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: of(*tried))
+    first = np.array([lever, math.log(force), 0.0])
     finer = minimize(  # together with the place itself a part of the force would be another cause's
-        lambda at: -of(at[0], math.exp(at[1])), (lever, math.log(force)), method="Nelder-Mead",
-        bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None)),
-        options={"xatol": 0.005, "fatol": 0.1},
+        lambda at: -of(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
+        bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None), (-LASTS, LASTS)),
+        options={"initial_simplex": first + STEPS * np.eye(4, 3), "xatol": 0.005, "fatol": 0.1},
     )  # fmt: skip
-    lever, force = float(finer.x[0]) * length, math.exp(finer.x[1])
+    lever, (force, lasts) = float(finer.x[0]) * length, map(float, np.exp(finer.x[1:]))
     one = -float(finer.fun)
-    return SideForce(one, one - raised, lever, force, across + lever * turning)
+    unit = across + lever * turning
+    return SideForce(one, one - raised, lever, force, unit, lasts=lasts)
 
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.diagnosis import evidence, fits
+from shiplog.diagnosis import evidence, fits, thresholds
 from shiplog.diagnosis.fitted import Fit, Found, Level, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis
@@ -37,6 +37,23 @@ class Rough:
     @property
     def best(self) -> Level:
         return max(self.levels, key=lambda level: level.value)
+
+    @property
+    def observations(self) -> float:
+        """How many independent values the process noise was estimated from: the curvature of the
+        log evidence over the logarithm of the noise is twice that."""
+        at = {math.log(one.noise_factor): one.value for one in self.levels}
+        top = math.log(self.best.noise_factor)
+        near = sorted(at, key=lambda log_noise: abs(log_noise - top))[:3]
+        if len(near) < 3:
+            return 0.0
+        return max(-float(np.polyfit(near, [at[n] for n in near], 2)[0]), 0.0)
+
+    def spectrum(self) -> float:
+        """Nats that a family gains where it explains the share `SPECTRUM` of the raised noise."""
+        factor = self.remainder.overall(self.best.noise_factor)
+        share = thresholds.SPECTRUM * max(1.0 - factor**-2.0, 0.0)
+        return -0.5 * self.observations * math.log1p(-share)
 
     def fit(self, trial: Trial, labels: Sequence[str], included: Sequence[str], one: Level) -> Fit:
         """The set at one of its levels."""
@@ -91,6 +108,24 @@ def weigh(
         _weigh_intermittent(table, labels)
     _weigh_families(table, labels, plain, rough)
     table.forget()
+
+
+def weigh_as(table: Hypotheses, labels: tuple[str, ...], one: Hypothesis, fit: Fit) -> bool:
+    """Whether these causes, some of another hypothesis, are more probable with the noise of that
+    one, where it has a shape of its own. They are then kept with it."""
+    if not one.remainder.shaped:
+        return False
+    numbers = {name: fit.found.numbers[name] for name in table.included(labels)}
+    start = replace(fit, found=replace(fit.found, numbers=numbers))
+    again = _fitted_with(table, labels, start, one.remainder)
+    before = table.found.get((labels, one.kind))
+    least = -math.inf if before is None else before.evidence + evidence.LITTLE_NATS
+    if again.diverged or again.found.evidence < least:
+        return False
+    force = one.side_force
+    pattern = None if force is None else table.with_pattern(again, force)
+    table.put(labels, again.found.evidence, again, pattern)
+    return True
 
 
 def rougher(table: Hypotheses, labels: tuple[str, ...], plain: Rough) -> Rough:
@@ -162,7 +197,8 @@ def changed(
 
     The noise may be raised as well, since no family describes an unknown force exactly: in the
     most probable way, `rough`. The family counts only if it is more probable with nominal noise
-    than noise alone that is raised by one factor; otherwise its functions are a fit to noise.
+    than noise alone that is raised by one factor; otherwise its functions are a fit to noise. Nor
+    does it count where it explains little of raised noise: that is an error of the spectrum.
     """
 
     def tried(of: Rough) -> list[tuple[float, float, float]]:
@@ -176,6 +212,9 @@ def changed(
     nominal = [(v - raised_over_nominal(trial, noise), s, noise) for v, s, noise in tried(plain)]
     noisy = max(nominal)[0] > plain.best.value
     value, size, noise = max(tried(rough) if noisy else nominal)
+    raised = plain.best.noise_factor > RAISED_FROM
+    if raised and value - rough.best.value < rough.spectrum():
+        value = -math.inf
     if not noisy:
         return Change(plain.point, Remainder(family, size), value, noise)
     remainder = replace(rough.remainder, kind=family, size=size, noisy=True)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from shiplog.diagnosis.bounds import log_share, within
+from shiplog.diagnosis.bounds import log_on_board, log_share, on_board, within
 
 
 def test_a_number_held_at_a_bound_moves_the_others():
@@ -61,3 +61,39 @@ def test_bounds_far_off_are_worth_nothing_and_far_within_the_tail_no_digit_is_lo
     assert log_share(4.0 * one, 0.1 * one, one, -off, 0.0 * one) == pytest.approx(
         tail - math.log(0.5), rel=1e-9
     )
+
+
+def test_a_load_beyond_the_ship_is_moved_onto_it():
+    """The most probable point of the line second = 1.5 first, which another number follows."""
+    mean = np.array([7.0, 1.0, 2.0])
+    root = np.array([[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [-0.2, 0.3, 0.6]])
+    covariance = root @ root.T
+    inverse = np.linalg.inv(covariance)
+
+    def off(point):
+        return float((point - mean) @ inverse @ (point - mean))
+
+    found = on_board(mean, covariance, 1.5, at=1)
+    assert found[2] == pytest.approx(1.5 * found[1])
+    for way in (np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 1.5])):
+        assert off(found) < min(off(found + 0.01 * way), off(found - 0.01 * way))
+    assert (on_board(mean, covariance, 2.1, at=1) == mean).all()
+
+
+def test_what_a_load_on_board_adds_is_the_share_of_draws_that_are():
+    mean, size = np.array([1.0, 2.0]), np.array([2.0, 1.0])
+    covariance = np.array([[1.0, 0.3], [0.3, 0.5]])
+    rng = np.random.default_rng(0)
+
+    def share(drawn):
+        return float(np.mean(np.abs(drawn[:, 1]) <= 1.5 * np.abs(drawn[:, 0])))
+
+    after = share(rng.multivariate_normal(mean, covariance, 200_000))
+    before = share(size * rng.standard_normal((200_000, 2)))
+    found = log_on_board(mean, covariance, size, 1.5)
+    assert found == pytest.approx(np.log(after / before), abs=0.02)
+    assert np.arctan(3.0) * 2.0 / np.pi == pytest.approx(before, abs=0.01)
+    # far outside it is the tail beyond the nearer line: 23 of 1.5 · 4 ± 1.5
+    far = log_on_board(np.array([4.0, 23.0]), np.diag([2.25, 1.0]), size, 1.5)
+    lost = 0.5 * 17.0**2 / (1.0 + 2.25**2)
+    assert -lost - 5.0 < far < -lost

@@ -16,7 +16,7 @@ from shiplog.diagnosis import (
     unrecorded_thruster,
 )
 from shiplog.diagnosis.intermittent import of_one_device
-from shiplog.diagnosis.remainder import RAISED
+from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 COUNT = 24
@@ -72,9 +72,29 @@ def test_noise_is_raised_in_each_channel_by_as_much_as_was_drawn():
 
 def test_nominal_noise_at_one_place_is_raised_with_the_others():
     left = left_by(passed(40.0), np.ones(COUNT))
-    _, remainder = raised_noise.by_channel(left, np.array([0.0, 0.01, 0.004]))
+    nominal = Remainder(INTERMITTENT, intermittent=(0.0, 0.01, 0.004), force_lasts=0.5)
+    _, remainder = raised_noise.by_channel(left, nominal)
     side = (remainder.channels[1] * remainder.channels[2]) ** 0.5
     assert remainder.intermittent == pytest.approx((0.0, 0.01 * side, 0.004 * side))
+    assert remainder.force_lasts == pytest.approx(0.5 * remainder.noise_lasts)
+
+
+def test_raised_noise_lasts_as_long_as_was_drawn():
+    """Three times as large and five times as long as the nominal noise, which is nearly nothing."""
+    count = 2 * COUNT
+    record = straight.sailed(count)
+    knots = segments.grid(record).knots
+    small = replace(PROCESS_NOISE, acceleration=0.1 * PROCESS_NOISE.acceleration)
+    more = replace(PROCESS_NOISE.times(3.0), time=5.0 * PROCESS_NOISE.time)
+    drawn = np.random.default_rng(8).standard_normal((count, 3 * knots))
+    accelerations = drawn @ np.linalg.cholesky(more.kernel(knots)).T
+    linear = straight.passed(record, straight.columns_of(()), accelerations=accelerations, seed=5)
+    none = np.zeros(linear.j.shape[-1])
+    left = raised_noise.left_by(linear, none, small, np.ones(count), 1.0)
+    value, remainder = raised_noise.by_channel(left)
+    assert remainder.noise_lasts == pytest.approx(5.0, rel=0.25)
+    as_long = replace(remainder, noise_lasts=1.0).in_noise(small)
+    assert value > left.likelihood(as_long) + 10.0
 
 
 def test_forces_at_one_place_are_found_there(reference):
@@ -119,12 +139,13 @@ def test_a_nominal_force_at_one_place_is_no_force_of_the_trial(reference):
     linear = passed(40.0)
     weight = np.ones(COUNT)
     found = estimated(linear, weight, reference)
-    again = estimated(linear, weight, reference, found.force * found.unit)
+    again = estimated(linear, weight, reference, found.remainder)
     assert (again.lever, again.force) == pytest.approx((found.lever, found.force))
     assert found.gain > 30.0 and again.gain < 1.0
     # together with a place of its own it is as much a force as before
     elsewhere = ACROSS - LEVER * SETTING.scale["length"] * TURNING
-    other = estimated(linear, weight, reference, elsewhere)
+    nominal = replace(found.remainder, intermittent=tuple(elsewhere))
+    other = estimated(linear, weight, reference, nominal)
     assert other.gain > 20.0
 
 
@@ -158,7 +179,8 @@ def test_a_nominal_force_at_one_place_is_tested_on_the_nominal_campaign(asked):
     record, columns = straight.sailed(12), straight.columns_of(CAUSES)
     made = straight.campaign(record, straight.passed(record, columns), columns)
     grid = segments.grid(record)
-    assert intermittent.nominal_side_force(made, grid) == pytest.approx(2.0 * UNIT)
+    found = intermittent.nominal_side_force(made, grid)
+    assert found is not None and found.intermittent == pytest.approx(tuple(2.0 * UNIT))
     assert asked["weight"].sum() == 12.0
     assert intermittent.nominal_side_force(replace(made, weight=np.zeros(12)), grid) is None
     asked["gain"] = -1.0  # it acts in each channel by itself

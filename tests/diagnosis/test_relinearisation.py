@@ -35,7 +35,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, converged={}, first=None, fixed=()), asked
+    return SimpleNamespace(at=at, converged={}, first=None, fixed=(), on_board=dict), asked
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -115,10 +115,11 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
 
     trial.at = at
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
+    monkeypatch.setattr(evidence, "fit", fit)
     held = {"held": np.array([3.0])}
     trial.first = SimpleNamespace()
     _, alone = converge(trial, ("held",), held, None)
     assert alone.evidence == -np.inf and alone.numbers["held"] == [3.0]
     _, both = converge(trial, ("held", "x"), {**held, "x": np.array([4.0])}, None)
     assert both.evidence == 0.0
-    assert asked == [1.0] and set(seen) == {3.0}
+    assert asked[0] == 1.0 and set(seen) == {3.0}

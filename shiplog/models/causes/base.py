@@ -170,6 +170,11 @@ class Cause:
         causes does where they vary together: each by itself would vary by as much."""
         return self.nominal
 
+    def farthest(self, setting: Setting) -> float:
+        """How many times the first number the second one may be: it is a moment, of a force or a
+        mass that acts on the ship [m]."""
+        return math.inf
+
     @property
     def reads(self) -> bool:
         """Whether it changes what was recorded, and not the ship's motion."""

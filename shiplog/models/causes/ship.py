@@ -224,6 +224,9 @@ class Payload(Cause):
     def absorbed(self) -> bool:
         return True
 
+    def farthest(self, setting: Setting) -> float:
+        return 0.5 * setting.scale["length"]  # a load is on board
+
     def coefficients(self, c: dict, p: Any, state: Any, share: Any, at: dict) -> dict:
         return c | {"load.mass": p[0], "load.moment": p[1]}
 
