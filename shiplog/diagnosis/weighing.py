@@ -117,6 +117,7 @@ def weigh_as(table: Hypotheses, labels: tuple[str, ...], one: Hypothesis, fit: F
         return False
     numbers = {name: fit.found.numbers[name] for name in table.included(labels)}
     start = replace(fit, found=replace(fit.found, numbers=numbers))
+    table.trial.converged.pop((table.included(labels), one.remainder), None)  # begin there
     again = _fitted_with(table, labels, start, one.remainder)
     before = table.found.get((labels, one.kind))
     least = -math.inf if before is None else before.evidence + evidence.LITTLE_NATS
