@@ -95,7 +95,7 @@ class HeldOut(Rollouts):
     def gain(self, decision: Decision) -> Gain:
         return self.gain_between(self.losses_before, self.parts(self.states_after(decision)))
 
-    def felt(self, decision: Decision, one: Named) -> bool:
+    def changes_velocity(self, decision: Decision, one: Named) -> bool:
         """Whether a named cause itself changes the velocities that the windows compare. The clock
         of the position does not; numbers that are fitted together with it may."""
         present = self.parts(self.states_after(decision))

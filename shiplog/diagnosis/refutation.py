@@ -48,7 +48,7 @@ class Judge(Protocol):
         """Of a decision over one with a cause less."""
         ...
 
-    def felt(self, decision: Decision, one: Named) -> bool:
+    def changes_velocity(self, decision: Decision, one: Named) -> bool:
         """Whether the cause itself changes what is compared."""
         ...
 
@@ -77,11 +77,12 @@ def _why_in_doubt(
 
 
 def _refuted(
-    asked: Sequence[tuple[Named, Gain]], felt: Callable[[Named], bool]
+    asked: Sequence[tuple[Named, Gain]], changes_velocity: Callable[[Named], bool]
 ) -> tuple[frozenset[str], str] | None:
-    """Of causes whose whole interval is a loss, and that are `felt`, the one whose loss is most
-    certain, and why; together with another one from which it is hard to separate."""
-    worse = [pair for pair in asked if pair[1].high < 0.0 and felt(pair[0])]
+    """Of causes whose whole interval is a loss, and that change the velocities themselves, the one
+    whose loss is most certain, and why; together with another one from which it is hard to
+    separate."""
+    worse = [pair for pair in asked if pair[1].high < 0.0 and changes_velocity(pair[0])]
     if not worse:
         return None
     one, worth = min(worse, key=lambda pair: pair[1].high)
@@ -139,8 +140,8 @@ def judged(
             ]
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
-        felt = partial(held.felt, decision)
-        if refutable := _refuted(asked, felt) or _unproved(asked, first):
+        itself = partial(held.changes_velocity, decision)
+        if refutable := _refuted(asked, itself) or _unproved(asked, first):
             names, why = refutable
             bans[names] = why
             search.without(*names)

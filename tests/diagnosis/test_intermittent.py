@@ -107,6 +107,28 @@ def test_forces_at_one_place_are_found_there(reference):
     assert quiet.gain < 3.0
 
 
+def test_a_force_lasts_as_long_as_was_drawn(reference):
+    """Twice and half the usual time, of a force that is large next to the noise."""
+    unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
+    record = straight.sailed(4 * COUNT)
+    knots, usual = segments.grid(record).knots, PROCESS_NOISE.intermittent_time
+    for lasts in (0.5, 2.0):
+        alone = replace(
+            PROCESS_NOISE, acceleration=1e-6 * PROCESS_NOISE.acceleration,
+            intermittent=20.0 * unit, intermittent_time=lasts * usual,
+        )  # fmt: skip
+        drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * knots))
+        pushed = drawn @ np.linalg.cholesky(alone.kernel(knots)).T
+        linear = straight.passed(record, straight.columns_of(()), accelerations=pushed, seed=5)
+        found = estimated(linear, np.ones(4 * COUNT), reference)
+        assert found.lasts == pytest.approx(lasts, rel=0.4)
+        assert found.force == pytest.approx(20.0, rel=0.2)
+        assert found.remainder.force_lasts == found.lasts
+        in_noise = found.remainder.in_noise(PROCESS_NOISE)
+        assert in_noise.intermittent_time == pytest.approx(found.lasts * usual)
+        assert in_noise.time == PROCESS_NOISE.time
+
+
 def test_noise_that_is_raised_in_two_channels_is_no_force_at_one_place(reference):
     """Raised in sway and yaw, independently of each other, and nominal in surge."""
     record = straight.sailed(COUNT)

@@ -32,7 +32,7 @@ class HeldOut:
         assert len(self.asked) < 20, "it never ends"
         return gain(*self.gains[labels])
 
-    def felt(self, decision, one):
+    def changes_velocity(self, decision, one):
         return one.cause.label not in self.hidden
 
     def worth(self, rest, decision):

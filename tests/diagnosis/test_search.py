@@ -296,6 +296,45 @@ def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_n
     assert one.evidence > raised.evidence + 5.0
 
 
+def test_a_family_that_explains_a_tenth_of_raised_noise_gains_so_many_nats():
+    """N values of variance λ²: their log likelihood over ln λ is that of a Gaussian, and a tenth
+    of the raised part less variance is worth that share of N/2 nats."""
+    count, factor = 2000.0, 3.0
+    levels = [
+        evidence.Level(noise, np.eye(1), np.eye(1), np.zeros(1),
+                       -count * math.log(noise) - 0.5 * count * (factor / noise) ** 2)
+        for noise in (factor / 1.02, factor, factor * 1.02, 1.0)
+    ]  # fmt: skip
+    rough = weighing.Rough(None, weighing.RAISING, levels)
+    assert rough.observations == pytest.approx(count, rel=0.01)
+    share = 0.1 * (1.0 - 1.0 / factor**2)
+    assert rough.spectrum() == pytest.approx(-0.5 * count * math.log(1.0 - share), rel=0.01)
+    nominal = weighing.Rough(None, weighing.RAISING, [replace(levels[0], noise_factor=1.0)])
+    assert nominal.spectrum() == 0.0
+
+
+def test_a_set_with_one_cause_less_is_fitted_again_with_the_same_noise():
+    """Its own noise was less probable, so what it lacks is no evidence for the cause."""
+    trial, point = trial_with({"drag": [1.2]}, accelerations=raised_noise())
+    found = search_of(trial, point)
+    found.run()
+    kept = {k: h for k, h in found.table.found.items() if k[0] in (("drag",), ("drag", "load"))}
+    best = replace(kept[("drag",), RAISED], causes=("drag", "load"))
+    wrong = replace(best.remainder, channels=(9.0, 1.0, 1.0), noise_lasts=4.0)
+    lost = {"evidence": best.evidence - 50.0, "score": best.score - 50.0}
+    before = replace(kept[("drag",), RAISED], remainder=wrong, **lost)
+    found.table.found[("drag",), RAISED] = before
+    fit = found.table.fit(replace(best, causes=("drag",)))
+    shaped = replace(best, remainder=replace(best.remainder, channels=(3.2, 3.2, 3.3)))
+    assert weighing.weigh_as(found.table, ("drag",), shaped, fit)
+    again = found.table.found[("drag",), RAISED]
+    assert again.remainder == shaped.remainder
+    assert again.evidence == pytest.approx(best.evidence, abs=15.0)
+    assert not weighing.weigh_as(found.table, ("drag",), shaped, fit)  # it gains no more
+    plain = replace(best, remainder=Remainder(RAISED))
+    assert not weighing.weigh_as(found.table, ("drag",), plain, fit)
+
+
 @pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
 def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
     gain, noisy, monkeypatch

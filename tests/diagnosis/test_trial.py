@@ -10,7 +10,7 @@ import straight
 from dense_trial import DRAG, SHARE, gaussian, level, nats, of_noise
 from straight import PROCESS_NOISE
 
-from shiplog.diagnosis import campaign_parts, evidence, fits
+from shiplog.diagnosis import bounds, campaign_parts, evidence, fits
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.parameter_layout import HELD_INFORMATION
 from shiplog.diagnosis.remainder import NOMINAL, Remainder
@@ -248,3 +248,31 @@ def test_stretches_of_one_segment_have_nothing_between_their_segments(made):
     given = straight.passed(record, nominal.reference.columns)
     trial = straight.trial(nominal, record, given)
     assert trial.covering(trial.first) is trial.first.linear
+
+
+def test_a_moment_is_no_larger_than_its_mass_can_make_it(trial, monkeypatch):
+    """A load of 2 kg, 1.5 m from midship at most; other causes stay as they are."""
+    monkeypatch.setattr(type(trial), "farthest", lambda _, name: 1.5 if name == "two" else math.inf)
+    numbers = {"two": np.array([-2.0, 7.0]), "drag": np.array([9.0])}
+    kept = trial.on_board(numbers)
+    assert kept["two"].tolist() == [-2.0, 3.0] and kept["drag"].tolist() == [9.0]
+    assert numbers["two"].tolist() == [-2.0, 7.0]
+    assert trial.on_board({"two": np.array([2.0, 2.0])})["two"].tolist() == [2.0, 2.0]
+
+
+def test_what_is_beyond_the_ship_costs_evidence_and_is_moved(trial, monkeypatch):
+    """Evidence falls by the share of the posterior that is on board, over that of the prior."""
+    monkeypatch.setattr(type(trial), "farthest", lambda _, name: math.inf)
+    point, included = trial.at({}), ("two",)
+    free = evidence.level(trial, point, 1.0, included)
+    mean, covariance = evidence.numbers_of(trial, free, point, included)
+    (first, second), size = mean["two"], trial.reference.columns.unit[
+        trial.reference.columns.of["two"]
+    ]  # fmt: skip
+    farthest = 0.5 * abs(second / first)
+    monkeypatch.setattr(type(trial), "farthest", lambda _, name: farthest)
+    bound = evidence.level(trial, point, 1.0, included)
+    wanted = bounds.log_on_board(np.array([first, second]), covariance, size, farthest)
+    assert bound.value - free.value == pytest.approx(wanted)
+    moved, _ = evidence.numbers_of(trial, bound, point, included)
+    assert abs(moved["two"][1]) == pytest.approx(farthest * abs(moved["two"][0]))

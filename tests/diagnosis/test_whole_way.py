@@ -184,8 +184,8 @@ def test_windows_feel_a_current_and_not_the_clock_of_the_position(sea):
     late = replace(current, cause=by[clock], numbers=found.numbers[clock])
     joint = replace(decision, fit=Fit(point, found, Remainder()), named=(current, late))
     assert abs(found.numbers[clock]).max() > 0.0
-    assert sea.done.held.felt(joint, current)
-    assert not sea.done.held.felt(joint, late)
+    assert sea.done.held.changes_velocity(joint, current)
+    assert not sea.done.held.changes_velocity(joint, late)
 
 
 def test_the_manoeuvre_that_separates_is_the_seamans(sea):
