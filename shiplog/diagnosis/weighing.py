@@ -42,12 +42,16 @@ class Rough:
     def observations(self) -> float:
         """How many independent values the process noise was estimated from: the curvature of the
         log evidence over the logarithm of the noise is twice that."""
-        at = {math.log(one.noise_factor): one.value for one in self.levels}
-        top = math.log(self.best.noise_factor)
-        near = sorted(at, key=lambda log_noise: abs(log_noise - top))[:3]
+        top, apart = math.log(self.best.noise_factor), 0.5 * math.log(evidence.FINE_STEP)
+        at = {math.log(one.noise_factor) - top: one.value for one in self.levels}
+        near = [0.0]  # and those nearest to it; a level may have been computed twice, but for
+        for noise in sorted(at, key=abs):  # rounding
+            if min(abs(noise - other) for other in near) > apart:
+                near.append(noise)
         if len(near) < 3:
             return 0.0
-        return max(-float(np.polyfit(near, [at[n] for n in near], 2)[0]), 0.0)
+        parabola = np.polyfit(near[:3], [at[noise] for noise in near[:3]], 2)
+        return max(-float(parabola[0]), 0.0)
 
     def spectrum(self) -> float:
         """Nats that a family gains where it explains the share `SPECTRUM` of the raised noise."""
