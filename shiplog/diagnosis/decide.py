@@ -12,7 +12,7 @@ from shiplog.diagnosis import fits, thresholds
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.hypotheses import Hypotheses
-from shiplog.diagnosis.hypothesis import Hypothesis, name_of
+from shiplog.diagnosis.hypothesis import Hypothesis, form_error_of, name_of
 from shiplog.diagnosis.posterior import FAMILY, STOCHASTIC, Posterior
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, Remainder
 from shiplog.diagnosis.result import (
@@ -133,7 +133,7 @@ def _named(
             continue
         assert best.found.covariance is not None
         numbers = np.asarray(best.found.numbers[label])
-        form = thresholds.FORM_ERROR * numbers  # its equations are no better than that
+        form = form_error_of(by[label]) * numbers  # its equations are no better than that
         unit = by[label].unit_error * numbers  # one error of all numbers of the cause
         given.append(
             Named(

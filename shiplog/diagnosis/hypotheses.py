@@ -75,7 +75,8 @@ class Hypotheses:
     def score(self, evidence: float, labels: Sequence[str], kind: str) -> float:
         """Log posterior, in nats, up to a constant."""
         misfit = sum(self.placebo.get(n, 0.0) for n in labels) + self.placebo.get(kind, 0.0)
-        return evidence + self.priors.of(labels, kind) - misfit - form_error(self.alone, labels)
+        allowance = form_error(self.alone, labels, self.by)
+        return evidence + self.priors.of(labels, kind) - misfit - allowance
 
     def put(
         self,

@@ -90,12 +90,19 @@ class Priors:
         return self.causes(labels) + self.kinds[kind]
 
 
-def form_error(alone: Mapping[str, float], labels: Sequence[str]) -> float:
-    """Allowance, in nats, for further causes that imitate the form error of the strongest one.
+def form_error_of(cause: Cause) -> float:
+    """Share of its force or reading that a cause's equations may leave wrong."""
+    return max(thresholds.FORM_ERROR, cause.form_error)
+
+
+def form_error(alone: Mapping[str, float], labels: Sequence[str], by: Mapping[str, Cause]) -> float:
+    """Allowance, in nats, for further causes that imitate the form error of another one: of the one
+    that leaves most.
 
     alone   log Bayes factor of each cause by itself, over no cause
+    by      label → cause
     """
     if len(labels) < 2:
         return 0.0
-    first = max((alone.get(label, 0.0) for label in labels), default=0.0)
-    return thresholds.FORM_ERROR**2 * max(first, 0.0) * (len(labels) - 1)
+    left = (form_error_of(by[n]) ** 2 * alone.get(n, 0.0) for n in labels)
+    return max(0.0, *left) * (len(labels) - 1)

@@ -62,9 +62,12 @@ def test_causes_of_one_name_share_that_names_prior():
 def test_what_a_form_leaves_over_by_hand():
     alone = {"drag": 300.0, "load": 40.0, "two": -5.0}
     share = thresholds.FORM_ERROR**2  # nats go with the square of a force
-    assert form_error(alone, ()) == form_error(alone, ("drag",)) == 0.0
-    assert form_error(alone, ("drag", "load")) == pytest.approx(300.0 * share)
-    assert form_error(alone, ("load", "drag")) == pytest.approx(300.0 * share)
-    assert form_error(alone, ("load", "two")) == pytest.approx(40.0 * share)
-    assert form_error(alone, ("drag", "load", "two")) == pytest.approx(2 * 300.0 * share)
-    assert form_error(alone, ("two", "unseen")) == 0.0  # nothing was explained
+    by = {cause.label: cause for cause in CAUSES} | {"unseen": CAUSES[0]}
+    assert form_error(alone, (), by) == form_error(alone, ("drag",), by) == 0.0
+    assert form_error(alone, ("drag", "load"), by) == pytest.approx(300.0 * share)
+    assert form_error(alone, ("load", "drag"), by) == pytest.approx(300.0 * share)
+    assert form_error(alone, ("load", "two"), by) == pytest.approx(40.0 * share)
+    assert form_error(alone, ("drag", "load", "two"), by) == pytest.approx(2 * 300.0 * share)
+    assert form_error(alone, ("two", "unseen"), by) == 0.0  # nothing was explained
+    by["load"] = type("Coarse", (One,), {"form_error": 0.2})("load")  # more than drag leaves
+    assert form_error(alone, ("drag", "load"), by) == pytest.approx(40.0 * 0.04)

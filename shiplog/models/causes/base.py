@@ -135,6 +135,7 @@ class Cause:
     user: ClassVar[bool] = False
     shifts: ClassVar[bool] = False  # the motion in time: what it changes is a derivative
     unit_error: ClassVar[float] = 0.0  # share by which the unit of its numbers may be wrong
+    form_error: ClassVar[float] = 0.0  # share of its force that its equations may leave wrong
     forms: ClassVar[int] = 0  # of its equations, factors that are uncertain: `FORM_SPREAD`
 
     @property

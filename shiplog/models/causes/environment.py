@@ -118,6 +118,10 @@ class WindForce(Cause):
         )
 
 
+# Share of the force of a bank or of shallow water, that is left wrong with the uncertain factors of
+# their equations fitted: a map of a dozen places, or a straight wall, is not the ground itself.
+COARSE = 0.2
+
 # What grows in shallow water, by how much per unit of the map. Y_v, N_v and N_r are of a full ship
 # by the formulas of Kijima et al. 1990, the others are estimates.
 GROWS = (
@@ -153,6 +157,7 @@ class ShallowWater(Cause):
     separated_by = {"cross_flow_drag": "the same manoeuvre at two places"}
 
     forms = len(GROWS) - 1
+    form_error = COARSE
 
     @property
     def count(self) -> int:
@@ -219,6 +224,7 @@ class Bank(Cause):
     separated_by = {"shallow_water": "the same run farther from the bank"}
 
     forms = 2
+    form_error = COARSE
 
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         banks = setting.profile.site.banks
