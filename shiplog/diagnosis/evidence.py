@@ -195,7 +195,7 @@ def _with(trial: Trial, one: Level, label: str) -> Found:
     low, high = (bound / unit for bound in trial.bounds(label))
     gained += bounds.log_share(value, _deviation(left), np.ones(len(unit)), low, high)
     farthest = trial.farthest(label) * unit[0] / unit[-1]
-    if np.isfinite(farthest):
+    if math.isfinite(farthest):
         gained += bounds.log_on_board(value, left, np.ones(len(unit)), farthest)
         value = bounds.on_board(value, left, farthest)
     value = bounds.within(value, left, low, high)

@@ -21,6 +21,7 @@ from shiplog.voyages.timescale import BIN, KNOT
 # Of the noise's variance, that may be coloured.
 COLOURED_SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)
 FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
+INTERMITTENT_TIME_S = 12.0  # s, of an intermittent force on a three-metre ship: several bins
 LEAP = 16.0  # steps at once, at most
 ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it
 LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
@@ -45,7 +46,7 @@ class ProcessNoise:
     time: float
     start: np.ndarray
     intermittent: np.ndarray | None = None
-    intermittent_time: float = 12.0
+    intermittent_time: float = INTERMITTENT_TIME_S
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
     bin: float = BIN

@@ -38,7 +38,6 @@ ON_THE_WAY, AT_REST = 2, 3  # rounds in which instrument and process noise are e
 FIRST_NOISE = 0.04  # of the acceleration that a path may have: process noise before it is estimated
 FREE = 2.0  # times the process noise: the allowed acceleration at a path's nodes
 PROCESS_NOISE_TIME_S = 4.0  # s, of a three-metre ship
-INTERMITTENT_TIME_S = 12.0  # the same of an intermittent force: one is on for several bins
 FIRST_SIZE = 1.0  # of a family's weights, in units of the process noise
 LEAST_SIZE = 0.01  # the same: a model without discrepancy has none of it
 SIZE_STEPS = 3  # of expectation-maximisation, of these sizes, each time
@@ -156,7 +155,7 @@ class _Campaign:
         begin = ProcessNoise(
             wide.noise, FIRST_NOISE * wide.acceleration, PROCESS_NOISE_TIME_S * of.factor,
             wide.start, bin=of.bin, knot=of.knot,
-            intermittent_time=INTERMITTENT_TIME_S * of.factor,
+            intermittent_time=likelihood.INTERMITTENT_TIME_S * of.factor,
         )  # fmt: skip
         found = discrepancy.of(
             record.profile, begin.acceleration, columns.linearised, seen,

@@ -25,8 +25,8 @@ AWAY = 1e4  # m, m/s or rad, that no ship is off in half a minute
 LOST_NATS = 10.0  # of the numbers' log density: a step that loses more may be rejected
 MOST_HALVINGS = 3  # of one step, at most
 LEFT = 0.2  # standard deviations: expected distance from the optimum, at which a fit has converged
-# Of convergence, until two steps give it: length of a step over that of the last one. Lags and
-# clocks reach 0.8; with this, a first step of more than half a standard deviation is not the last.
+# Of convergence, until two steps give it: length of a step over that of the last one. A clock may
+# reach 0.8; with this, a first step of more than half a standard deviation is not the last one.
 RATE = 0.3
 STEADY = 0.05  # of the logarithm of the process noise, from one round to the next: converged
 

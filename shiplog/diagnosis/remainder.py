@@ -46,6 +46,12 @@ class Remainder:
         return self.channels, self.noise_lasts, self.intermittent, self.force_lasts
 
     @property
+    def lasts(self) -> float:
+        """Factor of the correlation time that is estimated: that of an intermittent force, else
+        that of the process noise, whose part at one place lasts longer with it."""
+        return self.force_lasts if self.kind == INTERMITTENT else self.noise_lasts
+
+    @property
     def shaped(self) -> bool:
         return self.shape != Remainder().shape
 
@@ -92,6 +98,7 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     square, cost = by_channel @ by_channel, math.log(RAISED_SPREAD / nominal)
     if not remainder.shaped:  # one number for all three
         return float(-0.5 * square / len(by_channel) - cost)
-    times = np.log([t for t in (remainder.noise_lasts, remainder.force_lasts) if t != 1.0])
-    square += float(times @ times) / TIME_SPREAD**2
-    return float(-0.5 * square - (SHAPE_NUMBERS + len(times)) * cost)
+    if remainder.lasts == 1.0:
+        return float(-0.5 * square - SHAPE_NUMBERS * cost)
+    square += (math.log(remainder.lasts) / TIME_SPREAD) ** 2
+    return float(-0.5 * square - (SHAPE_NUMBERS + 1) * cost)

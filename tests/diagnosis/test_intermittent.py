@@ -16,7 +16,7 @@ from shiplog.diagnosis import (
     unrecorded_thruster,
 )
 from shiplog.diagnosis.intermittent import of_one_device
-from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 COUNT = 24
@@ -256,3 +256,13 @@ def test_a_force_that_merely_varies_is_none():
         assert of_one_device(force, np.full(force.shape, 0.3)) == 0.0
     unmeasured = np.full(varies.shape, 2.0)
     assert of_one_device(0.2 * varies, unmeasured) == 0.0
+
+
+def test_noise_at_one_place_lasts_longer_with_the_others_and_counts_once():
+    """The prior of a correlation time is that of one number, whether part acts at one place."""
+    plain = Remainder(RAISED, channels=(2.0, 3.0, 2.0), noise_lasts=3.0)
+    partly = replace(plain, intermittent=(0.0, 0.01, 0.004), force_lasts=1.5)
+    usual = replace(plain, noise_lasts=1.0)
+    assert noise_prior(1.0, 0.2, partly) == noise_prior(1.0, 0.2, plain)
+    cost = 0.5 * np.log(3.0) ** 2 + np.log(1.0 / 0.2)
+    assert noise_prior(1.0, 0.2, usual) - noise_prior(1.0, 0.2, plain) == pytest.approx(cost)

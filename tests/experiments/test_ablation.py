@@ -27,6 +27,8 @@ from shiplog.diagnosis import (
     thresholds,
     trial_voyages,
 )
+from shiplog.diagnosis.hypothesis import form_error_of
+from shiplog.models.causes import CATALOGUE
 
 
 @pytest.fixture
@@ -103,3 +105,12 @@ def test_a_fit_without_the_discrepancy_is_not_that_of_the_cache(monkeypatch):
     with ExitStack() as stack:
         without.PARTS["discrepancy"](stack)
         assert nominal_cache.converged("model", "record") == (("model", "record"), ())
+
+
+def test_without_form_errors_no_cause_has_one():
+    coarse = [cause for cause in CATALOGUE if cause.form_error]
+    assert {cause.name for cause in coarse} == {"bank", "shallow_water"}
+    with ExitStack() as stack:
+        without.PARTS["form-error"](stack)
+        assert {form_error_of(cause) for cause in CATALOGUE} == {0.0}
+    assert {form_error_of(cause) for cause in coarse} == {0.2}

@@ -44,6 +44,7 @@ from shiplog.diagnosis import (
     voyage_effects,
 )
 from shiplog.diagnosis.hypotheses import Hypotheses
+from shiplog.models.causes import CATALOGUE
 
 
 def _no_placebo(stack: ExitStack) -> None:
@@ -53,6 +54,8 @@ def _no_placebo(stack: ExitStack) -> None:
 
 def _no_form_error(stack: ExitStack) -> None:
     stack.enter_context(patch.object(thresholds, "FORM_ERROR", 0.0))
+    for coarse in {type(cause) for cause in CATALOGUE if cause.form_error}:
+        stack.enter_context(patch.object(coarse, "form_error", 0.0))
 
 
 def _no_discrepancy(stack: ExitStack) -> None:
