@@ -102,7 +102,7 @@ def converge(
                 break
             halvings, damping = halvings + 1, 0.5 * damping
             half = _half_way(numbers, last.point.numbers if last else None, free[-1])
-            numbers = trial.on_board(half)
+            numbers = trial.clipped(half)
             continue
         converged = here.converged(last, damping)
         settled = lately is not None and abs(math.log(base.noise_factor / lately)) < STEADY
@@ -112,7 +112,7 @@ def converge(
         if best is None or base.density >= best.base.density:
             best = here
         near, noise_factor = point, base.noise_factor
-        numbers = trial.on_board(_towards(base.numbers, point.numbers, damping))
+        numbers = trial.clipped(_towards(base.numbers, point.numbers, damping))
         lately = noise_factor
         if not all(np.isfinite(values).all() for values in numbers.values()):
             return point, replace(base, name="+".join(included), evidence=-np.inf)

@@ -150,8 +150,8 @@ class Trial:
         """As `Cause.farthest` of this ship."""
         return self._cause(label).farthest(self.reference.setting)
 
-    def on_board(self, numbers: Numbers) -> Numbers:
-        """These numbers, each moment as large as its force or mass can make it at most."""
+    def clipped(self, numbers: Numbers) -> Numbers:
+        """These numbers, each moment clipped to the largest that its force or mass can make."""
         found = dict(numbers)
         for label, values in numbers.items():
             farthest = self.farthest(label)

@@ -35,7 +35,7 @@ def fits(monkeypatch, function, slope) -> tuple[Any, list[float]]:
 
     monkeypatch.setattr(evidence, "fit", fit)
     monkeypatch.setattr(evidence, "scan", lambda *given, **_: (fit(*given), []))
-    return SimpleNamespace(at=at, converged={}, first=None, fixed=(), on_board=dict), asked
+    return SimpleNamespace(at=at, converged={}, first=None, fixed=(), clipped=dict), asked
 
 
 def test_what_is_linear_takes_one_step(monkeypatch):
@@ -98,7 +98,8 @@ def test_steps_that_get_shorter_slowly_go_on_until_little_is_left(monkeypatch):
 
 def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
     """Where the model diverges with them alone there is no fit; where it diverges with another
-    cause too, that one is halved until it holds: 4, 2, 1."""
+    cause too, that one is halved until it holds: 4, 2, 1. From there to the best, 0, its steps are
+    damped: by a quarter, which two halvings left, then by a half."""
     trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
     trial.fixed = ("held",)
     seen, plain = [], trial.at
@@ -122,4 +123,4 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
     assert alone.evidence == -np.inf and alone.numbers["held"] == [3.0]
     _, both = converge(trial, ("held", "x"), {**held, "x": np.array([4.0])}, None)
     assert both.evidence == 0.0
-    assert asked[0] == 1.0 and set(seen) == {3.0}
+    assert asked == [1.0, 0.75, 0.375] and set(seen) == {3.0}

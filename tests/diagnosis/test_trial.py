@@ -254,10 +254,10 @@ def test_a_moment_is_no_larger_than_its_mass_can_make_it(trial, monkeypatch):
     """A load of 2 kg, 1.5 m from midship at most; other causes stay as they are."""
     monkeypatch.setattr(type(trial), "farthest", lambda _, name: 1.5 if name == "two" else math.inf)
     numbers = {"two": np.array([-2.0, 7.0]), "drag": np.array([9.0])}
-    kept = trial.on_board(numbers)
+    kept = trial.clipped(numbers)
     assert kept["two"].tolist() == [-2.0, 3.0] and kept["drag"].tolist() == [9.0]
     assert numbers["two"].tolist() == [-2.0, 7.0]
-    assert trial.on_board({"two": np.array([2.0, 2.0])})["two"].tolist() == [2.0, 2.0]
+    assert trial.clipped({"two": np.array([2.0, 2.0])})["two"].tolist() == [2.0, 2.0]
 
 
 def test_what_is_beyond_the_ship_costs_evidence_and_is_moved(trial, monkeypatch):
