@@ -73,8 +73,9 @@ def converge(
     """These causes together, linearised again until their numbers converge.
 
     They start from where an earlier fit of them converged, if there was one. A step is rejected,
-    too, if the evidence is then below the `lowest` that is possible. A fit that does not converge
-    has the evidence of the most probable numbers that it met.
+    too, if the evidence is below the `lowest` that is possible, about a path that the process noise
+    found there allows. A fit that does not converge has the evidence of the most probable numbers
+    that it met.
     """
     # where each channel has a factor of its own the common one stays near 1; an intermittent force
     # is estimated together with the nominal process noise, which is then kept
@@ -92,7 +93,12 @@ def converge(
     for _ in range(RELINEARISATIONS):
         try:
             point = trial.at(numbers, near, noise_factor, remainder)
-            base = _fitted(trial, point, included, remainder, lately, steady, lowest)
+            base = _fitted(trial, point, included, remainder, lately, steady)
+            if base.evidence < lowest:
+                if abs(math.log(base.noise_factor / noise_factor)) < STEADY:
+                    raise np.linalg.LinAlgError("a step too far")
+                near, noise_factor = point, base.noise_factor  # too firm a path, with any numbers
+                continue
             here = _Iterate(point, base, _length(point, base, included))
             if last is not None and here.rejected(last):
                 raise np.linalg.LinAlgError("a step too far")
@@ -149,17 +155,14 @@ def _length(point: Point, base: Found, included: Sequence[str]) -> float:
 
 def _fitted(
     trial: Trial, point: Point, included: Sequence[str], remainder: Remainder,
-    lately: float | None, steady: bool, lowest: float,
+    lately: float | None, steady: bool,
 ) -> Found:  # fmt: skip
-    """The hypothesis at a point. Raises np.linalg.LinAlgError where the step there went too far."""
+    """The hypothesis at a point. Raises np.linalg.LinAlgError where the path diverged."""
     if np.abs(point.linear.e).max() > AWAY:
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
-        base = evidence.fit(trial, point, included, lately, remainder)
-    else:
-        base, _ = evidence.scan(trial, point, (), included, lately, remainder)
-    if base.evidence < lowest:
-        raise np.linalg.LinAlgError("a step too far")
+        return evidence.fit(trial, point, included, lately, remainder)
+    base, _ = evidence.scan(trial, point, (), included, lately, remainder)
     return base
 
 

@@ -124,3 +124,32 @@ def test_numbers_that_the_model_has_already_are_never_halved(monkeypatch):
     _, both = converge(trial, ("held", "x"), {**held, "x": np.array([4.0])}, None)
     assert both.evidence == 0.0
     assert asked == [1.0, 0.75, 0.375] and set(seen) == {3.0}
+
+
+@pytest.mark.parametrize(("noise", "converges"), [(4.0, True), (1.0, False)])
+def test_a_path_that_nominal_noise_holds_too_firmly_refutes_no_numbers(
+    monkeypatch, noise, converges
+):
+    """Of noise 4 times the nominal one, the first path leaves 100 nats less, with any numbers. The
+    next one is as that noise allows, and nothing is halved. Where the noise is nominal, the numbers
+    are too far off, and are halved until there are no halvings left."""
+    trial, asked = fits(monkeypatch, lambda x: x, lambda x: 1.0)
+    plain, held = trial.at, []
+
+    def at(numbers, near, noise_factor, remainder):
+        held.append(noise_factor)
+        return plain(numbers)
+
+    def scan(_trial, point, *_, **__):
+        density = 0.0 if held[-1] == 4.0 else -100.0
+        return Found("", density, noise, point.numbers, np.eye(1), density=density), []
+
+    trial.at, trial.first = at, SimpleNamespace()
+    monkeypatch.setattr(evidence, "scan", scan)
+    monkeypatch.setattr(evidence, "fit", lambda *given: scan(*given)[0])
+    _, found = converge(trial, ("x",), {"x": np.array([1.0])}, None, lowest=-50.0)
+    assert np.isfinite(found.evidence) == converges
+    if converges:
+        assert held[:2] == [1.0, 4.0] and set(asked) == {1.0}
+    else:
+        assert set(held) == {1.0} and asked == [1.0, 0.5, 0.25, 0.125]
