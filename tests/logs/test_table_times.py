@@ -66,6 +66,16 @@ def test_a_time_of_day_goes_on_past_midnight():
     assert found.diff().to_list()[1] == 10**9
 
 
+@pytest.mark.parametrize(
+    "before", [[], ["23:59:58.0"]], ids=["begins at midnight", "the day before"]
+)
+def test_a_late_row_from_before_midnight_moves_no_later_row_by_a_day(before):
+    rows = [*before, "00:00:00.2", "23:59:59.8", "00:00:00.4", "06:00:00.0", "20:00:00.0"]
+    found = clock.instants(pl.Series("t", rows)).to_numpy()[-5:] * 1e-9
+    wanted = [0.2, -0.2, 0.4, 6 * 3600.0, 20 * 3600.0]  # a gap of 14 h is one
+    assert found - found[0] == pytest.approx(np.array(wanted) - wanted[0], abs=1e-6)
+
+
 NMEA_DAY = [124758.5, 124759.5, 124800.5, 124801.5]
 
 

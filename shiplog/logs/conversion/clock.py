@@ -13,6 +13,7 @@ from shiplog.logs import fields
 from shiplog.units import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
+LATEST_NS = 3600 * SECOND_NS  # no row comes later than that
 LONGEST_STEP_S = 60.0  # no ship's motion is recorded more slowly: the numbers are not seconds
 # A date must come whole: "3/4/2024" is two days, and only the other rows can say which.
 DATE_FORMATS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%Y%m%d", "%d%m%y")
@@ -70,10 +71,12 @@ def dates(values: pl.Series, form: str | None = None) -> pl.Series:
 def past_midnight(of_day: pl.Series) -> pl.Series:
     """Times of day [ns] that go on counting past midnight.
 
-    Half a day back is a midnight: a step back by less is a late row, and stays one.
+    Half a day back is a midnight: a step back by less is a late row, and stays one. Almost a day on
+    is a late row from before midnight.
     """
-    rises = (of_day.forward_fill().diff().fill_null(0) < -DAY_NS // 2).cast(pl.Int64).cum_sum()
-    return of_day + rises * DAY_NS
+    step = of_day.forward_fill().diff().fill_null(0)
+    days = (step < -DAY_NS // 2).cast(pl.Int64) - (step > DAY_NS - LATEST_NS).cast(pl.Int64)
+    return of_day + days.cum_sum() * DAY_NS
 
 
 def number_of(texts: pl.Series) -> pl.Series:
