@@ -6,7 +6,9 @@ probabilities are those of the hypotheses that do not contain it. Its gain is th
 names, whose numbers are fitted again. If one of them is an alias in the catalogue
 (`separated_by`), either may do the work of both: only the two together are refuted. The windows
 compare velocities. What does not itself change them, as the clock of the position, they cannot
-refute: the loss is that of other numbers.
+refute: the loss is that of other numbers. Nor do they refute a force or a property of the ship next
+to an unrecorded thruster. They lack its force; the helm answers it, and a rudder that is too weak
+would make up for it. The likelihood has the force in its noise.
 
 With a remainder the noise is not that of the likelihood, and a log Bayes factor is no proof. Causes
 are then named only if the interval of their joint gain lies above zero. A remainder so slight that
@@ -34,6 +36,7 @@ from shiplog.diagnosis.result import Decision, Named
 from shiplog.diagnosis.search import Search
 from shiplog.simulation.error_reduction import Gain
 
+SENSOR = "sensor"  # of a cause's kinds: it does not change how the ship moves
 TAKES_A_PLACE = "held-out voyages refute what is more probable"
 
 
@@ -76,13 +79,18 @@ def _why_in_doubt(
     return ""
 
 
+def _judges(held: Judge, decision: Decision, one: Named) -> bool:
+    """Whether held-out windows can refute this cause."""
+    lack_force = decision.side_force is not None and one.cause.kind != SENSOR
+    return not lack_force and held.changes_velocity(decision, one)
+
+
 def _refuted(
-    asked: Sequence[tuple[Named, Gain]], changes_velocity: Callable[[Named], bool]
+    asked: Sequence[tuple[Named, Gain]], judges: Callable[[Named], bool]
 ) -> tuple[frozenset[str], str] | None:
-    """Of causes whose whole interval is a loss, and that change the velocities themselves, the one
-    whose loss is most certain, and why; together with another one from which it is hard to
-    separate."""
-    worse = [pair for pair in asked if pair[1].high < 0.0 and changes_velocity(pair[0])]
+    """Of causes whose whole interval is a loss, and that the windows can judge, the one whose loss
+    is most certain, and why; together with another one from which it is hard to separate."""
+    worse = [pair for pair in asked if pair[1].high < 0.0 and judges(pair[0])]
     if not worse:
         return None
     one, worth = min(worse, key=lambda pair: pair[1].high)
@@ -140,8 +148,8 @@ def judged(
             ]
             worths = [held.worth(rest, decision) for rest in reduced]
         asked = list(zip(decision.named, worths, strict=True))
-        itself = partial(held.changes_velocity, decision)
-        if refutable := _refuted(asked, itself) or _unproved(asked, first):
+        judges = partial(_judges, held, decision)
+        if refutable := _refuted(asked, judges) or _unproved(asked, first):
             names, why = refutable
             bans[names] = why
             search.without(*names)

@@ -23,7 +23,7 @@ FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without eff
 RAISED_FROM = 1.2
 RAISING = Remainder(RAISED)
 NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
-FORCE_ROUNDS = 2  # of fitting an intermittent force and numbers in turn
+FORCE_ROUNDS = 5  # of fitting an intermittent force and numbers in turn, at most
 
 
 @dataclass(frozen=True)
@@ -265,13 +265,17 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
     assert most is not None
     if raised.score < most.score - SEARCH_NATS:
         return
-    fit, before, rounds = table.fit(raised), table.best_of(INTERMITTENT), FORCE_ROUNDS
+    fit, before, last = table.fit(raised), table.best_of(INTERMITTENT), -math.inf
     if before is not None:
-        fit, rounds = _fitted_with(table, labels, fit, before.remainder), 1
-    for _ in range(rounds):
+        fit = _fitted_with(table, labels, fit, before.remainder)
+        last = fit.found.evidence
+    for _ in range(FORCE_ROUNDS):
         if fit.diverged:  # nor is there anything left of it that a force could explain
             return
         tried = table.intermittent(fit)
         fit = _fitted_with(table, labels, fit, tried.remainder)
+        if fit.found.evidence < last + SEARCH_NATS:
+            break
+        last = fit.found.evidence
     if tried.gain > 0.0 and fit.found.evidence > raised.evidence:
         table.put(labels, fit.found.evidence, fit, table.with_pattern(fit, tried))

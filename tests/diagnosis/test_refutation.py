@@ -2,11 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
+import straight
 import weighed
 
 from shiplog.diagnosis.refutation import judged
-from shiplog.diagnosis.remainder import NOMINAL, RAISED
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.simulation.error_reduction import Gain
 
 DRAG, LOAD, TWO = ("drag",), ("load",), ("two",)
@@ -297,6 +300,21 @@ def test_what_the_windows_do_not_feel_they_do_not_refute(trial):
         decision, _, _, refuted = judged(weighed.search(trial, given), held)
         assert sorted(one.cause.label for one in decision.named) == named
         assert list(refuted) == [name for name in ("drag",) if name not in named]
+
+
+@pytest.mark.parametrize(("kind", "refuted"), [("ship", False), ("sensor", True)])
+def test_next_to_an_unrecorded_thruster_windows_refute_faults_of_sensors_only(
+    trial, monkeypatch, kind, refuted
+):
+    """The windows lack its force, and the helm answers it."""
+    force = SideForce(0.0, 60.0, 0.3, 4.0, np.array([0.0, 0.01, 0.004]), device=1.0)
+    both = {(DRAG, INTERMITTENT): 1.0, ((), INTERMITTENT): 1e-6}
+    made = weighed.search(trial, both, side_force=force)
+    monkeypatch.setattr(straight.One, "kind", kind)
+    decision, _, _, found = judged(made, HeldOut({DRAG: WORSE}))
+    assert [one.cause.label for one in decision.named] == ([] if refuted else ["drag"])
+    assert decision.side_force is force
+    assert set(found) == ({"drag"} if refuted else set())
 
 
 def test_a_gain_without_bounds_refutes_nothing(trial):

@@ -6,66 +6,16 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-import straight
+from searchable import raised_noise, search_of, searched, trial_with
 from straight import CAUSES
 
-from shiplog.diagnosis import evidence, fits, hypotheses, weighing
+from shiplog.diagnosis import hypotheses, weighing
 from shiplog.diagnosis import posterior as posteriors
 from shiplog.diagnosis import search as searching
 from shiplog.diagnosis.decide import decide
 from shiplog.diagnosis.fitted import Point
-from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.remainder import NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.search import Search
-from shiplog.diagnosis.unrecorded_thruster import SideForce
-from shiplog.diagnosis.weighing import weigh
-
-SENSITIVITY = 0.6
-NOMINAL_SEED, TRIAL_SEED = 1, 2
-
-
-def numbers_of(columns, hidden) -> np.ndarray:
-    whole = np.zeros(columns.linearised)
-    for label, values in hidden.items():
-        whole[columns.of[label]] = values
-    return whole
-
-
-def trial_with(hidden, causes=CAUSES, fixed=None, alike=None, **changes):
-    """A trial with these numbers (SI), and its first point.
-
-    alike   two labels whose columns are the same, but for a share of the second one's own
-    """
-    columns = straight.columns_of(causes)
-    nominal, record = straight.sailed(12), straight.sailed(8, seed=3)
-    campaign = straight.campaign(
-        nominal,
-        straight.passed(nominal, columns, seed=NOMINAL_SEED, sensitivity=SENSITIVITY),
-        columns,
-    )
-    given = straight.passed(record, columns, seed=TRIAL_SEED, sensitivity=SENSITIVITY, **changes)
-    if alike is not None:
-        one, other, share = alike
-        j = given.j.copy()
-        j[..., columns.of[other]] *= share
-        j[..., columns.of[other]] += j[..., columns.of[one]]
-        given = replace(given, j=j)
-    given = replace(given, e=given.e + given.j @ numbers_of(columns, hidden))
-    trial = straight.trial(campaign, record, given, tuple(fixed or {}))
-    return evidence.begin(trial, {n: np.asarray(v) for n, v in (fixed or {}).items()})
-
-
-def search_of(trial, point, placebo=None, likely=None) -> Search:
-    made = Search(trial, point, placebo or {}, likely)
-    made.table.intermittent = straight.no_hull
-    made.table.nominal_side_force = None
-    return made
-
-
-def searched(hidden, placebo=None, likely=None, **setting) -> Search:
-    trial, point = trial_with(hidden, **setting)
-    found = search_of(trial, point, placebo, likely)
-    found.run()
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -237,82 +187,6 @@ def test_what_a_model_has_already_stays_with_what_is_found():
     assert decision.named[0].numbers[0] == pytest.approx(1.0, abs=4.0 * spread)
 
 
-def raised_noise() -> np.ndarray:
-    """[S, 3J] three times the nominal process noise."""
-    plain, _ = trial_with({})
-    kernel = np.linalg.cholesky(straight.PROCESS_NOISE.kernel(plain.grid.knots))
-    return 3.0 * np.random.default_rng(6).standard_normal((8, len(kernel))) @ kernel.T
-
-
-def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
-    """Where the process noise is raised, whatever was tried before it."""
-    asked, real = [], fits.changed
-
-    def no_force(fit):
-        asked.append(fit.remainder)
-        return straight.no_hull(fit)
-
-    more = raised_noise()
-    for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
-        asked.clear()
-        trial, point = trial_with({}, accelerations=more)
-        monkeypatch.setattr(
-            fits, "changed", lambda *given, gain=gain, last=last: (
-                (gain, 3.0) if given[4] == last else real(*given)
-            )
-        )  # fmt: skip
-        table = search_of(trial, point).table
-        table.intermittent = no_force
-        weigh(table, (), {}, point)
-        assert table.found[(), RAISED].found.noise_factor > 1.5
-        assert asked[0].kind == RAISED
-        assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
-
-
-@pytest.mark.parametrize("gain", [40.0, -1.0])
-def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
-    """Its evidence is that of the trial with the force in the process noise."""
-    plain, _ = trial_with({})
-    knots, unit = plain.grid.knots, np.array([0.0, 0.3, 0.2])
-    alone = replace(
-        straight.PROCESS_NOISE, acceleration=1e-6 * straight.PROCESS_NOISE.acceleration,
-        intermittent=2.0 * unit,
-    )  # fmt: skip
-    drawn = np.random.default_rng(6).standard_normal((8, 3 * knots))
-    pushed = drawn @ np.linalg.cholesky(alone.kernel(knots)).T
-    trial, point = trial_with({}, accelerations=pushed)
-    table = search_of(trial, point).table
-    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit)
-    table.with_pattern = lambda fit, force: replace(force, device=0.5)
-    weigh(table, (), {}, point)
-    if gain < 0.0:
-        assert ((), INTERMITTENT) not in table.found
-        return
-    one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
-    assert one.remainder.intermittent == pytest.approx(2.0 * unit)
-    assert one.side_force.device == 0.5
-    again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
-    assert one.evidence == pytest.approx(again.value)
-    assert one.evidence > raised.evidence + 5.0
-
-
-def test_a_family_that_explains_a_tenth_of_raised_noise_gains_so_many_nats():
-    """N values of variance λ²: their log likelihood over ln λ is that of a Gaussian, and a tenth
-    of the raised part less variance is worth that share of N/2 nats."""
-    count, factor = 2000.0, 3.0
-    levels = [
-        evidence.Level(noise, np.eye(1), np.eye(1), np.zeros(1),
-                       -count * math.log(noise) - 0.5 * count * (factor / noise) ** 2)
-        for noise in (factor / 1.08, factor, factor * (1.0 + 1e-12), factor * 1.08, 1.0)
-    ]  # fmt: skip
-    rough = weighing.Rough(None, weighing.RAISING, levels)
-    assert rough.observations == pytest.approx(count, rel=0.02)
-    share = 0.1 * (1.0 - 1.0 / factor**2)
-    assert rough.spectrum() == pytest.approx(-0.5 * count * math.log(1.0 - share), rel=0.02)
-    nominal = weighing.Rough(None, weighing.RAISING, [replace(levels[0], noise_factor=1.0)])
-    assert nominal.spectrum() == 0.0
-
-
 def test_a_set_with_one_cause_less_is_fitted_again_with_the_same_noise():
     """Its own noise was less probable, so what it lacks is no evidence for the cause."""
     trial, point = trial_with({"drag": [1.2]}, accelerations=raised_noise())
@@ -333,30 +207,6 @@ def test_a_set_with_one_cause_less_is_fitted_again_with_the_same_noise():
     assert not weighing.weigh_as(found.table, ("drag",), shaped, fit)  # it gains no more
     plain = replace(best, remainder=Remainder(RAISED))
     assert not weighing.weigh_as(found.table, ("drag",), plain, fit)
-
-
-@pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
-def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
-    gain, noisy, monkeypatch
-):
-    """What gains a little together with noise that explains much is fitted to that noise."""
-    trial, point = trial_with({}, accelerations=raised_noise())
-    trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
-    monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
-    levels = weighing.nominal_levels(trial, point, (), 1.0)
-    raised = max(level.value for level in levels)
-    quiet = weighing.best(trial, levels, NOMINAL).value
-    wanted = max(
-        level.value - 0.5 * (math.log(level.noise_factor) / 0.05) ** 2
-        + 0.5 * math.log(level.noise_factor) ** 2 + math.log(1.0 / 0.05)
-        for level in levels
-    )  # fmt: skip
-    assert quiet == pytest.approx(wanted)
-    assert quiet + 2.0 < raised < quiet + 60.0
-    either = weighing.Rough(point, weighing.RAISING, levels)
-    change = weighing.changed(trial, either, either, (), "time")
-    assert change.remainder == Remainder("time", 3.0, noisy)
-    assert change.value == (pytest.approx(raised + gain) if noisy else -math.inf)
 
 
 def test_a_force_of_the_place_is_unknown_and_depends_on_position():

@@ -1,0 +1,127 @@
+"""One set of causes with raised noise, with an intermittent force, and with a family."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import straight
+from searchable import raised_noise, search_of, trial_with
+
+from shiplog.diagnosis import evidence, fits, weighing
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
+from shiplog.diagnosis.unrecorded_thruster import SideForce
+from shiplog.diagnosis.weighing import weigh
+
+
+def test_an_intermittent_force_is_tested_with_no_family(monkeypatch):
+    """Where the process noise is raised, whatever was tried before it."""
+    asked, real = [], fits.changed
+
+    def no_force(fit):
+        asked.append(fit.remainder)
+        return straight.no_hull(fit)
+
+    more = raised_noise()
+    for gain, last in ((0.0, None), (1e4, "time")):  # no family is near, or the last of them is
+        asked.clear()
+        trial, point = trial_with({}, accelerations=more)
+        monkeypatch.setattr(
+            fits, "changed", lambda *given, gain=gain, last=last: (
+                (gain, 3.0) if given[4] == last else real(*given)
+            )
+        )  # fmt: skip
+        table = search_of(trial, point).table
+        table.intermittent = no_force
+        weigh(table, (), {}, point)
+        assert table.found[(), RAISED].found.noise_factor > 1.5
+        assert asked[0].kind == RAISED
+        assert ((), INTERMITTENT) not in table.found  # it gains nothing: it is raised noise
+
+
+def pushed_at_one_place(unit):
+    """A trial with an intermittent force of 2 N, rms, whose acceleration of 1 N is `unit`."""
+    plain, _ = trial_with({})
+    alone = replace(
+        straight.PROCESS_NOISE, acceleration=1e-6 * straight.PROCESS_NOISE.acceleration,
+        intermittent=2.0 * unit,
+    )  # fmt: skip
+    kernel = np.linalg.cholesky(alone.kernel(plain.grid.knots))
+    drawn = np.random.default_rng(6).standard_normal((8, len(kernel)))
+    return trial_with({}, accelerations=drawn @ kernel.T)
+
+
+def test_force_and_numbers_are_fitted_in_turn_until_the_evidence_stays():
+    """Estimates that come nearer at each round: three rounds gain, the fourth gains nothing."""
+    unit = np.array([0.0, 0.3, 0.2])
+    trial, point = pushed_at_one_place(unit)
+    table, estimates = search_of(trial, point).table, [0.02, 0.2, 2.0, 2.0, 0.02]
+
+    def nearer(fit):
+        return SideForce(0.0, 40.0, 0.0, estimates.pop(0), unit)
+
+    table.intermittent, table.with_pattern = nearer, lambda fit, force: force
+    weigh(table, (), {}, point)
+    assert estimates == [0.02]
+    assert table.found[(), INTERMITTENT].side_force.force == 2.0
+
+
+@pytest.mark.parametrize("gain", [40.0, -1.0])
+def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
+    """Its evidence is that of the trial with the force in the process noise."""
+    unit = np.array([0.0, 0.3, 0.2])
+    trial, point = pushed_at_one_place(unit)
+    table = search_of(trial, point).table
+    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 2.0, unit)
+    table.with_pattern = lambda fit, force: replace(force, device=0.5)
+    weigh(table, (), {}, point)
+    if gain < 0.0:
+        assert ((), INTERMITTENT) not in table.found
+        return
+    one, raised = table.found[(), INTERMITTENT], table.found[(), RAISED]
+    assert one.remainder.intermittent == pytest.approx(2.0 * unit)
+    assert one.side_force.device == 0.5
+    again = evidence.level(trial, point, one.found.noise_factor, (), one.remainder)
+    assert one.evidence == pytest.approx(again.value)
+    assert one.evidence > raised.evidence + 5.0
+
+
+def test_a_family_that_explains_a_tenth_of_raised_noise_gains_so_many_nats():
+    """N values of variance λ²: their log likelihood over ln λ is that of a Gaussian, and a tenth
+    of the raised part less variance is worth that share of N/2 nats."""
+    count, factor = 2000.0, 3.0
+    levels = [
+        evidence.Level(noise, np.eye(1), np.eye(1), np.zeros(1),
+                       -count * math.log(noise) - 0.5 * count * (factor / noise) ** 2)
+        for noise in (factor / 1.08, factor, factor * (1.0 + 1e-12), factor * 1.08, 1.0)
+    ]  # fmt: skip
+    rough = weighing.Rough(None, weighing.RAISING, levels)
+    assert rough.observations == pytest.approx(count, rel=0.02)
+    share = 0.1 * (1.0 - 1.0 / factor**2)
+    assert rough.spectrum() == pytest.approx(-0.5 * count * math.log(1.0 - share), rel=0.02)
+    nominal = weighing.Rough(None, weighing.RAISING, [replace(levels[0], noise_factor=1.0)])
+    assert nominal.spectrum() == 0.0
+
+
+@pytest.mark.parametrize(("gain", "noisy"), [(2.0, False), (60.0, True)])
+def test_with_raised_noise_a_family_counts_where_it_alone_is_likelier_than_the_noise(
+    gain, noisy, monkeypatch
+):
+    """What gains a little together with noise that explains much is fitted to that noise."""
+    trial, point = trial_with({}, accelerations=raised_noise())
+    trial = replace(trial, campaign=replace(trial.campaign, noise=0.05))  # parts of the same noise
+    monkeypatch.setattr(fits, "changed", lambda *given: (gain, 3.0))
+    levels = weighing.nominal_levels(trial, point, (), 1.0)
+    raised = max(level.value for level in levels)
+    quiet = weighing.best(trial, levels, NOMINAL).value
+    wanted = max(
+        level.value - 0.5 * (math.log(level.noise_factor) / 0.05) ** 2
+        + 0.5 * math.log(level.noise_factor) ** 2 + math.log(1.0 / 0.05)
+        for level in levels
+    )  # fmt: skip
+    assert quiet == pytest.approx(wanted)
+    assert quiet + 2.0 < raised < quiet + 60.0
+    either = weighing.Rough(point, weighing.RAISING, levels)
+    change = weighing.changed(trial, either, either, (), "time")
+    assert change.remainder == Remainder("time", 3.0, noisy)
+    assert change.value == (pytest.approx(raised + gain) if noisy else -math.inf)
