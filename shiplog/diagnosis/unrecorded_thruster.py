@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -23,10 +23,8 @@ REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
 LEVERS = np.linspace(-0.45, 0.45, 7)
 STEPS = (0.05, 0.3, 0.3)  # the first ones, of place and logarithms of force and correlation time
 LASTS = math.log(4.0)  # of its correlation time over that of bursts, at most: it comes and goes
+MOST_STEPS = 10.0  # like the last one, that an extrapolation may go on
 SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
-# Share of the force, as `thresholds.FORM_ERROR`. Pushed at one end, a ship may drift to the side to
-# which it turns. The nominal voyages do not show that: the forces on the hull are extrapolated.
-FORM_ERROR = 0.1
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,8 @@ class SideForce:
     unit    [3] acceleration of 1 N
     device  probability, by its pattern, that it is the force of one device
     lasts   its correlation time, over the usual one
+    turning  [3] acceleration of 1 N m
+    reach   how far from midship it may act [m]
     """
 
     value: float
@@ -49,12 +49,43 @@ class SideForce:
     unit: np.ndarray
     device: float = 0.0
     lasts: float = 1.0
+    turning: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    reach: float = math.inf
+
+    @property
+    def _place(self) -> np.ndarray:
+        """[3] lever, logarithms of force and correlation time."""
+        return np.array([self.lever, math.log(self.force), math.log(self.lasts)])
+
+    def _at(self, place: np.ndarray) -> SideForce:
+        lever = float(np.clip(place[0], -self.reach, self.reach))
+        force, lasts = math.exp(place[1]), math.exp(float(np.clip(place[2], -LASTS, LASTS)))
+        unit = self.unit + (lever - self.lever) * self.turning
+        return replace(self, lever=lever, force=force, unit=unit, lasts=lasts)
 
     @property
     def remainder(self) -> Remainder:
         surge, sway, yaw = map(float, self.unit * self.force)
         of = (surge, sway, yaw)
         return Remainder(INTERMITTENT, intermittent=of, force_lasts=self.lasts)
+
+
+Step = tuple[SideForce, SideForce]
+
+
+def where_steps_lead(last: Step, this: Step) -> SideForce:
+    """Where steps of estimating force and numbers in turn lead to: secant method on the place,
+    which the numbers make up for, so that its steps are short, and slow to get shorter.
+
+    last, this  the force that the numbers were fitted with, and the next estimate
+    """
+    (first, to_first), (second, to_second) = last, this
+    before, now = to_first.lever - first.lever, to_second.lever - second.lever
+    if before * now > 0.0 and abs(now) >= abs(before):
+        share = MOST_STEPS
+    else:
+        share = min(now / (before - now), MOST_STEPS) if before != now else 0.0
+    return to_second._at(to_second._place + share * (to_second._place - to_first._place))
 
 
 def estimate_side_force(
@@ -84,7 +115,8 @@ def estimate_side_force(
     lever, (force, lasts) = float(finer.x[0]) * length, map(float, np.exp(finer.x[1:]))
     one = -float(finer.fun)
     unit = across + lever * turning
-    return SideForce(one, one - raised, lever, force, unit, lasts=lasts)
+    reach = REACH_LENGTHS * length
+    return SideForce(one, one - raised, lever, force, unit, 0.0, lasts, turning, reach)
 
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:

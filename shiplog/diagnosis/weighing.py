@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shiplog.diagnosis import evidence, fits, thresholds
+from shiplog.diagnosis import evidence, fits, thresholds, unrecorded_thruster
 from shiplog.diagnosis.fitted import Fit, Found, Level, Point
 from shiplog.diagnosis.hypotheses import Hypotheses
 from shiplog.diagnosis.hypothesis import Hypothesis
 from shiplog.diagnosis.relinearisation import converge
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.trial import Trial
+from shiplog.diagnosis.unrecorded_thruster import SideForce
 
 SEARCH_NATS = 10.0  # nats behind the best, beyond which a hypothesis is not worth a linearisation
 FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without effect it loses a few
@@ -23,7 +24,9 @@ FAILED_NATS = 50.0  # nats below nothing, at which a fit has failed: without eff
 RAISED_FROM = 1.2
 RAISING = Remainder(RAISED)
 NOISE_ROUNDS = 2  # of fitting noise and numbers in turn
-FORCE_ROUNDS = 5  # of fitting an intermittent force and numbers in turn, at most
+FORCE_ROUNDS = 6  # of fitting an intermittent force and numbers in turn, at most
+FORCE_NATS = 2.0  # gained by a round, that do not decide between hypotheses
+LEFT_NATS = 300.0  # behind raised noise, that further rounds do not make up for
 
 
 @dataclass(frozen=True)
@@ -265,17 +268,40 @@ def _weigh_intermittent(table: Hypotheses, labels: tuple[str, ...]) -> None:
     assert most is not None
     if raised.score < most.score - SEARCH_NATS:
         return
-    fit, before, last = table.fit(raised), table.best_of(INTERMITTENT), -math.inf
-    if before is not None:
-        fit = _fitted_with(table, labels, fit, before.remainder)
-        last = fit.found.evidence
+    found = _fitted_with_force(table, labels, raised)
+    if found is None:
+        return
+    fit, force = found
+    if force.gain > 0.0 and fit.found.evidence > raised.evidence:
+        table.put(labels, fit.found.evidence, fit, table.with_pattern(fit, force))
+
+
+def _fitted_with_force(
+    table: Hypotheses, labels: tuple[str, ...], raised: Hypothesis
+) -> tuple[Fit, SideForce] | None:
+    """An intermittent force and the numbers of a set, fitted in turn until the evidence stays. They
+    begin with the most probable force so far, or with raised noise. None where the fit diverges."""
+    fit, before = table.fit(raised), table.best_of(INTERMITTENT)
+    given = None if before is None else before.side_force
+    best: tuple[Fit, SideForce] | None = None
+    if given is not None:
+        fit = _fitted_with(table, labels, fit, given.remainder)
+        best = None if fit.diverged else (fit, given)
+    steps: list[unrecorded_thruster.Step] = []
     for _ in range(FORCE_ROUNDS):
         if fit.diverged:  # nor is there anything left of it that a force could explain
-            return
-        tried = table.intermittent(fit)
-        fit = _fitted_with(table, labels, fit, tried.remainder)
-        if fit.found.evidence < last + SEARCH_NATS:
             break
-        last = fit.found.evidence
-    if tried.gain > 0.0 and fit.found.evidence > raised.evidence:
-        table.put(labels, fit.found.evidence, fit, table.with_pattern(fit, tried))
+        tried = table.intermittent(fit)
+        steps = [] if given is None else [*steps[-1:], (given, tried)]
+        given = tried if len(steps) < 2 else unrecorded_thruster.where_steps_lead(*steps)
+        last, fit = fit, _fitted_with(table, labels, fit, given.remainder)
+        if given is not tried and fit.found.evidence < last.found.evidence:  # they led too far
+            given, steps = tried, []
+            fit = _fitted_with(table, labels, last, given.remainder)
+        reached = -math.inf if best is None else best[0].found.evidence
+        if fit.diverged or fit.found.evidence <= reached:
+            break
+        best = fit, given
+        if fit.found.evidence < max(reached + FORCE_NATS, raised.evidence - LEFT_NATS):
+            break
+    return best

@@ -1,5 +1,6 @@
 """An unrecorded thruster, placed between the places that are tried first."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -52,3 +53,42 @@ def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
     assert found.lever == pytest.approx(1.1, abs=0.05)
     assert found.force == pytest.approx(1.7, rel=0.1)
     assert found.gain > 1000.0
+
+
+def side_force(lever: float, force: float = 1.0) -> unrecorded_thruster.SideForce:
+    """Of a ship that 1 N accelerates sideways by 0.01 m/s² and 1 N m turns by 0.02 rad/s²."""
+    unit, turning = np.array([0.0, 0.01, 0.02 * lever]), np.array([0.0, 0.0, 0.02])
+    return unrecorded_thruster.SideForce(
+        0.0, 1.0, lever, force, unit, lasts=2.0, turning=turning, reach=1.5
+    )
+
+
+@pytest.mark.parametrize(
+    ("rate", "lever", "force"),
+    [(0.8, 1.0, 2.0), (-0.5, 1.0, 2.0), (0.95, None, None)],
+    ids=["slow steps", "steps to and fro", "ten steps on at most"],
+)
+def test_steps_that_shrink_by_one_rate_lead_to_their_limit(rate, lever, force):
+    """A place and a logarithm of a force whose distance from 1 m and 2 N is `rate` times that of
+    the step before."""
+
+    def at(distance: float) -> unrecorded_thruster.SideForce:
+        return side_force(1.0 + distance, 2.0 * math.exp(-distance))
+
+    zero, one, two = at(0.5), at(0.5 * rate), at(0.5 * rate**2)
+    found = unrecorded_thruster.where_steps_lead((zero, one), (one, two))
+    if lever is None:
+        assert found.lever == pytest.approx(two.lever + 10.0 * (two.lever - one.lever))
+        return
+    assert (found.lever, found.force) == (pytest.approx(lever), pytest.approx(force))
+    assert found.unit == pytest.approx([0.0, 0.01, 0.02 * lever])
+    assert found.remainder.intermittent == pytest.approx(tuple(found.unit * found.force))
+    assert found.lasts == pytest.approx(2.0)
+
+
+def test_steps_lead_no_farther_than_the_ship_reaches():
+    """Steps that do not get shorter: ten of them, or to the bow."""
+    zero, one, two = side_force(0.1), side_force(0.2), side_force(0.4)
+    assert unrecorded_thruster.where_steps_lead((zero, one), (one, two)).lever == 1.5
+    still = side_force(0.2), side_force(0.2)
+    assert unrecorded_thruster.where_steps_lead(still, still).lever == 0.2

@@ -51,19 +51,27 @@ def pushed_at_one_place(unit):
     return trial_with({}, accelerations=drawn @ kernel.T)
 
 
-def test_force_and_numbers_are_fitted_in_turn_until_the_evidence_stays():
-    """Estimates that come nearer at each round: three rounds gain, the fourth gains nothing."""
+@pytest.mark.parametrize(("left", "asked"), [(math.inf, 4), (300.0, 1)])
+def test_force_and_numbers_are_fitted_in_turn_until_the_evidence_stays(monkeypatch, left, asked):
+    """Estimates that come nearer at each round: three rounds gain, the fourth gains nothing. After
+    the first one the noise alone is far more probable, which ends it unless that is allowed."""
     unit = np.array([0.0, 0.3, 0.2])
     trial, point = pushed_at_one_place(unit)
-    table, estimates = search_of(trial, point).table, [0.02, 0.2, 2.0, 2.0, 0.02]
+    table, estimates = search_of(trial, point).table, iter([0.2, 0.8, 2.0, 2.0, 0.02])
+    given = []
 
     def nearer(fit):
-        return SideForce(0.0, 40.0, 0.0, estimates.pop(0), unit)
+        given.append(next(estimates))
+        return SideForce(0.0, 40.0, 0.0, given[-1], unit)
 
     table.intermittent, table.with_pattern = nearer, lambda fit, force: force
+    monkeypatch.setattr(weighing, "LEFT_NATS", left)
     weigh(table, (), {}, point)
-    assert estimates == [0.02]
-    assert table.found[(), INTERMITTENT].side_force.force == 2.0
+    assert len(given) == asked
+    if asked > 1:
+        assert table.found[(), INTERMITTENT].side_force.force == 2.0
+    else:
+        assert ((), INTERMITTENT) not in table.found
 
 
 @pytest.mark.parametrize("gain", [40.0, -1.0])
