@@ -12,7 +12,7 @@ import numpy as np
 from shiplog.diagnosis import intermittent, raised_noise
 from shiplog.diagnosis.fitted import Fit, Point
 from shiplog.diagnosis.hypothesis import Hypothesis, Place, Priors, form_error, holds_one
-from shiplog.diagnosis.remainder import NOMINAL, Remainder
+from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -75,8 +75,16 @@ class Hypotheses:
     def score(self, evidence: float, labels: Sequence[str], kind: str) -> float:
         """Log posterior, in nats, up to a constant."""
         misfit = sum(self.placebo.get(n, 0.0) for n in labels) + self.placebo.get(kind, 0.0)
-        allowance = form_error(self.alone, labels, self.by)
+        force = self._intermittent_alone if kind == INTERMITTENT else 0.0
+        allowance = form_error(self.alone, labels, self.by, force)
         return evidence + self.priors.of(labels, kind) - misfit - allowance
+
+    @property
+    def _intermittent_alone(self) -> float:
+        """Log Bayes factor of an intermittent force without a cause, over nothing; where it is kept
+        with causes only, that of raised noise, which was as probable."""
+        alone = self.found.get(((), INTERMITTENT), self.found.get(((), RAISED)))
+        return 0.0 if alone is None else alone.evidence - self.nothing.evidence
 
     def put(
         self,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.diagnosis import thresholds
+from shiplog.diagnosis import thresholds, unrecorded_thruster
 from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
@@ -95,14 +95,16 @@ def form_error_of(cause: Cause) -> float:
     return max(thresholds.FORM_ERROR, cause.form_error)
 
 
-def form_error(alone: Mapping[str, float], labels: Sequence[str], by: Mapping[str, Cause]) -> float:
-    """Allowance, in nats, for further causes that imitate the form error of another one: of the one
-    that leaves most.
+def form_error(
+    alone: Mapping[str, float], labels: Sequence[str], by: Mapping[str, Cause], force: float = 0.0
+) -> float:
+    """Allowance, in nats, for further causes that imitate the form error of another one, or of an
+    intermittent force: of the one that leaves most.
 
     alone   log Bayes factor of each cause by itself, over no cause
     by      label → cause
+    force   log Bayes factor of an intermittent force by itself, where these causes act with one
     """
-    if len(labels) < 2:
-        return 0.0
     left = (form_error_of(by[n]) ** 2 * alone.get(n, 0.0) for n in labels)
-    return max(0.0, *left) * (len(labels) - 1)
+    of_causes = max(0.0, *left) * (len(labels) - 1) if len(labels) > 1 else 0.0
+    return max(of_causes, unrecorded_thruster.FORM_ERROR**2 * force * len(labels))

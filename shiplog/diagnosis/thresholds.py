@@ -23,9 +23,9 @@ ANOTHER_CAUSE = 0.1
 REMAINDER = 0.15
 
 # Share of a force or of a reading. A cause's equations are right to about this share, unless the
-# cause says a larger one, and what they leave over imitates further causes. The evidence goes with
-# the square: the log Bayes factor of each further cause has to exceed this squared times that of
-# the cause that leaves most.
+# cause says a larger one, and what they leave over imitates further causes; so does what an
+# intermittent force leaves over. The evidence goes with the square: the log Bayes factor of each
+# further cause has to exceed this squared times that of the cause, or force, that leaves most.
 FORM_ERROR = 0.02
 
 # Share of what a hypothesis explains, and of what a cause does. With a remainder, causes are named

@@ -27,7 +27,7 @@ from shiplog.diagnosis import (
     thresholds,
     trial_voyages,
 )
-from shiplog.diagnosis.hypothesis import form_error_of
+from shiplog.diagnosis.hypothesis import form_error, form_error_of
 from shiplog.models.causes import CATALOGUE
 
 
@@ -113,4 +113,5 @@ def test_without_form_errors_no_cause_has_one():
     with ExitStack() as stack:
         without.PARTS["form-error"](stack)
         assert {form_error_of(cause) for cause in CATALOGUE} == {0.0}
+        assert form_error({}, ("bank",), {"bank": coarse[0]}, 5000.0) == 0.0
     assert {form_error_of(cause) for cause in coarse} == {0.2}
