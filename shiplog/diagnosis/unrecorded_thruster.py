@@ -17,9 +17,7 @@ from shiplog.diagnosis.remainder import INTERMITTENT, Remainder
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
-# Ship lengths from midship: a force acts on the ship. A fifth more than half a length, since motion
-# shows no more of the added inertia than its ratio to the forces.
-REACH_LENGTHS = 0.6
+REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
 # Share of the force, as `thresholds.FORM_ERROR`: the likelihood takes its course for Gaussian, and
 # pushed at one end a ship may drift to the side to which it turns, which no nominal voyage shows.
 FORM_ERROR = 0.1
