@@ -162,8 +162,7 @@ def _fitted(
         raise np.linalg.LinAlgError("the path diverged")
     if steady and lately is not None:
         return evidence.fit(trial, point, included, lately, remainder)
-    base, _ = evidence.scan(trial, point, (), included, lately, remainder)
-    return base
+    return evidence.scan(trial, point, (), included, lately, remainder)[0]
 
 
 def _half_way(

@@ -56,13 +56,14 @@ class SideForce:
     reach: float = math.inf
 
     @property
-    def _place(self) -> np.ndarray:
+    def _coordinates(self) -> np.ndarray:
         """[3] lever, logarithms of force and correlation time."""
         return np.array([self.lever, math.log(self.force), math.log(self.lasts)])
 
-    def _at(self, place: np.ndarray) -> SideForce:
-        lever = float(np.clip(place[0], -self.reach, self.reach))
-        force, lasts = math.exp(place[1]), math.exp(float(np.clip(place[2], -LASTS, LASTS)))
+    def _at(self, coordinates: np.ndarray) -> SideForce:
+        """The same force there, within its reach and its longest and shortest time."""
+        lever = float(np.clip(coordinates[0], -self.reach, self.reach))
+        force, lasts = np.exp([coordinates[1], np.clip(coordinates[2], -LASTS, LASTS)]).tolist()
         unit = self.unit + (lever - self.lever) * self.turning
         return replace(self, lever=lever, force=force, unit=unit, lasts=lasts)
 
@@ -77,27 +78,29 @@ Step = tuple[SideForce, SideForce]
 
 
 def where_steps_lead(last: Step, this: Step) -> SideForce:
-    """Where steps of estimating force and numbers in turn lead to: secant method on the place,
-    which the numbers make up for, so that its steps are short, and slow to get shorter.
+    """Limit of estimating force and numbers in turn, by the secant method on the lever (Aitken's Δ²
+    process). The numbers make up for a wrong place: the lever converges slowest. Force and
+    correlation time go as far on; MOST_STEPS limits how far, and the ship's ends the lever.
 
-    last, this  the force that the numbers were fitted with, and the next estimate
+    last, this  the force that the numbers were fitted with, and the estimate that followed
     """
     (first, to_first), (second, to_second) = last, this
     before, now = to_first.lever - first.lever, to_second.lever - second.lever
-    if before * now > 0.0 and abs(now) >= abs(before):
-        share = MOST_STEPS
+    if before * now > 0.0 and abs(now) >= abs(before):  # they do not get shorter
+        further = MOST_STEPS
     else:
-        share = min(now / (before - now), MOST_STEPS) if before != now else 0.0
-    return to_second._at(to_second._place + share * (to_second._place - to_first._place))
+        further = min(now / (before - now), MOST_STEPS) if before != now else 0.0
+    step = to_second._coordinates - to_first._coordinates
+    return to_second._at(to_second._coordinates + further * step)
 
 
 def estimate_side_force(
-    left: Left, ref: Reference, at_one_place: Remainder | None = None
+    left: Left, ref: Reference, at_one_coordinates: Remainder | None = None
 ) -> SideForce:
     """The most probable intermittent side force at one place along the ship, from the residual.
-    It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
+    It accelerates sway and yaw together, as no other process noise does. `at_one_coordinates` as
     `raised_noise.by_channel` has it."""
-    raised, _ = by_channel(left, at_one_place)
+    raised, _ = by_channel(left, at_one_coordinates)
     ship, length = ref.model.stand_in, ref.setting.scale["length"]
     across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
 

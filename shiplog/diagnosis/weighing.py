@@ -280,7 +280,8 @@ def _fitted_with_force(
     table: Hypotheses, labels: tuple[str, ...], raised: Hypothesis
 ) -> tuple[Fit, SideForce] | None:
     """An intermittent force and the numbers of a set, fitted in turn until the evidence stays. They
-    begin with the most probable force so far, or with raised noise. None where the fit diverges."""
+    begin with the most probable force so far, or with raised noise. Its gain is that of the last
+    estimate next to these numbers. None where the fit diverges."""
     fit, before = table.fit(raised), table.best_of(INTERMITTENT)
     given = None if before is None else before.side_force
     best: tuple[Fit, SideForce] | None = None
@@ -288,10 +289,12 @@ def _fitted_with_force(
         fit = _fitted_with(table, labels, fit, given.remainder)
         best = None if fit.diverged else (fit, given)
     steps: list[unrecorded_thruster.Step] = []
+    gain = 0.0
     for _ in range(FORCE_ROUNDS):
         if fit.diverged:  # nor is there anything left of it that a force could explain
             break
         tried = table.intermittent(fit)
+        gain = tried.gain
         steps = [] if given is None else [*steps[-1:], (given, tried)]
         given = tried if len(steps) < 2 else unrecorded_thruster.where_steps_lead(*steps)
         last, fit = fit, _fitted_with(table, labels, fit, given.remainder)
@@ -304,4 +307,4 @@ def _fitted_with_force(
         best = fit, given
         if fit.found.evidence < max(reached + FORCE_NATS, raised.evidence - LEFT_NATS):
             break
-    return best
+    return None if best is None else (best[0], replace(best[1], gain=gain))

@@ -74,6 +74,24 @@ def test_force_and_numbers_are_fitted_in_turn_until_the_evidence_stays(monkeypat
         assert ((), INTERMITTENT) not in table.found
 
 
+@pytest.mark.parametrize(("gain", "kept"), [(30.0, True), (-1.0, False)])
+def test_a_set_with_the_force_of_another_one_needs_a_gain_of_its_own(gain, kept):
+    """The force of nothing is more probable than what is estimated next to the drag; it counts
+    there only where an estimate next to the drag gains over raised noise."""
+    unit = np.array([0.0, 0.3, 0.2])
+    trial, point = pushed_at_one_place(unit)
+    table = search_of(trial, point).table
+    table.with_pattern = lambda fit, force: force
+    table.intermittent = lambda fit: SideForce(0.0, 40.0, 0.0, 2.0, unit)
+    weigh(table, (), {}, point)
+    table.intermittent = lambda fit: SideForce(0.0, gain, 0.0, 0.02, unit)
+    weigh(table, ("drag",), {"drag": np.zeros(1)}, point)
+    assert ((("drag",), INTERMITTENT) in table.found) == kept
+    if kept:
+        force = table.found[("drag",), INTERMITTENT].side_force
+        assert (force.force, force.gain) == (2.0, gain)
+
+
 @pytest.mark.parametrize("gain", [40.0, -1.0])
 def test_an_intermittent_force_is_a_hypothesis_where_it_gains_more_than_raised_noise(gain):
     """Its evidence is that of the trial with the force in the process noise."""
