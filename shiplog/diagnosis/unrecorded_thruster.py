@@ -77,7 +77,7 @@ class SideForce:
 Step = tuple[SideForce, SideForce]
 
 
-def where_steps_lead(last: Step, this: Step) -> SideForce:
+def extrapolated(last: Step, this: Step) -> SideForce:
     """Limit of estimating force and numbers in turn, by the secant method on the lever (Aitken's Δ²
     process). The numbers make up for a wrong place: the lever converges slowest. Force and
     correlation time go as far on; MOST_STEPS limits how far, and the ship's ends the lever.

@@ -296,7 +296,7 @@ def _fitted_with_force(
         tried = table.intermittent(fit)
         gain = tried.gain
         steps = [] if given is None else [*steps[-1:], (given, tried)]
-        given = tried if len(steps) < 2 else unrecorded_thruster.where_steps_lead(*steps)
+        given = tried if len(steps) < 2 else unrecorded_thruster.extrapolated(*steps)
         last, fit = fit, _fitted_with(table, labels, fit, given.remainder)
         if given is not tried and fit.found.evidence < last.found.evidence:  # they led too far
             given, steps = tried, []

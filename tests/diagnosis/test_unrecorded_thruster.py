@@ -76,7 +76,7 @@ def test_steps_that_shrink_by_one_rate_lead_to_their_limit(rate, lever, force):
         return side_force(1.0 + distance, 2.0 * math.exp(-distance))
 
     zero, one, two = at(0.5), at(0.5 * rate), at(0.5 * rate**2)
-    found = unrecorded_thruster.where_steps_lead((zero, one), (one, two))
+    found = unrecorded_thruster.extrapolated((zero, one), (one, two))
     if lever is None:
         assert found.lever == pytest.approx(two.lever + 10.0 * (two.lever - one.lever))
         return
@@ -86,9 +86,9 @@ def test_steps_that_shrink_by_one_rate_lead_to_their_limit(rate, lever, force):
     assert found.lasts == pytest.approx(2.0)
 
 
-def test_steps_lead_no_farther_than_the_ship_reaches():
+def test_extrapolation_goes_no_farther_than_the_ship_reaches():
     """Steps that do not get shorter: ten of them, or to the bow."""
     zero, one, two = side_force(0.1), side_force(0.2), side_force(0.4)
-    assert unrecorded_thruster.where_steps_lead((zero, one), (one, two)).lever == 1.5
+    assert unrecorded_thruster.extrapolated((zero, one), (one, two)).lever == 1.5
     still = side_force(0.2), side_force(0.2)
-    assert unrecorded_thruster.where_steps_lead(still, still).lever == 0.2
+    assert unrecorded_thruster.extrapolated(still, still).lever == 0.2
