@@ -192,7 +192,7 @@ def _reasons(
     reasons = {name: why for name, why in refuted.items() if name not in kept}
     for label, gained in sorted(table.alone.items(), key=lambda pair: -pair[1])[:MOST_REASONS]:
         name = name_of(label)
-        if name in kept or name in reasons:
+        if name in kept or name in reasons or table.by[label].special:
             continue
         misfit = table.placebo.get(label, 0.0)
         why = f"log Bayes factor {gained:+.0f} nats by itself"

@@ -197,6 +197,8 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     found = []
     for label, expected in decision.expected.items():
         cause, least = by[label], expected.least(nats)
+        if cause.special:
+            continue
         sizes = least * cause.sizes(setting)
         if cause.parameters:  # its sizes begin with theirs; uncertain factors may follow
             parts = zip(cause.parameters, sizes, least, strict=False)

@@ -261,3 +261,32 @@ def test_no_water_is_deeper_than_deep():
     )(0.0)  # fmt: skip
     assert np.asarray(slope) == pytest.approx((at(1e-6) - at(0.0)) / 1e-6, rel=1e-3)
     assert np.abs(slope).max() > 1e-3
+
+
+def test_wind_forces_that_change_alike_differ_by_a_quarter():
+    """Numbers: the share that is added to sway, and the logarithms of the other two over it."""
+    one, alike = WindForce().each(setting())
+    assert (one, alike) == (WindForce(), WindForce(alike=True))
+    assert (one.label, alike.label) == ("wind_force", "wind_force:alike")
+    assert not alike.compatible("wind_force") and alike.compatible("wind_speed_scale")
+    assert alike.sizes(setting()) == pytest.approx([0.3, 0.25, 0.25])
+    low, high = alike.bounds(setting())
+    assert (low[0], high[0]) == (-1.0, np.inf)
+    assert np.exp([low[1:], high[1:]]) == pytest.approx(np.array([[1 / math.e] * 2, [math.e] * 2]))
+    p = np.array([-0.2, math.log(1.25), -math.log(1.25)])
+    factors = [float(value) for value, _ in alike.displayed(p).values()]
+    assert factors == pytest.approx([0.75, 0.8, 0.84])
+    assert alike.scales(p)["wind"] == pytest.approx(factors)
+    # the same force as that of three independent numbers
+    ship, wind = under_way()[:2], under_way()[2]
+    same = extended([one])[0], np.array(factors) - 1.0
+    model, values = extended([alike])
+    found = acceleration(model, values, p, *ship, wind)
+    assert found == pytest.approx(acceleration(same[0], values, same[1], *ship, wind), rel=1e-12)
+    assert alike.practical(np.array([0.02, 0.5, 0.0]), setting())  # 0.033 ahead
+    assert not alike.practical(np.array([0.02, 0.0, 0.0]), setting())
+
+
+def test_a_model_without_wind_has_no_wind_force_that_changes_alike():
+    (one,) = WindForce().each(replace(setting(), lacking={"wind.x1": -0.7}))
+    assert one == WindForce(("wind.x1",))

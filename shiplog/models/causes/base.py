@@ -22,7 +22,8 @@ from shiplog.voyages.recording import Record
 # Standard deviation of the logarithm of an uncertain factor in a cause's equations: a factor of
 # 1.6. Published formulas for one force differ by as much.
 FORM_SPREAD = 0.5
-FORM_BOUND = 4.0 * FORM_SPREAD  # of that logarithm: four standard deviations
+FORM_DEVIATIONS = 4.0  # standard deviations that such a logarithm is off, at most
+FORM_BOUND = FORM_DEVIATIONS * FORM_SPREAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +148,11 @@ class Cause:
     def count(self) -> int:
         """Of its numbers: the parameters, then the logarithms of the uncertain factors."""
         return len(self.parameters) + self.forms
+
+    @property
+    def special(self) -> bool:
+        """Whether it is a special case of the cause of its name, and not listed by itself."""
+        return False
 
     @property
     def absorbed(self) -> bool:

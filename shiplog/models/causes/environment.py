@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
-from shiplog.models.causes.base import Cause, Parameter, ParameterEstimate, Setting
+from shiplog.models.causes.base import (
+    FORM_DEVIATIONS,
+    Cause,
+    Parameter,
+    ParameterEstimate,
+    Setting,
+)
 
 
 @dataclass(frozen=True)
@@ -46,17 +52,29 @@ class Current(Cause):
         )
 
 
+# Standard deviation of the logarithm of the surge or yaw factor's change over that of sway, where
+# one thing changes them together: by a quarter, as coefficients of ships of one type differ.
+ALIKE = 0.25
+
+
 @dataclass(frozen=True)
 class WindForce(Cause):
     """Of a model that has no wind force, that of such a ship times its numbers.
+
+    Its three forces may differ independently, as coefficients do. A load on deck, a draught or the
+    density of the air changes them `alike`: its numbers are then the change of sway, and the
+    logarithms of those of surge and yaw over it. An anemometer's scale has the same effect, and
+    must not be preferred because three independent numbers seldom agree.
 
     Size: coefficients ahead of ship types differ by a quarter from their mean (Blendermann 1994, as
     in Fossen 2011, Table 8.1), and areas above water by as much with the load on deck.
 
     lacking   the coefficients that the model has not
+    alike     whether one thing changes all three
     """
 
     lacking: tuple[str, ...] = ()
+    alike: bool = False
 
     name = "wind_force"
     kind = "environment"
@@ -74,20 +92,41 @@ class WindForce(Cause):
     }
 
     @property
+    def label(self) -> str:
+        return f"{self.name}:alike" if self.alike else self.name
+
+    @property
+    def special(self) -> bool:
+        return self.alike
+
+    @property
     def absorbed(self) -> bool:
         return not self.lacking
 
     def on(self, setting: Setting) -> WindForce:
         return WindForce(tuple(n for n in setting.lacking if n.startswith("wind.")))
 
+    def each(self, setting: Setting) -> tuple[Cause, ...]:
+        """Independent forces, and forces that change alike where the model has any."""
+        one = self.on(setting)
+        return (one,) if one.lacking else (one, replace(one, alike=True))
+
+    def compatible(self, label: str) -> bool:
+        return label.partition(":")[0] != self.name
+
     def constants(self, setting: Setting) -> dict[str, np.ndarray]:
         values = [setting.lacking[name] for name in self.lacking]
         return {"wind.of_such_a_ship": np.array(values)} if values else {}
 
     def sizes(self, setting: Setting) -> np.ndarray:
+        if self.alike:
+            return np.array([setting.prior(self.parameters[1]), ALIKE, ALIKE])
         return np.ones(3) if self.lacking else super().sizes(setting)
 
     def bounds(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        if self.alike:
+            most = FORM_DEVIATIONS * ALIKE
+            return np.array([-1.0, -most, -most]), np.array([np.inf, most, most])
         if self.lacking:  # which way the wind turns the ship depends on what stands on deck
             return np.array([0.0, 0.0, -3.0]), np.full(3, np.inf)
         return super().bounds(setting)
@@ -97,17 +136,27 @@ class WindForce(Cause):
             had, already = dict(zip(self.lacking, at["wind.of_such_a_ship"], strict=True)), 0.0
         else:
             had, already = {k: v for k, v in c.items() if k.startswith("wind.")}, 1.0
-        factor = {axis: already + p[i] for i, axis in enumerate("xyn")}
+        factor = dict(zip("xyn", already + self._added(jnp.stack(list(p)), jnp), strict=True))
         return c | {k: v * factor[k.removeprefix("wind.")[0]] for k, v in had.items()}
 
     def scales(self, p: np.ndarray) -> dict[str, np.ndarray]:
         """All wind force grows, what the model describes of it and what it does not; where the
         model has none, nothing of it grows."""
-        return {} if self.lacking else {"wind": 1.0 + np.asarray(p)}
+        return {} if self.lacking else {"wind": 1.0 + self._added(np.asarray(p))}
+
+    def _added(self, p: Any, xp: Any = np) -> Any:
+        """[..., 3] of numbers [..., 3]: what is added to the factors of surge, sway and yaw."""
+        if not self.alike:
+            return p
+        of_sway = p[..., 0]
+        return xp.stack((of_sway * xp.exp(p[..., 1]), of_sway, of_sway * xp.exp(p[..., 2])), -1)
 
     def displayed(self, p: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
-        already = 0.0 if self.lacking else 1.0
-        return {q.name: (already + p[..., i], "1") for i, q in enumerate(self.parameters)}
+        factors = (0.0 if self.lacking else 1.0) + self._added(np.asarray(p))
+        return {q.name: (factors[..., i], "1") for i, q in enumerate(self.parameters)}
+
+    def practical(self, p: np.ndarray, setting: Setting) -> np.ndarray:
+        return super().practical(self._added(np.asarray(p)), setting)
 
     def sentence(self, estimates: Mapping[str, ParameterEstimate]) -> str:
         x, y, n = (estimates[q.name].value for q in self.parameters)
