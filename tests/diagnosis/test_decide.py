@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import straight
 import weighed
 
 from shiplog.diagnosis import fits, thresholds
@@ -309,3 +310,12 @@ def test_what_may_stand_in_a_place_is_at_most_a_hundred_times_less_probable(tria
     (one,) = verdict(trial, {(DRAG, NOMINAL): 0.94, (clock, NOMINAL): 0.05}).named
     assert one.alike == clock
     assert cause_json(one)["indistinguishable_from"] == ["clock"]
+
+
+def test_why_a_special_case_is_not_named_is_not_said_by_itself(trial, monkeypatch):
+    found = verdict(trial, {(DRAG, NOMINAL): 0.95, ((), NOMINAL): 0.05})
+    assert {"clock:wind", "clock:gnss", "load", "two"} == set(found.rejected)
+    special = property(lambda cause: cause.label == "clock:gnss")
+    monkeypatch.setattr(straight.One, "special", special)
+    found = verdict(trial, {(DRAG, NOMINAL): 0.95, ((), NOMINAL): 0.05})
+    assert {"clock:wind", "load", "two"} == set(found.rejected)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shiplog.diagnosis.fitted import ExpectedEvidence
-from shiplog.models.causes.environment import Bank, Current
+from shiplog.models.causes.environment import Bank, Current, WindForce
 from shiplog.models.causes.sensors import HeadingOffset
 from shiplog.models.causes.ship import Fouling, RudderDelay, RudderLag
 from shiplog.report import answer, page, verdict
@@ -95,6 +95,16 @@ def test_a_number_that_no_data_would_reveal_is_left_out_of_the_limits():
         by = {one["name"]: one["parameters"] for one in limits}
         assert by["bank"] == ({} if strength is None else {"strength": strength})
         assert bool(by["fouling"]) == (strength is not None)
+
+
+def test_a_special_case_of_a_cause_has_no_limits_of_its_own():
+    expected = ExpectedEvidence(np.array([10.0, 1.0, 1.0]), 0.0)
+    (one,) = verdict.limits_json(
+        SimpleNamespace(expected={"wind_force": expected, "wind_force:alike": expected}),
+        [WindForce(), WindForce(alike=True)], SimpleNamespace(prior=lambda p: p.prior),
+    )  # fmt: skip
+    assert one["name"] == "wind_force" and "channel" not in one
+    assert one["parameters"]["surge_factor"]["value"] == pytest.approx(0.3)
 
 
 def test_the_report_says_what_was_not_tested_and_why():
