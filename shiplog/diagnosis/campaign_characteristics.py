@@ -13,6 +13,7 @@ from shiplog.diagnosis import (
     discrepancy,
     likelihood,
     linearisation,
+    noise_estimate,
     nominal_fit,
     segment_nodes,
     segments,
@@ -178,7 +179,7 @@ def _noise_of_parts(
     for rows, numbers in zip(made.rows, effects.numbers, strict=True):
         own[rows] = numbers * made.columns.unit
     left = made.linear.less_numbers(own, made.accelerations).pick(kept)
-    return likelihood.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
+    return noise_estimate.learnt(left, np.zeros(made.columns.linearised), process_noise, rounds=3)
 
 
 def noise_time(
@@ -198,7 +199,7 @@ def noise_time(
             for _ in range(2 if factor == 1.0 else 1):
                 numbers, _ = _solved(linear, accelerations, tried, columns, held)
                 left = linear.less(accelerations @ numbers[columns.linearised :])
-                tried = likelihood.learnt(left, numbers[: columns.linearised], tried, rounds=2)
+                tried = noise_estimate.learnt(left, numbers[: columns.linearised], tried, rounds=2)
             _, value = _solved(linear, accelerations, tried, columns, held)
             if value < best:
                 break

@@ -52,7 +52,7 @@ def external(
     base, _ = evidence.scan(trial, point, (), trial.fixed, remainder=remainder)
     fit = Fit(point, base, remainder)
     residual, d = fits.residual(trial, fits.of_parts(trial, whole, fit), fit)
-    process_noise = trial.process_noise(remainder).times(base.noise_factor)
+    process_noise = trial.process_noise(remainder, whole.cut).times(base.noise_factor)
     found: tuple[external_forces.Stretch, ...] = ()
     if external_forces.driven(physics):
         weighed = external_forces.balance(residual, d, process_noise, trial.record, physics, values)
@@ -95,7 +95,8 @@ def depends_on(trial: Trial, nothing: Fit, whole: Linear) -> tuple[Dependence, .
     """What the model cannot see and the residual depends on, with no cause named."""
     found = residual_acceleration.posterior(
         *fits.residual(trial, whole, nothing),
-        trial.process_noise(nothing.remainder).times(nothing.found.noise_factor), trial.record,
+        trial.process_noise(nothing.remainder, whole.cut).times(nothing.found.noise_factor),
+        trial.record,
     )  # fmt: skip
     knots = residual_acceleration.table(found, trial.record)
     return omitted_inputs.table(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shiplog.diagnosis import thresholds, unrecorded_thruster
+from shiplog.diagnosis import thresholds
 from shiplog.diagnosis.fitted import Found, Point
 from shiplog.diagnosis.linear_segments import Path
 from shiplog.diagnosis.remainder import INTERMITTENT, NOMINAL, RAISED, Remainder
@@ -107,4 +107,4 @@ def form_error(
     """
     left = (form_error_of(by[n]) ** 2 * alone.get(n, 0.0) for n in labels)
     of_causes = max(0.0, *left) * (len(labels) - 1) if len(labels) > 1 else 0.0
-    return max(of_causes, unrecorded_thruster.FORM_ERROR**2 * force * len(labels))
+    return max(of_causes, thresholds.FORM_ERROR**2 * force * len(labels))

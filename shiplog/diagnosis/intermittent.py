@@ -10,9 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from shiplog.diagnosis import fits, likelihood, raised_noise, thresholds, unrecorded_thruster
+from shiplog.diagnosis import (
+    fits,
+    likelihood,
+    on_off,
+    raised_noise,
+    segment_nodes,
+    thresholds,
+    unrecorded_thruster,
+)
 from shiplog.diagnosis.fitted import Fit
+from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal_campaign import Campaign
+from shiplog.diagnosis.on_off import Course
 from shiplog.diagnosis.raised_noise import Left
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
@@ -56,9 +66,28 @@ def nominal_side_force(campaign: Campaign, g: SegmentGrid) -> Remainder | None:
 
 
 def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) -> SideForce:
-    """Of what a hypothesis leaves; `at_one_place` as `raised_noise.by_channel` has it."""
+    """Of what a hypothesis leaves; `at_one_place` as `raised_noise.by_channel` has it. It is on or
+    off where its pattern may be that of a device, and such a course is more probable: that of this
+    estimate, or the one that the hypothesis has."""
     left = noise_left(trial, fit)
-    return unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
+    found = unrecorded_thruster.estimate_side_force(left, trial.reference, at_one_place)
+    if found.gain <= 0.0:
+        return found
+    force, deviation = force_at_nodes(trial, fit, found, trial.process_noise(found.remainder))
+    found = replace(found, device=of_one_device(force, deviation))
+    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
+    kept = trial.weight > 0.0
+    if found.device == 0.0:
+        return found
+    courses = [on_off.course(force[kept], np.abs(deviation[kept]), rows[kept])]
+    if fit.remainder.on:
+        courses.append(Course(fit.remainder.on, fit.remainder.on_prior))
+    devices = (
+        unrecorded_thruster.while_on(left, trial.reference, found, course, rows[kept])
+        for course in courses
+        if course is not None
+    )
+    return max((found, *devices), key=lambda one: one.value)
 
 
 def noise_left(trial: Trial, fit: Fit) -> Left:
@@ -69,14 +98,20 @@ def noise_left(trial: Trial, fit: Fit) -> Left:
 
 
 def with_pattern(trial: Trial, fit: Fit, side_force: SideForce) -> SideForce:
-    """The same with the probability that it is one device's; `fit` has it in its remainder."""
+    """The same with the probability that it is one device's; `fit` has it in its remainder. Of a
+    force that is on or off, the course was found with that probability."""
+    if side_force.course is not None:
+        return side_force
     return replace(side_force, device=of_one_device(*force_at_nodes(trial, fit, side_force)))
 
 
-def force_at_nodes(trial: Trial, fit: Fit, side_force: SideForce) -> tuple[np.ndarray, np.ndarray]:
+def force_at_nodes(
+    trial: Trial, fit: Fit, side_force: SideForce, process_noise: ProcessNoise | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Force of the unrecorded thruster at the knots and its standard deviation [S, J] in N; of a
-    hypothesis whose remainder has it."""
-    process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
+    hypothesis whose remainder has it, or in the given process noise that has it."""
+    if process_noise is None:
+        process_noise = trial.process_noise(fit.remainder).times(fit.found.noise_factor)
     left = fits.residual(trial, fit.point.linear, fit)
     z, covariance = likelihood.starts_and_knots(*left, process_noise)
     knots = trial.grid.knots
@@ -84,10 +119,11 @@ def force_at_nodes(trial: Trial, fit: Fit, side_force: SideForce) -> tuple[np.nd
     alone = replace(process_noise, acceleration=NO_NOISE * process_noise.acceleration)
     intermittent = alone.kernel(knots)
     share = intermittent @ np.linalg.inv(kernel)
-    accelerations = (z[:, 6:] @ share.T).reshape(len(z), 3, knots)
+    accelerations = (share @ z[:, 6:, None]).reshape(len(z), 3, knots)
     sway = slice(knots, 2 * knots)
-    beyond = (intermittent - share @ intermittent)[sway, sway]
-    known = share[sway] @ covariance[:, 6:, 6:] @ share[sway].T
+    beyond = (intermittent - share @ intermittent)[..., sway, sway]
+    of_sway = share[..., sway, :]
+    known = of_sway @ covariance[:, 6:, 6:] @ np.swapaxes(of_sway, -1, -2)
     variance = np.diagonal(known + beyond, axis1=1, axis2=2)
     return accelerations[:, 1] / side_force.unit[1], np.sqrt(
         np.maximum(variance, 0.0)

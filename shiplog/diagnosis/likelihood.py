@@ -18,13 +18,7 @@ import numpy as np
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.timescale import BIN, KNOT
 
-# Of the noise's variance, that may be coloured.
-COLOURED_SHARES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95)
-FADES = (1.0, 2.0, 4.0, 8.0, 16.0)  # s, in which that may fade
 INTERMITTENT_TIME_S = 12.0  # s, of an intermittent force on a three-metre ship: several bins
-LEAP = 16.0  # steps at once, at most
-ENOUGH_SEGMENTS = 8  # unbroken segments, fewer of which do not show it
-LEAST_NOISE = np.array([1e-3, 5e-4, 1e-3, 5e-4, 1e-4, 1e-4])  # of the noise: m, m/s, rad, rad/s
 
 
 @dataclass(frozen=True)
@@ -38,6 +32,8 @@ class ProcessNoise:
     start   [6]  of the initial state, before any data
     intermittent   [3]  acceleration of an intermittent force, of correlation time
                    `intermittent_time` [s]
+    runs    [S, J, J]  of a force that is on or off: 1 where it is on at both knots of a segment, in
+                   one run, and 0 elsewhere; None where it may act at any time
     bin, knot    s of one observation, and between the nodes of the acceleration
     """
 
@@ -47,47 +43,51 @@ class ProcessNoise:
     start: np.ndarray
     intermittent: np.ndarray | None = None
     intermittent_time: float = INTERMITTENT_TIME_S
+    runs: np.ndarray | None = None
     coloured: np.ndarray = field(default_factory=lambda: np.zeros(6))
     fade: np.ndarray = field(default_factory=lambda: np.ones(6))
     bin: float = BIN
     knot: float = KNOT
 
     def kernel(self, knots: int) -> np.ndarray:
-        """Covariance [3J, 3J] of the acceleration at the knots, channel by channel."""
+        """Covariance [3J, 3J] of the acceleration at the knots, channel by channel; with a force
+        that is on or off [S, 3J, 3J]."""
         apart = self.knot * np.arange(knots)
-        whole = np.kron(np.diag(self.acceleration**2), _decay(apart, self.time))
-        if self.intermittent is not None:
-            whole += np.kron(
-                np.outer(self.intermittent, self.intermittent),
-                _decay(apart, self.intermittent_time),
-            )
-        return whole
+        whole = np.kron(np.diag(self.acceleration**2), decay(apart, self.time))
+        if self.intermittent is None:
+            return whole
+        force = np.outer(self.intermittent, self.intermittent)
+        lasts = decay(apart, self.intermittent_time)
+        if self.runs is None:
+            return whole + np.kron(force, lasts)
+        each = np.einsum("ab,sij->saibj", force, self.runs * lasts)
+        return whole + each.reshape(len(each), *whole.shape)
 
     def times(self, factor: float) -> ProcessNoise:
         return replace(self, acceleration=self.acceleration * factor)
 
     def precision(self, knots: int) -> np.ndarray:
-        """Of z [Z, Z]."""
-        size = 6 + 3 * knots
-        whole = np.zeros((size, size))
-        whole[:6, :6] = np.diag(self.start**-2.0)
-        whole[6:, 6:] = np.linalg.inv(self.kernel(knots))
+        """Of z [Z, Z]; with a force that is on or off [S, Z, Z]."""
+        size, known = 6 + 3 * knots, np.linalg.inv(self.kernel(knots))
+        whole = np.zeros((*known.shape[:-2], size, size))
+        whole[..., :6, :6] = np.diag(self.start**-2.0)
+        whole[..., 6:, 6:] = known
         return whole
 
 
-def _decay(at: np.ndarray, time: float) -> np.ndarray:
+def decay(at: np.ndarray, time: float) -> np.ndarray:
     """Correlation [J, J] of an Ornstein-Uhlenbeck process at knots at these times [J]."""
     return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(len(at))
 
 
-def _correlation(share: float, fade: float, at: np.ndarray) -> np.ndarray:
+def correlation_of_noise(share: float, fade: float, at: np.ndarray) -> np.ndarray:
     """[B, B] of noise at these times [B] of which a share lasts, as an Ornstein-Uhlenbeck process
     does."""
     apart = np.abs(np.subtract.outer(at, at))
     return (1.0 - share) * np.eye(len(at)) + share * np.exp(-apart / fade)
 
 
-class _Whitening:
+class Whitening:
     """Observations in units in which their noise is white and of unit size."""
 
     def __init__(self, used: np.ndarray, process_noise: ProcessNoise) -> None:
@@ -98,7 +98,7 @@ class _Whitening:
         self.logdet = 2.0 * float((used * np.log(process_noise.noise)).sum())
         for channel in range(6):
             patterns, of = np.unique(used[..., channel], axis=0, return_inverse=True)
-            correlation = _correlation(
+            correlation = correlation_of_noise(
                 process_noise.coloured[channel], process_noise.fade[channel], at
             )
             roots = np.zeros((len(patterns), bins, bins))
@@ -133,7 +133,7 @@ class Weighed:
 
 
 def weighed(linear: Linear, process_noise: ProcessNoise) -> Weighed:
-    white = _Whitening(linear.cut.used, process_noise)
+    white = Whitening(linear.cut.used, process_noise)
     d = white(np.concatenate((linear.e[..., None], linear.j), -1))
     z = white(linear.z)
     zt = np.swapaxes(z, 1, 2)
@@ -243,7 +243,8 @@ class Startless:
         bordered[:, :knots, knots:], bordered[:, knots:, knots:] = self.kd, self.dd
         bordered[:, knots, :knots] = self.kd[..., 0]
         root = np.diagonal(np.linalg.cholesky(bordered), axis1=1, axis2=2)
-        of_kernel = len(self.kk) * np.linalg.slogdet(kernel)[1]
+        each = np.broadcast_to(np.linalg.slogdet(kernel)[1], len(self.kk))
+        of_kernel = float(each.sum())
         volume = of_kernel + 2.0 * float(np.log(root[:, :knots]).sum())
         return root[:, knots] ** 2, self.logdet + volume
 
@@ -274,10 +275,11 @@ def modes(weighed: Weighed, process_noise: ProcessNoise) -> Modes:
     np.linalg.LinAlgError where the path diverged."""
     left = startless(weighed, process_noise)
     root = np.linalg.cholesky(process_noise.kernel(weighed.knots))
-    felt, axes = np.linalg.eigh(root.T @ left.kk @ root)
+    turned = np.swapaxes(root, -1, -2)
+    felt, axes = np.linalg.eigh(turned @ left.kk @ root)
     across = np.swapaxes(axes, 1, 2)
     return Modes(
-        left.dd, across @ (root.T @ left.kd), np.maximum(felt, 0.0),
+        left.dd, across @ (turned @ left.kd), np.maximum(felt, 0.0),
         across @ np.linalg.inv(root), left.logdet, np.zeros((*felt.shape, 0)),
     )  # fmt: skip
 
@@ -290,60 +292,7 @@ def _of_start(weighed: Weighed, known: np.ndarray) -> float:
     return float(of.sum())
 
 
-def learnt(
-    linear: Linear, d: np.ndarray, process_noise: ProcessNoise, rounds: int = 4
-) -> ProcessNoise:
-    """Instrument and process noise that fit the residuals of d, by expectation-maximisation
-    (Dempster et al. 1977). Of three steps a round, the first two give the length of the third
-    (SQUAREM, Varadhan & Roland 2008). The colour of the noise is estimated once, at the end.
-
-    d   [C] the numbers of the columns
-    """
-    left = (linear.e - linear.j @ d)[..., None]
-    products = _by_channel(linear, left, process_noise)
-    counted = np.maximum(linear.cut.used.sum((0, 1)), 1)
-    knots = (linear.z.shape[-1] - 6) // 3
-    inverse = np.linalg.inv(_decay(process_noise.knot * np.arange(knots), process_noise.time))
-    least = np.log(np.concatenate((LEAST_NOISE, np.full(3, 1e-12))))
-
-    def at(sizes: np.ndarray) -> ProcessNoise:
-        return replace(process_noise, noise=np.exp(sizes[:6]), acceleration=np.exp(sizes[6:]))
-
-    def step(sizes: np.ndarray) -> np.ndarray:
-        """Logarithms of instrument and process noise [9] after one step."""
-        now = at(sizes)
-        whole = np.tensordot(now.noise**-2.0, products, 1)
-        covariance = np.linalg.inv(whole[:, 1:, 1:] + now.precision(knots))
-        gap = covariance @ whole[:, 1:, :1]
-        gap = np.concatenate((np.ones((len(gap), 1, 1)), -gap), 1)  # of [e | Z], what z leaves
-        second = gap @ np.swapaxes(gap, 1, 2)
-        second[:, 1:, 1:] += covariance
-        noise = products.reshape(6, -1) @ second.reshape(-1) / counted
-        accelerations = second[:, 7:, 7:].mean(0).reshape(3, knots, 3, knots)
-        acceleration = np.einsum("ij,cicj->c", inverse, accelerations) / knots
-        return np.maximum(0.5 * np.log(np.concatenate((noise, acceleration))), least)
-
-    sizes = np.log(np.concatenate((process_noise.noise, process_noise.acceleration)))
-    for _ in range(rounds):
-        one = step(sizes)
-        two = step(one)
-        first, second = one - sizes, two - one
-        bend = float(np.linalg.norm(second - first))
-        leap = float(np.clip(np.linalg.norm(first) / max(bend, 1e-12), 1.0, LEAP))
-        sizes = step(sizes + 2.0 * leap * first + leap**2 * (second - first))
-    return _coloured(linear, left, at(sizes))
-
-
-def _by_channel(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> np.ndarray:
-    """Products [6, S, 1 + Z, 1 + Z] of [error | Z] in each channel alone, were its noise of unit
-    size: what its size is changes but their weight."""
-    by = _Whitening(linear.cut.used, replace(process_noise, noise=np.ones(6))).by
-    both = np.concatenate((left, linear.z), -1)
-    white = (each @ both[:, :, channel] for channel, each in enumerate(by))
-    return np.stack([np.swapaxes(values, 1, 2) @ values for values in white])
-
-
-def _posterior(
+def posterior_in_white(
     z: np.ndarray, left: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
@@ -352,46 +301,11 @@ def _posterior(
     return covariance @ (zt @ left), covariance
 
 
-def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> ProcessNoise:
-    """With the most probable colour of each channel's noise, from the second moments of complete
-    stretches; its standard deviation follows."""
-    used = linear.cut.used
-    whole = used.all((1, 2))
-    if whole.sum() < ENOUGH_SEGMENTS:
-        return process_noise
-    z, error = linear.z[whole], left[whole]
-    white = _Whitening(used[whole], process_noise)
-    mean, covariance = _posterior(white(z), white(error), process_noise)
-    bins = used.shape[1]
-    noise, coloured, fade = (
-        process_noise.noise.copy(),
-        process_noise.coloured.copy(),
-        process_noise.fade.copy(),
-    )
-    for channel in range(6):
-        columns = z[:, :, channel]
-        gap = error[:, :, channel] - columns @ mean
-        second = gap[..., 0].T @ gap[..., 0]
-        second += (columns @ covariance @ np.swapaxes(columns, 1, 2)).sum(0)
-        best = np.inf
-        for share in COLOURED_SHARES:
-            for time in FADES if share > 0.0 else FADES[:1]:
-                correlation = _correlation(share, time, process_noise.bin * np.arange(bins))
-                variance = np.trace(np.linalg.solve(correlation, second)) / (bins * len(gap))
-                cost = np.linalg.slogdet(correlation)[1] + bins * np.log(variance)
-                if cost < best:
-                    best, coloured[channel], fade[channel] = cost, share, time
-                    noise[channel] = np.sqrt(variance)
-    return replace(
-        process_noise, noise=np.maximum(noise, LEAST_NOISE), coloured=coloured, fade=fade
-    )
-
-
 def starts_and_knots(
     linear: Linear, d: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
     """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
-    white = _Whitening(linear.cut.used, process_noise)
+    white = Whitening(linear.cut.used, process_noise)
     left = white((linear.e - linear.j @ d)[..., None])
-    z, covariance = _posterior(white(linear.z), left, process_noise)
+    z, covariance = posterior_in_white(white(linear.z), left, process_noise)
     return z[..., 0], covariance

@@ -13,6 +13,7 @@ from shiplog.diagnosis import (
     discrepancy,
     likelihood,
     linearisation,
+    noise_estimate,
     segment_nodes,
     segments,
 )
@@ -299,7 +300,7 @@ class _Joint:
         count = self.columns.linearised
         left = self.linear.less(self.accelerations @ found[count:])
         numbers = (found * self.columns.unit)[:count]
-        return likelihood.learnt(left, numbers, process_noise, rounds=rounds)
+        return noise_estimate.learnt(left, numbers, process_noise, rounds=rounds)
 
 
 def within(free: np.ndarray, covariance: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, float]:

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shiplog.diagnosis import on_off
 from shiplog.diagnosis.likelihood import ProcessNoise
+from shiplog.diagnosis.on_off import Intervals
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
 CHANGE_SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
@@ -30,6 +32,9 @@ class Remainder:
     intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force at one
                   place, in addition to the process noise
     force_lasts   factor of the correlation time of that force
+    on            of a force that is on or off, first and last row of the record of each run in
+                  which it is on; empty where it may act at any time
+    on_prior      log probability of such a course before any data, nats
     """
 
     kind: str = NOMINAL
@@ -39,11 +44,13 @@ class Remainder:
     noise_lasts: float = 1.0
     intermittent: tuple[float, float, float] | None = None
     force_lasts: float = 1.0
+    on: Intervals = ()
+    on_prior: float = 0.0
 
     @property
     def shape(self) -> tuple:
         """What of it makes the process noise more than a multiple of the nominal one."""
-        return self.channels, self.noise_lasts, self.intermittent, self.force_lasts
+        return self.channels, self.noise_lasts, self.intermittent, self.force_lasts, self.on
 
     @property
     def lasts(self) -> float:
@@ -71,16 +78,21 @@ class Remainder:
         force = np.zeros(3) if self.intermittent is None else np.array(self.intermittent)
         return float(np.prod(np.hypot(channels, force) / acceleration) ** (1.0 / len(channels)))
 
-    def in_noise(self, process_noise: ProcessNoise) -> ProcessNoise:
+    def in_noise(self, process_noise: ProcessNoise, rows: np.ndarray | None = None) -> ProcessNoise:
         """The process noise with the factors of its channels and of its time, and the intermittent
-        force in it."""
+        force in it.
+
+        rows   [S, J] of the record at the knots of segments; without them a force that is on or off
+               has its size only
+        """
         if not self.shaped:
             return process_noise
         force = None if self.intermittent is None else np.array(self.intermittent)
+        runs = on_off.runs(self.on, rows) if self.on and rows is not None else None
         acceleration = process_noise.acceleration * self.channels
         return replace(
             process_noise, acceleration=acceleration, time=self.noise_lasts * process_noise.time,
-            intermittent=force,
+            intermittent=force, runs=runs,
             intermittent_time=self.force_lasts * process_noise.intermittent_time,
         )  # fmt: skip
 
@@ -99,6 +111,6 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     if not remainder.shaped:  # one number for all three
         return float(-0.5 * square / len(by_channel) - cost)
     if remainder.lasts == 1.0:
-        return float(-0.5 * square - SHAPE_NUMBERS * cost)
+        return float(-0.5 * square - SHAPE_NUMBERS * cost) + remainder.on_prior
     square += (math.log(remainder.lasts) / TIME_SPREAD) ** 2
-    return float(-0.5 * square - (SHAPE_NUMBERS + 1) * cost)
+    return float(-0.5 * square - (SHAPE_NUMBERS + 1) * cost) + remainder.on_prior

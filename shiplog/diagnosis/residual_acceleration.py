@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
-from shiplog.diagnosis import segments
+from shiplog.diagnosis import segment_nodes, segments
 from shiplog.diagnosis.likelihood import ProcessNoise, starts_and_knots
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.voyages.recording import Record
@@ -67,7 +67,7 @@ def posterior(
     z, covariance = starts_and_knots(linear, d, process_noise)
     mean = z[:, 6:]
     sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 6:])
-    rows = linear.cut.rows[:, None] + round(record.timescale.knot / record.step) * np.arange(knots)
+    rows = segment_nodes.rows_at_knots(linear.cut.rows, segments.grid(record))
     return Unexplained(
         mean.reshape(count, 3, knots),
         sd.reshape(count, 3, knots),

@@ -39,6 +39,11 @@ def at_knots(segments: Cut, g: SegmentGrid) -> Knots:
     return Knots(state, driven)
 
 
+def rows_at_knots(begins: np.ndarray, g: SegmentGrid) -> np.ndarray:
+    """[S, J] of the record, of segments that begin at these rows [S]."""
+    return begins[:, None] + round(g.knot / g.step) * np.arange(g.knots)
+
+
 def in_each_channel(waves: np.ndarray) -> np.ndarray:
     """[S, J, F] → [S, J, 3, 3F]."""
     count = waves.shape[-1]

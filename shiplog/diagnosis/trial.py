@@ -164,9 +164,11 @@ class Trial:
         (cause,) = (c for c in self.reference.model.causes if c.label == label)
         return cause
 
-    def process_noise(self, remainder: Remainder) -> ProcessNoise:
-        """The nominal one; with an intermittent force in it, where one remains."""
-        return remainder.in_noise(self.reference.process_noise)
+    def process_noise(self, remainder: Remainder, cut: segments.Cut | None = None) -> ProcessNoise:
+        """The nominal one; with an intermittent force in it, where one remains. Of the trial's own
+        segments, or of others."""
+        rows = segment_nodes.rows_at_knots(self.rows if cut is None else cut.rows, self.grid)
+        return remainder.in_noise(self.reference.process_noise, rows)
 
     def at(
         self,

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from shiplog.diagnosis import campaign_prior, discrepancy, likelihood
+from shiplog.diagnosis import campaign_prior, discrepancy, likelihood, segment_nodes
 from shiplog.diagnosis.campaign_parts import products
 from shiplog.diagnosis.discrepancy import Discrepancy
 from shiplog.diagnosis.fitted import Point
@@ -44,7 +44,8 @@ class Products:
     def modes(self, point: Point, noise_factor: float, remainder: Remainder) -> tuple[Modes, float]:
         """Products of the point, and the wanted factors λ: one pass serves every λ, but that of an
         intermittent force together with the process noise, whose axes turn with it."""
-        process_noise = remainder.in_noise(self._campaign.reference.process_noise)
+        rows = segment_nodes.rows_at_knots(point.linear.cut.rows, self._grid)
+        process_noise = remainder.in_noise(self._campaign.reference.process_noise, rows)
         shape, left = remainder.shape, noise_factor
         if process_noise.intermittent is not None:
             process_noise, shape, left = process_noise.times(noise_factor), (shape, left), 1.0

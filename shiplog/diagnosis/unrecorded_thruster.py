@@ -11,16 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
+from shiplog.diagnosis import on_off
 from shiplog.diagnosis.nominal_reference import Reference
+from shiplog.diagnosis.on_off import Course
 from shiplog.diagnosis.raised_noise import Left, by_channel
 from shiplog.diagnosis.remainder import INTERMITTENT, Remainder
 from shiplog.jit_cache import traced
 from shiplog.models.mmg import MMG, body
 
 REACH_LENGTHS = 0.5  # ship lengths from midship: a force acts on the ship
-# Share of the force, as `thresholds.FORM_ERROR`: the likelihood takes its course for Gaussian, and
-# pushed at one end a ship may drift to the side to which it turns, which no nominal voyage shows.
-FORM_ERROR = 0.1
 # To start from: places in ship lengths; forces in multiples of the one that accelerates the ship
 # sideways as much as the nominal process noise does
 LEVERS = np.linspace(-0.45, 0.45, 7)
@@ -34,15 +33,16 @@ SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 class SideForce:
     """An intermittent side force at one place, such as an unrecorded thruster's.
 
-    value   log likelihood, nats
+    value   log likelihood, nats; of a course that is on or off with its log probability
     gain    nats over process noise that is raised in each channel by itself
     lever   its place [m ahead of midship]
-    force   root mean square [N]
+    force   root mean square [N], while it is on
     unit    [3] acceleration of 1 N
     device  probability, by its pattern, that it is the force of one device
     lasts   its correlation time, over the usual one
     turning  [3] acceleration of 1 N m
     reach   how far from midship it may act [m]
+    course  when it is on, if it is either on or off
     """
 
     value: float
@@ -54,6 +54,7 @@ class SideForce:
     lasts: float = 1.0
     turning: np.ndarray = field(default_factory=lambda: np.zeros(3))
     reach: float = math.inf
+    course: Course | None = None
 
     @property
     def _coordinates(self) -> np.ndarray:
@@ -70,8 +71,11 @@ class SideForce:
     @property
     def remainder(self) -> Remainder:
         surge, sway, yaw = map(float, self.unit * self.force)
-        of = (surge, sway, yaw)
-        return Remainder(INTERMITTENT, intermittent=of, force_lasts=self.lasts)
+        of, course = (surge, sway, yaw), self.course or Course((), 0.0)
+        return Remainder(
+            INTERMITTENT, intermittent=of, force_lasts=self.lasts, on=course.on,
+            on_prior=course.prior,
+        )  # fmt: skip
 
 
 Step = tuple[SideForce, SideForce]
@@ -85,6 +89,8 @@ def extrapolated(last: Step, this: Step) -> SideForce:
     last, this  the force that the numbers were fitted with, and the estimate that followed
     """
     (first, to_first), (second, to_second) = last, this
+    if len({one.course is None for one in (*last, *this)}) > 1:  # sizes of another kind
+        return to_second
     before, now = to_first.lever - first.lever, to_second.lever - second.lever
     if before * now > 0.0 and abs(now) >= abs(before):  # they do not get shorter
         further = MOST_STEPS
@@ -101,28 +107,60 @@ def estimate_side_force(
     It accelerates sway and yaw together, as no other process noise does. `at_one_coordinates` as
     `raised_noise.by_channel` has it."""
     raised, _ = by_channel(left, at_one_coordinates)
-    ship, length = ref.model.stand_in, ref.setting.scale["length"]
-    across, turning = accelerations(ship, ref.coefficients, np.eye(3)[1:])  # of 1 N, of 1 N m
+    asked = _Asked(left, ref)
+    sizes = left.nominal.acceleration[1] / abs(asked.across[1]) * SIZES  # N
+    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: asked.value(*tried))
+    return asked.finer(np.array([lever, math.log(force), 0.0]), raised)
 
-    def of(lever: float, force: float, lasts: float = 1.0) -> float:
-        unit, time = across + lever * length * turning, lasts * left.nominal.intermittent_time
-        return left.likelihood(
-            replace(left.nominal, intermittent=unit * force, intermittent_time=time)
+
+def while_on(
+    left: Left, ref: Reference, stationary: SideForce, course: Course, rows: np.ndarray
+) -> SideForce:
+    """The most probable force of a device that is on or off, from one that may act at any time.
+
+    rows   [S, J] of the record at the knots of the segments that are `left`
+    """
+    runs = on_off.runs(course.on, rows)
+    known = replace(left, nominal=replace(left.nominal, runs=runs))
+    asked = _Asked(known, ref)
+    duty = max(float(np.diagonal(runs, axis1=1, axis2=2).mean()), 1.0 / runs.shape[1])
+    first = stationary._coordinates / np.array([asked.length, 1.0, 1.0])
+    first[1] -= 0.5 * math.log(duty)  # all of it acts while it is on
+    found = asked.finer(first, stationary.value - stationary.gain)
+    value, gain = found.value + course.prior, found.gain + course.prior
+    return replace(found, value=value, gain=gain, device=stationary.device, course=course)
+
+
+class _Asked:
+    """How likely a side force is, by its lever in ship lengths, size [N] and correlation time."""
+
+    def __init__(self, left: Left, ref: Reference) -> None:
+        self._left, self.length = left, ref.setting.scale["length"]
+        self.across, self._turning = accelerations(  # of 1 N, of 1 N m
+            ref.model.stand_in, ref.coefficients, np.eye(3)[1:]
         )
 
-    sizes = left.nominal.acceleration[1] / abs(across[1]) * SIZES  # N
-    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: of(*tried))
-    first = np.array([lever, math.log(force), 0.0])
-    finer = minimize(  # together with the place itself a part of the force would be another cause's
-        lambda at: -of(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
-        bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None), (-LASTS, LASTS)),
-        options={"initial_simplex": first + STEPS * np.eye(4, 3), "xatol": 0.005, "fatol": 0.1},
-    )  # fmt: skip
-    lever, (force, lasts) = float(finer.x[0]) * length, map(float, np.exp(finer.x[1:]))
-    one = -float(finer.fun)
-    unit = across + lever * turning
-    reach = REACH_LENGTHS * length
-    return SideForce(one, one - raised, lever, force, unit, 0.0, lasts, turning, reach)
+    def value(self, lever: float, force: float, lasts: float = 1.0) -> float:
+        unit, nominal = self.across + lever * self.length * self._turning, self._left.nominal
+        time = lasts * nominal.intermittent_time
+        return self._left.likelihood(
+            replace(nominal, intermittent=unit * force, intermittent_time=time)
+        )
+
+    def finer(self, first: np.ndarray, raised: float) -> SideForce:
+        """The most probable force near [3] a lever and logarithms of size and correlation time;
+        together with the place, or a part of it would be another cause's. `raised`: log likelihood
+        of raised noise."""
+        finer = minimize(
+            lambda at: -self.value(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
+            bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None), (-LASTS, LASTS)),
+            options={"initial_simplex": first + STEPS * np.eye(4, 3), "xatol": 0.005,
+                     "fatol": 0.1},
+        )  # fmt: skip
+        lever, (force, lasts) = float(finer.x[0]) * self.length, map(float, np.exp(finer.x[1:]))
+        one = -float(finer.fun)
+        unit, reach = self.across + lever * self._turning, REACH_LENGTHS * self.length
+        return SideForce(one, one - raised, lever, force, unit, 0.0, lasts, self._turning, reach)
 
 
 def accelerations(ship: MMG, coefficients: Mapping, force: np.ndarray) -> np.ndarray:

@@ -74,7 +74,8 @@ def _residual(done: DiagnosedTrial) -> tuple[pl.DataFrame, tuple[str, ...]]:
     ref, record = trial.reference, trial.record
     nothing = decision.nothing
     nominal = ref.mean * ref.columns.unit
-    process_noise = trial.process_noise(nothing.remainder).times(nothing.found.noise_factor)
+    process_noise = trial.process_noise(nothing.remainder, whole.cut)
+    process_noise = process_noise.times(nothing.found.noise_factor)
     found = residual_acceleration.posterior(*trial.left(whole, nominal), process_noise, record)
     keep = residual_acceleration.once(found)
     order = np.argsort(found.rows[keep])

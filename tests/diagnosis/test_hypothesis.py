@@ -77,11 +77,11 @@ def test_what_a_form_leaves_over_by_hand():
 
 
 def test_what_an_intermittent_force_leaves_over_by_hand():
-    """A tenth of it: every cause is a further one, the first as well."""
+    """Two hundredths of it: every cause is a further one, the first as well."""
     alone, by = {"drag": 300.0}, {cause.label: cause for cause in CAUSES}
     assert form_error(alone, (), by, 5000.0) == 0.0
-    assert form_error(alone, ("drag",), by, 5000.0) == pytest.approx(50.0)
-    assert form_error(alone, ("drag", "load"), by, 5000.0) == pytest.approx(100.0)
+    assert form_error(alone, ("drag",), by, 5000.0) == pytest.approx(2.0)
+    assert form_error(alone, ("drag", "load"), by, 5000.0) == pytest.approx(4.0)
     by["drag"] = type("Coarse", (One,), {"form_error": 0.2})("drag")  # leaves more than the force
     assert form_error(alone, ("drag", "load"), by, 500.0) == pytest.approx(300.0 * 0.04)
     assert form_error(alone, ("drag", "load"), by, -5.0) == pytest.approx(300.0 * 0.04)
@@ -95,6 +95,6 @@ def test_a_cause_next_to_an_intermittent_force_has_to_gain_more_than_the_force_l
     table.by = {cause.label: cause for cause in CAUSES}
     evidence = {((), NOMINAL): -20.0, ((), alone): 980.0}
     table.found = {key: SimpleNamespace(evidence=value) for key, value in evidence.items()}
-    for kind, left in ((INTERMITTENT, 10.0), (RAISED, 0.0), (NOMINAL, 0.0)):
+    for kind, left in ((INTERMITTENT, 0.4), (RAISED, 0.0), (NOMINAL, 0.0)):
         prior = table.priors.of(("drag",), kind)
         assert table.score(990.0, ("drag",), kind) == pytest.approx(990.0 + prior - left)

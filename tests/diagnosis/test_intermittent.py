@@ -9,13 +9,18 @@ import straight
 from straight import CAUSES, PROCESS_NOISE, SETTING
 
 from shiplog.diagnosis import (
+    evidence,
     intermittent,
     likelihood,
+    on_off,
     raised_noise,
+    segment_nodes,
     segments,
     unrecorded_thruster,
 )
+from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.intermittent import of_one_device
+from shiplog.diagnosis.nominal_reference import Reference
 from shiplog.diagnosis.remainder import INTERMITTENT, RAISED, Remainder, noise_prior
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
@@ -169,6 +174,103 @@ def test_a_nominal_force_at_one_place_is_no_force_of_the_trial(reference):
     nominal = replace(found.remainder, intermittent=tuple(elsewhere))
     other = estimated(linear, weight, reference, nominal)
     assert other.gain > 20.0
+
+
+# --- on or off
+
+
+def campaign(columns):
+    nominal = straight.sailed(COUNT, seed=3)
+    made = straight.campaign(nominal, straight.passed(nominal, columns), columns)
+    made.reference.model.stand_in = None  # what moves it is given
+    return made
+
+
+def pushed(force: float, seed: int = 4):
+    """A trial that is pushed at one place, each segment in turn: by a device with that force while
+    it is on, for 12 s, in either direction. Its rows, and where it is on [S, J]."""
+    record, columns = straight.sailed(COUNT), straight.columns_of(())
+    grid = segments.grid(record)
+    unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
+    on = np.zeros((COUNT, grid.knots), dtype=bool)
+    on[1::3, 4:10] = True
+    way = np.random.default_rng(seed).choice([-1.0, 1.0], COUNT)[:, None]
+    accelerations = (unit[None, :, None] * (force * way * on)[:, None]).reshape(COUNT, -1)
+    made = campaign(columns)
+    given = straight.passed(record, columns, accelerations=accelerations, seed=5)
+    return straight.trial(made, record, given), on
+
+
+@pytest.fixture
+def hull(monkeypatch):
+    monkeypatch.setattr(unrecorded_thruster, "accelerations", lambda *_: (ACROSS, TURNING))
+    monkeypatch.setattr(Reference, "coefficients", {})
+
+
+def left_with(trial, remainder):
+    found = evidence.fit(trial, trial.first, (), 1.0, remainder)
+    return Fit(trial.first, found, remainder)
+
+
+def test_a_device_is_on_where_it_pushes(hull):
+    trial, on = pushed(150.0)
+    found = intermittent.side_force(trial, left_with(trial, Remainder()))
+    assert found.device == 1.0 and found.course is not None
+    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
+    starts, ends = rows[1::3, 4], rows[1::3, 9]
+    assert found.course.on == tuple(zip(starts.tolist(), ends.tolist(), strict=True))
+    assert found.lever / SETTING.scale["length"] == pytest.approx(LEVER, abs=0.02)
+    # fitted with it, the process noise pushes while it is on, and there only
+    fit = left_with(trial, found.remainder)
+    force, deviation = intermittent.force_at_nodes(trial, fit, found)
+    assert np.abs(force[~on]).max() < 1e-6 * np.abs(force[on]).min()
+    assert np.abs(force[on]).mean() == pytest.approx(150.0, rel=0.1)
+    assert np.isfinite(deviation).all()
+    assert intermittent.with_pattern(trial, fit, found) is found
+    # it is more probable, with the course's own probability, than one that may act at any time
+    always = replace(found.remainder, on=(), on_prior=0.0)
+    assert fit.found.evidence > left_with(trial, always).found.evidence + 50.0
+
+
+def test_the_course_of_a_hypothesis_stays_where_it_is_more_probable(hull, monkeypatch):
+    """A course that is drawn anew from another estimate may be worse."""
+    trial, _ = pushed(150.0)
+    first = intermittent.side_force(trial, left_with(trial, Remainder()))
+    worse = on_off.Course(first.course.on[:2], first.course.prior)
+    monkeypatch.setattr(on_off, "course", lambda *_: worse)
+    again = intermittent.side_force(trial, left_with(trial, first.remainder))
+    assert again.course == first.course
+    assert intermittent.side_force(trial, left_with(trial, Remainder())).course is None
+
+
+def test_a_force_that_varies_has_no_course(hull):
+    """Drawn as the likelihood takes it, at any time."""
+    record, columns = straight.sailed(4 * COUNT), straight.columns_of(())
+    made = campaign(columns)
+    unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
+    varies = replace(PROCESS_NOISE, acceleration=1e-6 * PROCESS_NOISE.acceleration,
+                     intermittent=20.0 * unit)  # fmt: skip
+    drawn = np.random.default_rng(3).standard_normal((4 * COUNT, 3 * segments.grid(record).knots))
+    accelerations = drawn @ np.linalg.cholesky(varies.kernel(segments.grid(record).knots)).T
+    given = straight.passed(record, columns, accelerations=accelerations, seed=5)
+    trial = straight.trial(made, record, given)
+    found = intermittent.side_force(trial, left_with(trial, Remainder()))
+    assert found.gain > 30.0
+    assert (found.device, found.course) == (0.0, None)
+
+
+def test_what_is_on_or_off_is_of_the_shape_and_the_prior_of_a_remainder():
+    force = Remainder(INTERMITTENT, intermittent=(0.0, 0.01, 0.004), force_lasts=1.5)
+    device = replace(force, on=((30, 60),), on_prior=-12.0)
+    assert device.shape != force.shape
+    assert noise_prior(1.0, 0.2, device) == noise_prior(1.0, 0.2, force) - 12.0
+    usual = replace(device, force_lasts=1.0), replace(force, force_lasts=1.0)
+    assert noise_prior(1.0, 0.2, usual[0]) == noise_prior(1.0, 0.2, usual[1]) - 12.0
+    rows = np.array([[20, 30, 40], [60, 70, 80]])
+    runs = device.in_noise(PROCESS_NOISE, rows).runs
+    assert runs.tolist() == on_off.runs(((30, 60),), rows).tolist()
+    assert device.in_noise(PROCESS_NOISE).runs is None  # its size only
+    assert force.in_noise(PROCESS_NOISE, rows).runs is None
 
 
 # --- what is nominal of it

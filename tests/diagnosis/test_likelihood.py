@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shiplog.diagnosis import likelihood
+from shiplog.diagnosis import likelihood, noise_estimate
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.linear_segments import Linear, Path
 from shiplog.diagnosis.nominal_reference import inflation, marginal, nominal_information
@@ -32,7 +32,7 @@ def linear(segments: int, bins: int = 4, knots: int = 3, columns: int = 2, seed:
     return Linear(cut, path, rng.standard_normal(shape) * NOISE, z, j)
 
 
-def covariance(process_noise: ProcessNoise, knots: int) -> np.ndarray:
+def covariance(process_noise: ProcessNoise, knots: int, segment: int = 0) -> np.ndarray:
     """Of z, written out: free start, and accelerations that stay for `time` seconds."""
     at = KNOT * np.arange(knots)
     stays = np.exp(-np.abs(at[:, None] - at) / process_noise.time)
@@ -43,6 +43,8 @@ def covariance(process_noise: ProcessNoise, knots: int) -> np.ndarray:
         whole[part, part] = process_noise.acceleration[channel] ** 2 * stays
     if process_noise.intermittent is not None:
         stays = np.exp(-np.abs(at[:, None] - at) / process_noise.intermittent_time)
+        if process_noise.runs is not None:
+            stays = stays * process_noise.runs[segment]
         whole[6:, 6:] += np.kron(
             np.outer(process_noise.intermittent, process_noise.intermittent), stays
         )
@@ -69,10 +71,10 @@ def dense(given: Linear, process_noise: ProcessNoise, fitted: bool = False):
     """Of each segment: the observations used, their columns, and C = R + Z K Zᵀ, explicitly.
     `fitted`: without what the start adds to it."""
     knots = (given.z.shape[-1] - 6) // 3
-    kernel = covariance(process_noise, knots)
-    if fitted:
-        kernel[:6] = 0.0
     for s in range(len(given.e)):
+        kernel = covariance(process_noise, knots, s)
+        if fitted:
+            kernel[:6] = 0.0
         used = given.cut.used[s].ravel()
         z = given.z[s].reshape(-1, given.z.shape[-1])[used]
         r = observed(process_noise, given.e.shape[1])[np.ix_(used, used)]
@@ -88,10 +90,15 @@ COLOURED = replace(
     PROCESS_NOISE, coloured=np.array([0.9, 0.5, 0.0, 0.3, 0.7, 0.95]),
     fade=np.array([1.0, 8.0, 1.0, 2.0, 3.0, 16.0]),
 )  # fmt: skip
+# On in the first two knots of three, in none, and in two that are not of one run.
+ON_OFF = replace(
+    INTERMITTENT, runs=np.array([[[1, 1, 0], [1, 1, 0], [0, 0, 0]], np.zeros((3, 3)),
+                                 [[1, 0, 0], [0, 0, 0], [0, 0, 1]]])
+)  # fmt: skip
 EACH = pytest.mark.parametrize(
     "process_noise",
-    (PROCESS_NOISE, INTERMITTENT, COLOURED),
-    ids=("plain", "intermittent", "coloured"),
+    (PROCESS_NOISE, INTERMITTENT, ON_OFF, COLOURED),
+    ids=("plain", "intermittent", "on and off", "coloured"),
 )
 
 
@@ -221,8 +228,8 @@ def test_start_and_knots_are_the_posterior_mean(process_noise):
     """K Zᵀ C⁻¹ (e - J d), written out."""
     given, d = linear(3), np.array([0.3, -0.7])
     found, _ = likelihood.starts_and_knots(given, d, process_noise)
-    kernel = covariance(process_noise, 3)
     for s, (e, j, c) in enumerate(dense(given, process_noise)):
+        kernel = covariance(process_noise, 3, s)
         z = given.z[s].reshape(-1, 15)[given.cut.used[s].ravel()]
         mean = kernel @ z.T @ np.linalg.solve(c, e - j @ d)
         assert found[s] == pytest.approx(mean, rel=1e-5, abs=1e-7)
@@ -287,7 +294,7 @@ def test_sizes_are_learnt_from_draws_of_the_model():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise
     e[~given.cut.used] = 1e3  # nobody looks there
     begin = replace(PROCESS_NOISE, noise=NOISE * 3.0, acceleration=PROCESS_NOISE.acceleration / 3.0)
-    found = likelihood.learnt(replace(given, e=e), d, begin, rounds=25)
+    found = noise_estimate.learnt(replace(given, e=e), d, begin, rounds=25)
     assert found.noise == pytest.approx(NOISE, rel=0.15)
     assert found.acceleration == pytest.approx(PROCESS_NOISE.acceleration, rel=0.15)
     assert found.time == PROCESS_NOISE.time and (found.start == PROCESS_NOISE.start).all()
@@ -308,7 +315,7 @@ def test_sizes_learnt_are_the_likeliest():
     begin = replace(
         PROCESS_NOISE, noise=NOISE * 10.0, acceleration=PROCESS_NOISE.acceleration / 10.0
     )
-    found = likelihood.learnt(given, np.zeros(2), begin, rounds=5)
+    found = noise_estimate.learnt(given, np.zeros(2), begin, rounds=5)
 
     def log_density(sizes):
         tried = replace(found, noise=sizes[:6], acceleration=sizes[6:])
@@ -336,14 +343,14 @@ def test_colour_of_the_noise_is_learnt_from_draws_of_it():
     e = np.einsum("sbcz,sz->sbc", given.z, z) + given.j @ d + noise.reshape(given.e.shape)
     drawn, found = replace(given, e=e), PROCESS_NOISE
     for _ in range(4):
-        found = likelihood.learnt(drawn, d, found, rounds=6)
+        found = noise_estimate.learnt(drawn, d, found, rounds=6)
     assert found.coloured[5] == pytest.approx(0.8, abs=0.1) and found.fade[5] == 4.0
     assert (found.coloured[:5] <= 0.2).all()
     assert found.noise == pytest.approx(NOISE, rel=0.1)
     holes = replace(
         drawn, cut=replace(drawn.cut, used=drawn.cut.used & (np.arange(15) != 7)[:, None])
     )
-    assert (likelihood.learnt(holes, d, PROCESS_NOISE, rounds=1).coloured == 0.0).all()
+    assert (noise_estimate.learnt(holes, d, PROCESS_NOISE, rounds=1).coloured == 0.0).all()
 
 
 def test_one_campaign_is_believed_less_where_voyages_disagree():

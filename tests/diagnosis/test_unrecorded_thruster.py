@@ -15,6 +15,7 @@ from shiplog.diagnosis import (
     segments,
     unrecorded_thruster,
 )
+from shiplog.diagnosis.on_off import Course
 
 
 def test_an_unrecorded_thruster_is_placed_where_it_stands(monkeypatch):
@@ -84,6 +85,13 @@ def test_steps_that_shrink_by_one_rate_lead_to_their_limit(rate, lever, force):
     assert found.unit == pytest.approx([0.0, 0.01, 0.02 * lever])
     assert found.remainder.intermittent == pytest.approx(tuple(found.unit * found.force))
     assert found.lasts == pytest.approx(2.0)
+
+
+def test_sizes_of_another_kind_are_not_extrapolated():
+    """Of a force that may act at any time, and of one while it is on."""
+    always, device = side_force(0.2), replace(side_force(0.4), course=Course(((30, 60),), -9.0))
+    assert unrecorded_thruster.extrapolated((always, device), (device, device)) is device
+    assert unrecorded_thruster.extrapolated((always, always), (always, device)) is device
 
 
 def test_extrapolation_goes_no_farther_than_the_ship_reaches():

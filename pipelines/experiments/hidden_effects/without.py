@@ -41,7 +41,6 @@ from shiplog.diagnosis import (
     refutation,
     thresholds,
     trial_voyages,
-    unrecorded_thruster,
     voyage_effects,
 )
 from shiplog.diagnosis.hypotheses import Hypotheses
@@ -54,8 +53,7 @@ def _no_placebo(stack: ExitStack) -> None:
 
 
 def _no_form_error(stack: ExitStack) -> None:
-    for where in (thresholds, unrecorded_thruster):
-        stack.enter_context(patch.object(where, "FORM_ERROR", 0.0))
+    stack.enter_context(patch.object(thresholds, "FORM_ERROR", 0.0))
     for coarse in {type(cause) for cause in CATALOGUE if cause.form_error}:
         stack.enter_context(patch.object(coarse, "form_error", 0.0))
 

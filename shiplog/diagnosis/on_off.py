@@ -1,0 +1,109 @@
+"""When a force that is either on or off was on.
+
+A hidden Markov model of two states (Rabiner 1989): the force at a knot is Gaussian about zero,
+large or small. The most probable course of the states and the sizes are estimated in turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import betaln
+
+STRONGEST = 0.95  # quantile of the force's size, since a single knot may be off
+ON = 0.5  # share of the strongest, above which it is on, to start from
+ROUNDS = 10  # of estimating course and sizes in turn, at most
+LEAST_SHARE = 1e-3  # of the large force, that the small one is at least
+
+Intervals = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Course:
+    """on     first and last row of the record of each run in which the force is on
+    prior  log probability of such a course before any data, nats"""
+
+    on: Intervals
+    prior: float
+
+
+def course(force: np.ndarray, deviation: np.ndarray, rows: np.ndarray) -> Course | None:
+    """The most probable one of a force [S, J] with a standard deviation [S, J] of its estimate, at
+    these rows [S, J] of the record, in order. None where it is always on, or always off."""
+    size, variance = np.abs(force.ravel()), deviation.ravel() ** 2
+    on = size > ON * np.quantile(size, STRONGEST)
+    for _ in range(ROUNDS):
+        if on.all() or not on.any():
+            return None
+        large = float(np.mean(size[on] ** 2))
+        small = max(float(np.mean(size[~on] ** 2)), LEAST_SHARE**2 * large)
+        each = np.stack([_log_density(size, v + variance) for v in (small, large)], -1)
+        before, on = on, _most_probable(each, _log_transitions(on))
+        if (on == before).all():
+            break
+    if on.all() or not on.any():
+        return None
+    return Course(_intervals(on.reshape(rows.shape), rows), _log_prior(on))
+
+
+def runs(on: Intervals, rows: np.ndarray) -> np.ndarray:
+    """[S, J, J] 1 where the force is on at both knots of a segment, in one run, and 0 elsewhere;
+    `rows` [S, J] of the record at the knots."""
+    first, last = np.array(on).T
+    of = np.searchsorted(first, rows, side="right") - 1
+    of = np.where((of >= 0) & (rows <= last[of]), of, -1)
+    return ((of[:, :, None] == of[:, None, :]) & (of[:, :, None] >= 0)).astype(float)
+
+
+def _log_density(size: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    return -0.5 * (size**2 / variance + np.log(variance))
+
+
+def _counts(on: np.ndarray) -> np.ndarray:
+    """[2, 2] how often each state (off, on) is followed by each."""
+    pairs = 2 * on[:-1].astype(int) + on[1:]
+    return np.bincount(pairs, minlength=4).reshape(2, 2).astype(float)
+
+
+def _log_transitions(on: np.ndarray) -> np.ndarray:
+    """[2, 2] from each state to each: their mean after a uniform prior (Laplace)."""
+    counts = _counts(on) + 1.0
+    return np.log(counts / counts.sum(1, keepdims=True))
+
+
+def _log_prior(on: np.ndarray) -> float:
+    """Of the states after the first, each probability of a change uniform from 0 to 1."""
+    (stays_off, goes_on), (goes_off, stays_on) = _counts(on)
+    whole = betaln(1.0 + goes_on, 1.0 + stays_off) + betaln(1.0 + goes_off, 1.0 + stays_on)
+    return float(whole) - math.log(2.0)  # either may be the first
+
+
+def _most_probable(each: np.ndarray, transitions: np.ndarray) -> np.ndarray:
+    """[n] bool (Viterbi 1967), of the log densities [n, 2] of each state."""
+    reached = each[0]
+    came_from = np.zeros(each.shape, dtype=int)
+    for at in range(1, len(each)):
+        ways = reached[:, None] + transitions
+        came_from[at] = ways.argmax(0)
+        reached = ways.max(0) + each[at]
+    states = np.empty(len(each), dtype=int)
+    states[-1] = reached.argmax()
+    for at in range(len(each) - 1, 0, -1):
+        states[at - 1] = came_from[at, states[at]]
+    return states.astype(bool)
+
+
+def _intervals(on: np.ndarray, rows: np.ndarray) -> Intervals:
+    """Rows of each run's first and last knot; runs of two segments that share a knot are one."""
+    found: list[tuple[int, int]] = []
+    for states, at in zip(on, rows, strict=True):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], states, [False])).astype(int)))
+        for begin, end in edges.reshape(-1, 2):
+            first, last = int(at[begin]), int(at[end - 1])
+            if found and first <= found[-1][1]:
+                found[-1] = (found[-1][0], max(last, found[-1][1]))
+            else:
+                found.append((first, last))
+    return tuple(found)
