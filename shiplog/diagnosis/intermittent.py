@@ -22,16 +22,15 @@ from shiplog.diagnosis import (
 from shiplog.diagnosis.fitted import Fit
 from shiplog.diagnosis.likelihood import ProcessNoise
 from shiplog.diagnosis.nominal_campaign import Campaign
-from shiplog.diagnosis.on_off import Course
+from shiplog.diagnosis.on_off import ON, STRONGEST
 from shiplog.diagnosis.raised_noise import Left
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.segments import SegmentGrid
 from shiplog.diagnosis.trial import Trial
 from shiplog.diagnosis.unrecorded_thruster import SideForce
 
-# How the pattern of a force is read. Its strongest is a quantile, since a single knot may be off.
-STRONGEST = 0.95
-ON, OFF = 0.5, 0.2  # shares of the strongest, above which it is on, and below which it is off
+# How the pattern of a force is read
+OFF = 0.2  # share of the strongest, below which it is off
 KNOWN = 2.0  # standard deviations of the estimate: a weaker force shows no pattern
 COMES_AND_GOES = 0.5  # of the time: what is on for longer is no device that comes and goes
 NO_NOISE = 1e-9  # of the process noise, that leaves the intermittent force by itself
@@ -75,15 +74,13 @@ def side_force(trial: Trial, fit: Fit, at_one_place: Remainder | None = None) ->
         return found
     force, deviation = force_at_nodes(trial, fit, found, trial.process_noise(found.remainder))
     found = replace(found, device=of_one_device(force, deviation))
-    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
-    kept = trial.weight > 0.0
     if found.device == 0.0:
         return found
-    courses = [on_off.course(force[kept], np.abs(deviation[kept]), rows[kept])]
-    if fit.remainder.on:
-        courses.append(Course(fit.remainder.on, fit.remainder.on_prior))
+    kept = trial.weight > 0.0
+    rows = segment_nodes.rows_at_knots(trial.rows[kept], trial.grid)
+    courses = (on_off.course(force[kept], np.abs(deviation[kept]), rows), fit.remainder.course)
     devices = (
-        unrecorded_thruster.while_on(left, trial.reference, found, course, rows[kept])
+        unrecorded_thruster.estimate_on_off_force(left, trial.reference, found, course, rows)
         for course in courses
         if course is not None
     )

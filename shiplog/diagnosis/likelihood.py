@@ -76,13 +76,14 @@ class ProcessNoise:
 
 
 def decay(at: np.ndarray, time: float) -> np.ndarray:
-    """Correlation [J, J] of an Ornstein-Uhlenbeck process at knots at these times [J]."""
+    """Correlation [J, J] of an Ornstein-Uhlenbeck process at these times [J], s, that fades within
+    `time`, s."""
     return np.exp(-np.abs(at[:, None] - at) / time) + 1e-9 * np.eye(len(at))
 
 
 def correlation_of_noise(share: float, fade: float, at: np.ndarray) -> np.ndarray:
-    """[B, B] of noise at these times [B] of which a share lasts, as an Ornstein-Uhlenbeck process
-    does."""
+    """[B, B] of noise at these times [B], s, of which a share lasts, as an Ornstein-Uhlenbeck
+    process does, and fades within `fade`, s."""
     apart = np.abs(np.subtract.outer(at, at))
     return (1.0 - share) * np.eye(len(at)) + share * np.exp(-apart / fade)
 
@@ -292,7 +293,7 @@ def _of_start(weighed: Weighed, known: np.ndarray) -> float:
     return float(of.sum())
 
 
-def posterior_in_white(
+def whitened_posterior(
     z: np.ndarray, left: np.ndarray, process_noise: ProcessNoise
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean [S, Z, 1] and covariance [S, Z, Z] of start and knots, of columns and error in white."""
@@ -307,5 +308,5 @@ def starts_and_knots(
     """z [S, Z] of every segment and its covariance [S, Z, Z], the numbers d [C] given."""
     white = Whitening(linear.cut.used, process_noise)
     left = white((linear.e - linear.j @ d)[..., None])
-    z, covariance = posterior_in_white(white(linear.z), left, process_noise)
+    z, covariance = whitened_posterior(white(linear.z), left, process_noise)
     return z[..., 0], covariance

@@ -11,7 +11,7 @@ from shiplog.diagnosis.likelihood import (
     Whitening,
     correlation_of_noise,
     decay,
-    posterior_in_white,
+    whitened_posterior,
 )
 from shiplog.diagnosis.linear_segments import Linear
 
@@ -85,7 +85,7 @@ def _coloured(linear: Linear, left: np.ndarray, process_noise: ProcessNoise) -> 
         return process_noise
     z, error = linear.z[whole], left[whole]
     white = Whitening(used[whole], process_noise)
-    mean, covariance = posterior_in_white(white(z), white(error), process_noise)
+    mean, covariance = whitened_posterior(white(z), white(error), process_noise)
     bins = used.shape[1]
     noise, coloured, fade = (
         process_noise.noise.copy(),

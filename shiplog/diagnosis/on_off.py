@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import betaln
 
 STRONGEST = 0.95  # quantile of the force's size, since a single knot may be off
-ON = 0.5  # share of the strongest, above which it is on, to start from
+ON = 0.5  # share of the strongest, above which it is on, before a course is known
 ROUNDS = 10  # of estimating course and sizes in turn, at most
 LEAST_SHARE = 1e-3  # of the large force, that the small one is at least
 
@@ -22,16 +22,22 @@ Intervals = tuple[tuple[int, int], ...]
 
 @dataclass(frozen=True)
 class Course:
-    """on     first and last row of the record of each run in which the force is on
-    prior  log probability of such a course before any data, nats"""
+    """When a force is on.
+
+    on     first and last row of the record of each run in which it is, in order
+    prior  log probability of such a course before any data, nats
+    """
 
     on: Intervals
     prior: float
 
 
 def course(force: np.ndarray, deviation: np.ndarray, rows: np.ndarray) -> Course | None:
-    """The most probable one of a force [S, J] with a standard deviation [S, J] of its estimate, at
-    these rows [S, J] of the record, in order. None where it is always on, or always off."""
+    """The most probable course; None where the force is always on, or always off.
+
+    force, deviation  [S, J] estimate at the knots and its standard deviation, N
+    rows              [S, J] of the record at the knots, in order
+    """
     size, variance = np.abs(force.ravel()), deviation.ravel() ** 2
     on = size > ON * np.quantile(size, STRONGEST)
     for _ in range(ROUNDS):

@@ -9,7 +9,7 @@ import numpy as np
 
 from shiplog.diagnosis import on_off
 from shiplog.diagnosis.likelihood import ProcessNoise
-from shiplog.diagnosis.on_off import Intervals
+from shiplog.diagnosis.on_off import Course
 
 NOMINAL, RAISED, INTERMITTENT = "nominal", "raised", "intermittent"
 CHANGE_SIZES = (1.0, 3.0, 9.0)  # of a change of a family's weights, in units of the process noise
@@ -32,9 +32,7 @@ class Remainder:
     intermittent  root mean square acceleration [m/s², m/s², rad/s²] of an intermittent force at one
                   place, in addition to the process noise
     force_lasts   factor of the correlation time of that force
-    on            of a force that is on or off, first and last row of the record of each run in
-                  which it is on; empty where it may act at any time
-    on_prior      log probability of such a course before any data, nats
+    course        of that force, if it is on or off; None where it may act at any time
     """
 
     kind: str = NOMINAL
@@ -44,13 +42,12 @@ class Remainder:
     noise_lasts: float = 1.0
     intermittent: tuple[float, float, float] | None = None
     force_lasts: float = 1.0
-    on: Intervals = ()
-    on_prior: float = 0.0
+    course: Course | None = None
 
     @property
     def shape(self) -> tuple:
         """What of it makes the process noise more than a multiple of the nominal one."""
-        return self.channels, self.noise_lasts, self.intermittent, self.force_lasts, self.on
+        return self.channels, self.noise_lasts, self.intermittent, self.force_lasts, self.course
 
     @property
     def lasts(self) -> float:
@@ -88,7 +85,9 @@ class Remainder:
         if not self.shaped:
             return process_noise
         force = None if self.intermittent is None else np.array(self.intermittent)
-        runs = on_off.runs(self.on, rows) if self.on and rows is not None else None
+        runs = None
+        if self.course is not None and rows is not None:
+            runs = on_off.runs(self.course.on, rows)
         acceleration = process_noise.acceleration * self.channels
         return replace(
             process_noise, acceleration=acceleration, time=self.noise_lasts * process_noise.time,
@@ -106,11 +105,12 @@ def noise_prior(noise: float, nominal: float, remainder: Remainder) -> float:
     """
     if not remainder.raises:
         return -0.5 * (math.log(noise) / nominal) ** 2
+    course = 0.0 if remainder.course is None else remainder.course.prior
     by_channel = np.log(noise * np.array(remainder.channels)) / RAISED_SPREAD
     square, cost = by_channel @ by_channel, math.log(RAISED_SPREAD / nominal)
     if not remainder.shaped:  # one number for all three
         return float(-0.5 * square / len(by_channel) - cost)
     if remainder.lasts == 1.0:
-        return float(-0.5 * square - SHAPE_NUMBERS * cost) + remainder.on_prior
+        return float(-0.5 * square - SHAPE_NUMBERS * cost) + course
     square += (math.log(remainder.lasts) / TIME_SPREAD) ** 2
-    return float(-0.5 * square - (SHAPE_NUMBERS + 1) * cost) + remainder.on_prior
+    return float(-0.5 * square - (SHAPE_NUMBERS + 1) * cost) + course

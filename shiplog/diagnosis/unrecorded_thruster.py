@@ -71,10 +71,9 @@ class SideForce:
     @property
     def remainder(self) -> Remainder:
         surge, sway, yaw = map(float, self.unit * self.force)
-        of, course = (surge, sway, yaw), self.course or Course((), 0.0)
+        of = (surge, sway, yaw)
         return Remainder(
-            INTERMITTENT, intermittent=of, force_lasts=self.lasts, on=course.on,
-            on_prior=course.prior,
+            INTERMITTENT, intermittent=of, force_lasts=self.lasts, course=self.course
         )  # fmt: skip
 
 
@@ -101,38 +100,39 @@ def extrapolated(last: Step, this: Step) -> SideForce:
 
 
 def estimate_side_force(
-    left: Left, ref: Reference, at_one_coordinates: Remainder | None = None
+    left: Left, ref: Reference, at_one_place: Remainder | None = None
 ) -> SideForce:
     """The most probable intermittent side force at one place along the ship, from the residual.
-    It accelerates sway and yaw together, as no other process noise does. `at_one_coordinates` as
+    It accelerates sway and yaw together, as no other process noise does. `at_one_place` as
     `raised_noise.by_channel` has it."""
-    raised, _ = by_channel(left, at_one_coordinates)
-    asked = _Asked(left, ref)
-    sizes = left.nominal.acceleration[1] / abs(asked.across[1]) * SIZES  # N
-    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: asked.value(*tried))
-    return asked.finer(np.array([lever, math.log(force), 0.0]), raised)
+    raised, _ = by_channel(left, at_one_place)
+    likelihood = _Likelihood(left, ref)
+    sizes = left.nominal.acceleration[1] / abs(likelihood.across[1]) * SIZES  # N
+    lever, force = max(itertools.product(LEVERS, sizes), key=lambda tried: likelihood.of(*tried))
+    return likelihood.most_probable(np.array([lever, math.log(force), 0.0]), raised)
 
 
-def while_on(
+def estimate_on_off_force(
     left: Left, ref: Reference, stationary: SideForce, course: Course, rows: np.ndarray
 ) -> SideForce:
-    """The most probable force of a device that is on or off, from one that may act at any time.
+    """The most probable force of a device with this course, from one that may act at any time.
 
-    rows   [S, J] of the record at the knots of the segments that are `left`
+    stationary  that one
+    rows        [S, J] of the record at the knots of the segments that are `left`
     """
     runs = on_off.runs(course.on, rows)
-    known = replace(left, nominal=replace(left.nominal, runs=runs))
-    asked = _Asked(known, ref)
+    likelihood = _Likelihood(replace(left, nominal=replace(left.nominal, runs=runs)), ref)
     duty = max(float(np.diagonal(runs, axis1=1, axis2=2).mean()), 1.0 / runs.shape[1])
-    first = stationary._coordinates / np.array([asked.length, 1.0, 1.0])
+    first = stationary._coordinates / np.array([likelihood.length, 1.0, 1.0])
     first[1] -= 0.5 * math.log(duty)  # all of it acts while it is on
-    found = asked.finer(first, stationary.value - stationary.gain)
+    found = likelihood.most_probable(first, stationary.value - stationary.gain)
     value, gain = found.value + course.prior, found.gain + course.prior
     return replace(found, value=value, gain=gain, device=stationary.device, course=course)
 
 
-class _Asked:
-    """How likely a side force is, by its lever in ship lengths, size [N] and correlation time."""
+class _Likelihood:
+    """Of a side force, by its lever in ship lengths, size [N] and correlation time over the usual
+    one."""
 
     def __init__(self, left: Left, ref: Reference) -> None:
         self._left, self.length = left, ref.setting.scale["length"]
@@ -140,19 +140,23 @@ class _Asked:
             ref.model.stand_in, ref.coefficients, np.eye(3)[1:]
         )
 
-    def value(self, lever: float, force: float, lasts: float = 1.0) -> float:
+    def of(self, lever: float, force: float, lasts: float = 1.0) -> float:
+        """Log likelihood, nats."""
         unit, nominal = self.across + lever * self.length * self._turning, self._left.nominal
         time = lasts * nominal.intermittent_time
         return self._left.likelihood(
             replace(nominal, intermittent=unit * force, intermittent_time=time)
         )
 
-    def finer(self, first: np.ndarray, raised: float) -> SideForce:
-        """The most probable force near [3] a lever and logarithms of size and correlation time;
-        together with the place, or a part of it would be another cause's. `raised`: log likelihood
-        of raised noise."""
+    def most_probable(self, first: np.ndarray, raised: float) -> SideForce:
+        """The most probable force, its place with it: at a wrong place it would leave a part of
+        itself to other causes.
+
+        first    [3] lever and logarithms of size and correlation time, to start from
+        raised   log likelihood of raised noise, nats
+        """
         finer = minimize(
-            lambda at: -self.value(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
+            lambda at: -self.of(at[0], *np.exp(at[1:])), first, method="Nelder-Mead",
             bounds=((-REACH_LENGTHS, REACH_LENGTHS), (None, None), (-LASTS, LASTS)),
             options={"initial_simplex": first + STEPS * np.eye(4, 3), "xatol": 0.005,
                      "fatol": 0.1},

@@ -13,6 +13,7 @@ from shiplog.diagnosis import (
     intermittent,
     linearisation,
     residual_acceleration,
+    segment_nodes,
 )
 from shiplog.diagnosis.measurement_correction import corrected
 from shiplog.diagnosis.residual_acceleration import around
@@ -132,9 +133,8 @@ def _side_force(trial: Trial, decision: Decision) -> np.ndarray:
     """Force [n, 3] of the thruster that nobody records, at rows that are knots."""
     assert decision.side_force is not None
     force, _ = intermittent.force_at_nodes(trial, decision.fit, decision.side_force)
-    apart = round(trial.record.timescale.knot / trial.record.step)
     whole = np.full(len(trial.record), np.nan)
-    whole[trial.rows[:, None] + apart * np.arange(force.shape[1])] = force
+    whole[segment_nodes.rows_at_knots(trial.rows, trial.grid)] = force
     return whole[:, None] * np.array([0.0, 1.0, decision.side_force.lever])
 
 

@@ -187,8 +187,8 @@ def campaign(columns):
 
 
 def pushed(force: float, seed: int = 4):
-    """A trial that is pushed at one place, each segment in turn: by a device with that force while
-    it is on, for 12 s, in either direction. Its rows, and where it is on [S, J]."""
+    """A trial that is pushed at one place, by a device with that force while it is on: for 12 s of
+    every third segment, in either direction. The trial, and where it is on [S, J]."""
     record, columns = straight.sailed(COUNT), straight.columns_of(())
     grid = segments.grid(record)
     unit = ACROSS + LEVER * SETTING.scale["length"] * TURNING
@@ -228,7 +228,7 @@ def test_a_device_is_on_where_it_pushes(hull):
     assert np.isfinite(deviation).all()
     assert intermittent.with_pattern(trial, fit, found) is found
     # it is more probable, with the course's own probability, than one that may act at any time
-    always = replace(found.remainder, on=(), on_prior=0.0)
+    always = replace(found.remainder, course=None)
     assert fit.found.evidence > left_with(trial, always).found.evidence + 50.0
 
 
@@ -261,7 +261,7 @@ def test_a_force_that_varies_has_no_course(hull):
 
 def test_what_is_on_or_off_is_of_the_shape_and_the_prior_of_a_remainder():
     force = Remainder(INTERMITTENT, intermittent=(0.0, 0.01, 0.004), force_lasts=1.5)
-    device = replace(force, on=((30, 60),), on_prior=-12.0)
+    device = replace(force, course=on_off.Course(((30, 60),), -12.0))
     assert device.shape != force.shape
     assert noise_prior(1.0, 0.2, device) == noise_prior(1.0, 0.2, force) - 12.0
     usual = replace(device, force_lasts=1.0), replace(force, force_lasts=1.0)

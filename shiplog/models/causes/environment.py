@@ -52,8 +52,9 @@ class Current(Cause):
         )
 
 
-# Standard deviation of the logarithm of the surge or yaw factor's change over that of sway, where
-# one thing changes them together: by a quarter, as coefficients of ships of one type differ.
+# Standard deviation of the logarithm of the change of surge or yaw over that of sway, where one
+# thing changes them together. No figure is published: a quarter, as coefficients of ship types
+# differ.
 ALIKE = 0.25
 
 
