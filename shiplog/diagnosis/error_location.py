@@ -11,7 +11,6 @@ from shiplog.diagnosis import (
     evidence,
     external_forces,
     fits,
-    intermittent,
     omitted_inputs,
     residual_acceleration,
     thresholds,
@@ -22,9 +21,7 @@ from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.remainder import Remainder
-from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
-from shiplog.diagnosis.unrecorded_thruster import SideForce
 from shiplog.profile import Profile
 from shiplog.simulation import coverage as covering
 from shiplog.simulation import error_breakdown
@@ -34,10 +31,6 @@ from shiplog.training.load_model import Run
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
-
-STRONGEST = 0.98  # quantile of a force's size that counts as its strongest: a knot may be off
-ACTIVE_FROM = 0.5  # of the strongest: where the thruster counts as on
-PAUSE_KNOTS = 2.5  # times between two knots that an intermittent force may pause for
 
 
 def external(
@@ -130,31 +123,3 @@ def uncovered(
             )
         )  # fmt: skip
     return found
-
-
-def active_intervals(trial: Trial, decision: Decision, found: SideForce) -> list[dict]:
-    """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and sd_N."""
-    force, sd = intermittent.force_at_nodes(trial, decision.fit, found)
-    strongest = float(np.quantile(np.abs(force), STRONGEST))
-    times: list[dict] = []
-    for i, row in enumerate(trial.rows):
-        name = trial.record.names[trial.record.voyage[row]]
-        begin = float(trial.record.time[row])
-        for k in np.flatnonzero(np.abs(force[i, :-1]) >= ACTIVE_FROM * strongest):
-            at, value = begin + trial.grid.knot * float(k), float(force[i, k])
-            one = {"voyage": name, "start_s": at, "end_s": at, "force_N": value,
-                   "sd_N": float(sd[i, k])}  # fmt: skip
-            if times and _joined(times[-1], one, PAUSE_KNOTS * trial.grid.knot):
-                last = times[-1]
-                last["end_s"] = at
-                if abs(value) > abs(last["force_N"]):
-                    last |= {"force_N": value, "sd_N": one["sd_N"]}
-            else:
-                times.append(one)
-    return times
-
-
-def _joined(last: dict, one: dict, pause: float) -> bool:
-    """Whether it goes on, the same way, after at most a short pause."""
-    near = one["start_s"] - last["end_s"] < pause
-    return last["voyage"] == one["voyage"] and near and last["force_N"] * one["force_N"] > 0

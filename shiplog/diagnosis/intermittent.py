@@ -127,6 +127,27 @@ def force_at_nodes(
     ) / side_force.unit[1]
 
 
+def active_intervals(trial: Trial, fit: Fit, side_force: SideForce) -> list[dict]:
+    """When the unrecorded thruster worked: voyage, start_s, end_s, strongest force_N and its sd_N.
+    It starts and stops between two knots, on average half of the time between them away."""
+    force, sd = force_at_nodes(trial, fit, side_force)
+    rows = segment_nodes.rows_at_knots(trial.rows, trial.grid)
+    course = side_force.course or on_off.course(force, np.abs(sd), rows)
+    record, half = trial.record, 0.5 * trial.grid.knot
+    times: list[dict] = []
+    for first, last in course.on if course else ():
+        size = np.where((rows >= first) & (rows <= last), np.abs(force), -1.0)
+        strongest = np.unravel_index(size.argmax(), size.shape)
+        of_voyage = record.time[record.voyage == record.voyage[first]]
+        times.append({
+            "voyage": record.names[record.voyage[first]],
+            "start_s": float(max(record.time[first] - half, of_voyage[0])),
+            "end_s": float(min(record.time[last] + half, of_voyage[-1])),
+            "force_N": float(force[strongest]), "sd_N": float(sd[strongest]),
+        })  # fmt: skip
+    return times
+
+
 def of_one_device(force: np.ndarray, deviation: np.ndarray) -> float:
     """Probability that a side force [S, J], N, is that of one device, which is on or off: one,
     zero, or a half where its pattern is between both.

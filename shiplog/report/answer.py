@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
-from shiplog.diagnosis import error_location, next_manoeuvre, segments, thresholds
+from shiplog.diagnosis import intermittent, next_manoeuvre, segments, thresholds
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
@@ -110,7 +110,7 @@ def verdict(
     advised = next_manoeuvre.advice(trial, decision.named, decision.nothing.point.numbers)
     causes = [verdicts.cause_json(n, advised.get(n.cause.label)) for n in decision.named]
     if decision.side_force is not None:
-        times = error_location.active_intervals(trial, decision, decision.side_force)
+        times = intermittent.active_intervals(trial, decision.fit, decision.side_force)
         causes.append(verdicts.side_force_json(decision, times))
     word = _word(decision, bool(causes), held, context)
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)

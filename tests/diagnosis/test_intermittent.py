@@ -232,6 +232,27 @@ def test_a_device_is_on_where_it_pushes(hull):
     assert fit.found.evidence > left_with(trial, always).found.evidence + 50.0
 
 
+def test_the_times_of_a_device_are_those_of_its_pulses(hull):
+    """From half of the time between two knots before its first one to as long after its last."""
+    trial, _ = pushed(150.0)
+    found = intermittent.side_force(trial, left_with(trial, Remainder()))
+    fit = left_with(trial, found.remainder)
+    times = intermittent.active_intervals(trial, fit, found)
+    begins, knot = trial.record.time[trial.rows], trial.grid.knot
+    assert [one["start_s"] for one in times] == (begins[1::3] + 3.5 * knot).tolist()
+    assert [one["end_s"] for one in times] == (begins[1::3] + 9.5 * knot).tolist()
+    assert {one["voyage"] for one in times} == set(trial.record.names)
+    ways = np.random.default_rng(4).choice([-1.0, 1.0], COUNT)[1::3]  # as they were drawn
+    strongest = [one["force_N"] for one in times]
+    assert strongest == pytest.approx(150.0 * ways, rel=0.25)
+    assert all(0.0 < one["sd_N"] < 30.0 for one in times)
+    # where the force may act at any time, of the course that its estimate has by then
+    always = replace(found, course=None)
+    without = left_with(trial, always.remainder)
+    again = intermittent.active_intervals(trial, without, always)
+    assert [one["start_s"] for one in again] == [one["start_s"] for one in times]
+
+
 def test_the_course_of_a_hypothesis_stays_where_it_is_more_probable(hull, monkeypatch):
     """A course that is drawn anew from another estimate may be worse."""
     trial, _ = pushed(150.0)
