@@ -165,7 +165,7 @@ RIVALS = {
 }
 # The machine is that of docs/validation-answers.tar.xz: the answers do not record it.
 COST = """\
-Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an AMD EPYC (Zen 4), each
+Processor time, elapsed time and memory of `shiplog diagnose`, a case, on an Intel Xeon, each
 case on one core. Two cases ran at a time on two cores that also had other work: elapsed time is
 longer than on a free machine. The first case of a ship includes the fit of its nominal campaign,
 which is kept for the later ones; what is hidden differs, too."""
