@@ -12,6 +12,7 @@ from shiplog.numbers import counted, percent
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
+SAME_ERROR = 0.0005  # share of the error: less than this is 0.0 %, in which it is written
 OTHER_EQUATIONS = (
     "Either the equations of the catalogue are not those of this ship, or something unknown acts."
 )
@@ -83,7 +84,9 @@ def _named(
     if gain is None:
         return text
     windows = counted(gain.windows, "held-out window")
-    if gain.real:
+    if max(map(abs, (gain.reduction, gain.low, gain.high))) < SAME_ERROR:
+        share = f"The error on {windows} stays the same."
+    elif gain.real:
         share = (
             f"{percent(gain.reduction)} of the error on {windows} is "
             f"explained ({percent(gain.low)} to {percent(gain.high)})."

@@ -26,6 +26,15 @@ def test_what_it_may_be_instead_is_in_the_sentence():
         assert f"(10% to 30%). {begins}" in output and output.endswith("The rudders lag.")
 
 
+def test_an_error_that_does_not_change_is_said_to_stay_the_same():
+    """A fault of a sensor that only tells positions changes no error of the velocities."""
+    late = {"sentence": "The position is late.", "indistinguishable_from": [], "probability": 1.0}
+    for low, begins in ((-0.0004, "The error on 12 held-out windows stays the same."),
+                        (-0.0006, "No significant part of the error on 12")):  # fmt: skip
+        same = Gain(500.0, 499.9, low, 0.0004, 12, {})
+        assert sentence("named", [late], None, same, 1.0).startswith(begins)
+
+
 def test_one_window_is_one_window():
     lag = {"sentence": "The rudders lag.", "indistinguishable_from": [], "probability": 0.9}
     for after, low, high in ((400.0, 0.1, 0.3), (500.0, -0.1, 0.1)):
