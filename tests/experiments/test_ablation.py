@@ -10,8 +10,10 @@ from hidden_stubs import programs
 
 from pipelines.experiments.hidden_effects import (
     ablation,
+    one_search,
     plan,
     run,
+    score,
     suites,
     without,
 )
@@ -24,7 +26,9 @@ from shiplog.diagnosis import (
     placebo,
     posterior,
     refutation,
+    setup,
     thresholds,
+    trial_decision,
     trial_voyages,
 )
 from shiplog.diagnosis.hypothesis import form_error, form_error_of
@@ -88,6 +92,8 @@ def test_every_part_that_can_be_taken_out_is_there_and_comes_back(part):
         "refutation": (refutation, "judged"), "baseline": (baseline_check, "lacking"),
         "practical-size": (posterior, "practical"), "share-of-causes": (thresholds, "MOST"),
         "time-scale": (trial_voyages, "in_ship_time"), "imitation": (without.fits, "imitated"),
+        "slight": (thresholds, "SLIGHT"), "ordinary-noise": (thresholds, "ORDINARY_NOISE"),
+        "ordinary-spreads": (thresholds, "ORDINARY_SPREADS"), "pattern": (posterior, "device"),
     }  # fmt: skip
     assert set(without.PARTS) == {without.WHOLE, *watched} == {*ablation.MEANING}
     before = {name: getattr(*where) for name, where in watched.items()}
@@ -115,3 +121,47 @@ def test_without_form_errors_no_cause_has_one():
         assert {form_error_of(cause) for cause in CATALOGUE} == {0.0}
         assert form_error({}, ("bank",), {"bank": coarse[0]}, 5000.0) == 0.0
     assert {form_error_of(cause) for cause in coarse} == {0.2}
+
+
+def test_of_one_search_a_verdict_is_made_again_only_without_a_part_that_matters(
+    tmp_path, monkeypatch
+):
+    """The first part changes what is decided, the second one does not. The search is made once."""
+    searched, asked = [], []
+    monkeypatch.setattr(setup, "trial_of", lambda: searched.append("set up"))
+    monkeypatch.setattr(trial_decision, "_searched", lambda: searched.append("searched"))
+    monkeypatch.setattr(one_search, "_decided", lambda kept: thresholds.SLIGHT)
+
+    def run_shiplog(arguments):
+        setup.trial_of()
+        trial_decision._searched()
+        asked.append(dict(zip(arguments[1::2], arguments[2::2], strict=True)))
+        Path(asked[-1]["--json"]).write_text(f"slight {thresholds.SLIGHT}", encoding="utf-8")
+        return 3
+
+    monkeypatch.setattr(one_search.process, "run", run_shiplog)
+    verdict, folder = tmp_path / "verdict.json", tmp_path / "d"
+    given = ["diagnose", "--out", str(folder), "--json", str(verdict)]
+    parts = {part: without.PARTS[part] for part in ("slight", "imitation")}
+    with pytest.raises(SystemExit) as done:
+        one_search.diagnose(given, parts)
+    assert done.value.code == 3
+    assert searched == ["set up", "searched"]
+    assert [Path(one["--out"]).name for one in asked] == ["d", "d-slight"]
+    left = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.glob("*.json")}
+    assert left == {
+        "verdict.json": "slight 0.02", "verdict-without-slight.json": "slight 0.0",
+        "verdict-without-imitation.json": "slight 0.02",
+    }  # fmt: skip
+
+
+def test_verdicts_of_one_search_become_sealed_answers_of_each_part(tmp_path, stubs):
+    out, part = tmp_path / "out", tmp_path / "without-slight"
+    planned = plan.save(out, suites.plan("nightly", 5, 2))
+    run.run(out, planned, stubs(keep=True))
+    other = plan.case_folder(out, planned.cases[0]) / "verdict-without-slight.json"
+    other.write_text('{"verdict": "coverage"}', encoding="utf-8")
+    one_search.distribute(out, {"slight": part})
+    (answer,) = score.read(part).answers
+    assert (answer.planned, answer.word) == (planned.cases[0], "coverage")
+    assert [one["step"] for one in answer.steps][-1] == "diagnose"

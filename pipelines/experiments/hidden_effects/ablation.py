@@ -44,6 +44,10 @@ MEANING = {
     "practical-size": "a cause counts however small it is",
     "share-of-causes": "causes are named however little they explain",
     "imitation": "causes are named though the remainder could imitate them",
+    "slight": "a remainder that explains little puts names in doubt, too",
+    "ordinary-noise": "process noise that is raised by anything is a remainder",
+    "ordinary-spreads": "how far noise differs between voyages does not count",
+    "pattern": "a force is one device where an on/off course is more probable",
     "time-scale": "segments of 30 s whatever the ship",
 }
 

@@ -1,7 +1,8 @@
 """The program with one part of its decision taken out, to see what that part is for.
 
 python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
-    as `shiplog diagnose RUN ...`, without that part
+    as `shiplog diagnose RUN ...`, without that part; `nothing`: as it is, and from the same search
+    without each part that acts after it
 python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
     the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/;
     with --every 7 the first of each seven cases, with --first 20 so many of these
@@ -14,7 +15,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -22,8 +23,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pipelines.experiments.hidden_effects import ablation, replay
+from pipelines.experiments.hidden_effects import ablation, one_search, replay
 from pipelines.experiments.hidden_effects.ablation import WHOLE
+from pipelines.experiments.hidden_effects.one_search import Part
 from pipelines.experiments.hidden_effects.plan import positive
 from pipelines.experiments.hidden_effects.program import ROOT, identity, name
 from pipelines.experiments.hidden_effects.run import Settings
@@ -44,6 +46,7 @@ from shiplog.diagnosis import (
     voyage_effects,
 )
 from shiplog.diagnosis.hypotheses import Hypotheses
+from shiplog.diagnosis.remainder import INTERMITTENT
 from shiplog.models.causes import CATALOGUE
 
 
@@ -133,6 +136,31 @@ def _no_imitation(stack: ExitStack) -> None:
     stack.enter_context(patch.object(fits, "imitated", lambda *given: 0.0))
 
 
+def _none_slight(stack: ExitStack) -> None:
+    """However little a remainder explains, it may put a name in doubt."""
+    stack.enter_context(patch.object(thresholds, "SLIGHT", 0.0))
+
+
+def _no_ordinary_noise(stack: ExitStack) -> None:
+    """Noise that is raised by anything is a remainder."""
+    stack.enter_context(patch.object(thresholds, "ORDINARY_NOISE", 1.0))
+
+
+def _no_ordinary_spreads(stack: ExitStack) -> None:
+    """How far the noise differs from voyage to voyage does not count."""
+    stack.enter_context(patch.object(thresholds, "ORDINARY_SPREADS", 0.0))
+
+
+def _no_pattern(stack: ExitStack) -> None:
+    """An intermittent force is one device where a course that is on or off is more probable."""
+
+    def device(one):
+        force = one.side_force
+        return float(one.kind == INTERMITTENT and force is not None and force.course is not None)
+
+    stack.enter_context(patch.object(posterior, "device", device))
+
+
 def _fixed_time_scale(stack: ExitStack) -> None:
     """Segments of 30 s whatever the ship."""
 
@@ -151,25 +179,33 @@ def _learned_anew(stack: ExitStack) -> None:
     stack.enter_context(patch.object(nominal_cache, "characteristics", learned))
 
 
-PARTS: Mapping[str, Callable[[ExitStack], None]] = {
-    WHOLE: lambda stack: None,
+BEFORE_SEARCH: Mapping[str, Part] = {
     "placebo": _no_placebo,
     "form-error": _no_form_error,
     "discrepancy": _no_discrepancy,
     "voyage-effects": _voyages_alike,
     "share-of-trial": _whole_share,
     "robust-weights": _no_robust_weights,
-    "refutation": _no_refutation,
     "baseline": _no_baseline,
+    "time-scale": _fixed_time_scale,
+}
+AFTER_SEARCH: Mapping[str, Part] = {
+    "refutation": _no_refutation,
     "practical-size": _no_practical_size,
     "share-of-causes": _no_share_of_causes,
     "imitation": _no_imitation,
-    "time-scale": _fixed_time_scale,
+    "slight": _none_slight,
+    "ordinary-noise": _no_ordinary_noise,
+    "ordinary-spreads": _no_ordinary_spreads,
+    "pattern": _no_pattern,
 }
+PARTS: Mapping[str, Part] = {WHOLE: lambda stack: None, **BEFORE_SEARCH, **AFTER_SEARCH}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] == WHOLE:
+        one_search.diagnose(given[1:], AFTER_SEARCH)
     if given and given[0] in PARTS:
         with ExitStack() as stack:
             PARTS[given[0]](stack)
@@ -210,13 +246,15 @@ def without_each(
     """Ask a test's kept cases again without each part, one case of so many, into a folder next to
     it: a folder a part."""
     source_of = name(identity())
-    for part in parts:
-        out = source.with_name(f"{source.name}-without") / part
+    into = source.with_name(f"{source.name}-without")
+    for part in (one for one in parts if one not in AFTER_SEARCH):
+        out = into / part
         command = (sys.executable, "-m", "pipelines.experiments.hidden_effects.without", part)
         with patch.dict(os.environ, PYTHONPATH=_with_this_source()):
             called = source_of if part == WHOLE else f"{source_of} without {part}"
             settings = Settings(jobs=jobs, shiplog=command, called=called)
             replay.replay(source, out, settings, every, first)
+    one_search.distribute(into / WHOLE, {p: into / p for p in parts if p in AFTER_SEARCH})
 
 
 def _with_this_source() -> str:
