@@ -5,7 +5,8 @@ python -m pipelines.experiments.hidden_effects.without PART diagnose RUN ...
     without each part that acts after it
 python -m pipelines.experiments.hidden_effects.without --ablate DIR [--jobs N] [--only PART ...]
     the kept cases of DIR, diagnosed as they are and without each part in turn, into DIR-without/;
-    with --every 7 the first of each seven cases, with --first 20 so many of these
+    with --every 7 the first of each seven cases, with --first 20 so many of these; --only also
+    takes before-search and after-search, the parts that act there
 python -m pipelines.experiments.hidden_effects.without --page DIR-without ... [--markdown FILE]
     a page of what was found: how many are right, how many are misnamed, and which answers change
 """
@@ -199,6 +200,7 @@ AFTER_SEARCH: Mapping[str, Part] = {
     "ordinary-spreads": _no_ordinary_spreads,
     "pattern": _no_pattern,
 }
+GROUPS = {"before-search": BEFORE_SEARCH, "after-search": AFTER_SEARCH}
 PARTS: Mapping[str, Part] = {WHOLE: lambda stack: None, **BEFORE_SEARCH, **AFTER_SEARCH}
 
 
@@ -221,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     what.add_argument("--ablate", type=Path, metavar="DIR")
     what.add_argument("--page", type=Path, nargs="+", metavar="DIR-without")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=list(PARTS), default=list(PARTS))
+    parser.add_argument("--only", nargs="*", choices=[*PARTS, *GROUPS], default=list(GROUPS))
     parser.add_argument(
         "--every", type=positive, default=1, metavar="N", help="one case of so many"
     )
@@ -229,7 +231,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--markdown", type=Path, metavar="FILE")
     asked = parser.parse_args(given)
     if asked.ablate:
-        parts = dict.fromkeys((WHOLE, *asked.only))
+        only = (part for word in asked.only for part in GROUPS.get(word, (word,)))
+        parts = dict.fromkeys((WHOLE, *only))
         without_each(asked.ablate, parts, asked.jobs, asked.every, asked.first)
         return 0
     text = ablation.page([ablation.answers_in(folder) for folder in asked.page])
