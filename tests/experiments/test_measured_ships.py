@@ -39,6 +39,26 @@ def test_an_interrupted_way_goes_on_from_the_logs_that_it_made(tmp_path, monkeyp
     assert found.stopped == "" and found.cpu_s == 6.0
 
 
+def test_a_way_may_be_given_relative_folders(tmp_path, monkeypatch):
+    """Its steps run in another folder than the one that the paths are given from."""
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "run.mcap").write_text("log")
+    asked = []
+
+    def step(what, command, folder, settings):
+        asked.extend(command)
+        return {"step": what, "rc": 1, "cpu_s": 1.0, "stderr": "refused"}
+
+    monkeypatch.setattr(way, "step", step)
+    monkeypatch.chdir(tmp_path)
+    way.go(
+        "a ship", DataSet("a ship", "data", logs=("*.mcap",), profile="kvlcc2"), Path(), Path("o")
+    )
+    assert {str(tmp_path / "data" / "run.mcap"), str(tmp_path / "o" / "a-ship" / "store")} < {
+        *asked
+    }
+
+
 def test_a_model_that_diverged_is_not_one_that_was_not_evaluated():
     floors = {"hold": 90.0, "least_squares": None}
     evaluated = {"evaluate": {"loss": None, "floors": floors}}
