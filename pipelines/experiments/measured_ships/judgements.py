@@ -11,13 +11,11 @@ JUDGEMENTS: dict[str, str] = {
         "On tests that were held out, the physics have half of the regression's L."
     ),
     "esso-osaka, published": (
-        "Believable in part. The answer on the position's clock is right: the sensors alone give "
-        "0.95 s between position and velocity. By themselves, the random tests also give a wind "
-        "force athwart of half the published one; a wind that is measured 1.49 times too strong "
-        "has the same effect. It is not confirmed that the anemometer is wrong and not the force, "
-        "nor that the wind's clock is late. The antenna is not confirmed either: position and "
-        "velocity agree with each other wherever it is, and coefficients of another pond may look "
-        "the same. Half of the error is unexplained."
+        "Believable in part. The position's clock is right: the sensors alone give 0.95 s between "
+        "position and velocity. So is a wind force athwart of less than half the published one, "
+        "which the random tests give by themselves, too. The compass is not confirmed: a hull "
+        "whose coefficients are not those of this pond drifts at another angle, which looks the "
+        "same. Nor is it confirmed that the wind's clock is late. Half of the error is unexplained."
     ),
     "kvlcc2": (
         "Believable. All zigzags are of one series. On these six windows a plain regression "
