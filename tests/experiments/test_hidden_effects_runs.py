@@ -192,12 +192,13 @@ def test_logs_that_a_program_refuses_or_damages_are_its_own_answer(tmp_path, stu
     assert [one.word for one in found.answers] == [word] and not found.unmade
 
 
-def test_one_case_of_several_is_asked_again(tmp_path, stubs):
-    out = tmp_path / "out"
-    run.run(out, plan.save(out, suites.plan("nightly", 5, 3)), stubs(keep=True))
-    again = replay.replay(out, tmp_path / "new", stubs(), every=2)
-    assert [p.label for p in again.cases] == ["5", "7"]
-    assert len(score.read(tmp_path / "new").answers) == 2
+def test_some_cases_of_several_are_asked_again_and_then_others_in_addition(tmp_path, stubs):
+    out, new = tmp_path / "out", tmp_path / "new"
+    run.run(out, plan.save(out, suites.plan("nightly", 5, 5)), stubs(keep=True))
+    for every, asked in ((2, ["5", "7", "9"]), (3, ["5", "7", "8", "9"])):
+        again = replay.replay(out, new, stubs(), every=every)
+        assert [p.label for p in again.cases] == asked
+        assert [answer.planned.label for answer in score.read(new).answers] == asked
 
 
 def test_logs_of_another_family_come_with_their_own_profile(tmp_path, stubs, simulator):

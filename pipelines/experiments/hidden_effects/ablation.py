@@ -44,6 +44,7 @@ MEANING = {
     "voyage-effects": "voyages and their parts count as alike",
     "share-of-trial": "a trial counts all of itself",
     "robust-weights": "segments with errors far beyond the others count as much",
+    "spectrum": "a change of the discrepancy counts however little noise it explains",
     "refutation": "held-out voyages refute nothing",
     "baseline": "a model that lacks a force is not noticed",
     "practical-size": "a cause counts however small it is",

@@ -35,7 +35,8 @@ def replay(
 ) -> Plan:  # fmt: skip
     """The plan of what was replayed.
 
-    every   one of so many of the kept cases; `first`: so many of these
+    every   one of so many of the kept cases, in addition to those that were asked before;
+            `first`: so many of these
     whole   from the logs on: ingested and trained on as well
 
     Raises ShiplogError where no case of `source` was kept.
@@ -45,7 +46,9 @@ def replay(
             f"{out} cannot hold its own replay.", hint="choose another folder with --out."
         )
     before = plans.load(source)
-    cases = tuple(one for one in before.cases if run.kept(source, one))[::every][:first]
+    kept = [one for one in before.cases if run.kept(source, one)]
+    asked = {one.label for one in (*kept[::every][:first], *_asked_before(out))}
+    cases = tuple(one for one in kept if one.label in asked)
     if not cases:
         raise ShiplogError(
             f"{source} has no case with store and base.", hint="run the suite with --keep first."
@@ -63,6 +66,11 @@ def replay(
     todo = [[one] for one in plan.cases if run.kept(source, one) and _left(out, one, settings)]
     run.in_turn(todo, again, settings.jobs)
     return plan
+
+
+def _asked_before(out: Path) -> tuple[Planned, ...]:
+    """The cases of this replay until now: a second one adds to them."""
+    return plans.load(out).cases if (out / "keys" / "plan.json").exists() else ()
 
 
 def _from_the_logs(source: Path, out: Path, plan: Plan, settings: Settings) -> None:

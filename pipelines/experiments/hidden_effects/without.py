@@ -142,6 +142,11 @@ def _none_slight(stack: ExitStack) -> None:
     stack.enter_context(patch.object(thresholds, "SLIGHT", 0.0))
 
 
+def _no_error_of_spectrum(stack: ExitStack) -> None:
+    """A change of the discrepancy counts however little of raised noise it explains."""
+    stack.enter_context(patch.object(thresholds, "SPECTRUM", 0.0))
+
+
 def _no_ordinary_noise(stack: ExitStack) -> None:
     """Noise that is raised by anything is a remainder."""
     stack.enter_context(patch.object(thresholds, "ORDINARY_NOISE", 1.0))
@@ -188,6 +193,7 @@ BEFORE_SEARCH: Mapping[str, Part] = {
     "share-of-trial": _whole_share,
     "robust-weights": _no_robust_weights,
     "baseline": _no_baseline,
+    "spectrum": _no_error_of_spectrum,
     "time-scale": _fixed_time_scale,
 }
 AFTER_SEARCH: Mapping[str, Part] = {
