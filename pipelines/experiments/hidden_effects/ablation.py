@@ -44,9 +44,10 @@ MEANING = {
     "voyage-effects": "voyages and their parts count as alike",
     "share-of-trial": "a trial counts all of itself",
     "robust-weights": "segments with errors far beyond the others count as much",
-    "spectrum": "a change of the discrepancy counts however little noise it explains",
-    "refutation": "held-out voyages refute nothing",
     "baseline": "a model that lacks a force is not noticed",
+    "spectrum": "a change of the discrepancy counts however little noise it explains",
+    "time-scale": "segments of 30 s whatever the ship",
+    "refutation": "held-out voyages refute nothing",
     "practical-size": "a cause counts however small it is",
     "share-of-causes": "causes are named however little they explain",
     "imitation": "causes are named though the remainder could imitate them",
@@ -54,7 +55,6 @@ MEANING = {
     "ordinary-noise": "process noise that is raised by anything is a remainder",
     "ordinary-spreads": "how far noise differs between voyages does not count",
     "pattern": "a force is one device where an on/off course is more probable",
-    "time-scale": "segments of 30 s whatever the ship",
 }
 
 
