@@ -22,8 +22,10 @@ COMMAND = """\
     tar -xf docs/validation-answers.tar.xz -C test
     python -m pipelines.experiments.hidden_effects remake test/goals --share --jobs 2
     python -m pipelines.experiments.hidden_effects remake test/abroad --jobs 2
-    python -m pipelines.experiments.hidden_effects.without --ablate test/goals --only after-search
-    python -m pipelines.experiments.hidden_effects.without --ablate test/abroad --only after-search
+    python -m pipelines.experiments.hidden_effects.without --ablate test/goals --every 2 \\
+        --only after-search
+    python -m pipelines.experiments.hidden_effects.without --ablate test/abroad --every 2 \\
+        --only after-search
     python -m pipelines.experiments.hidden_effects.without --ablate test/goals --every 17 \\
         --only before-search
     python -m pipelines.experiments.hidden_effects.without --ablate test/abroad --every 20 \\
@@ -32,10 +34,10 @@ COMMAND = """\
         test/abroad-without --markdown docs/results/ablation.md"""
 INTRODUCTION = """\
 Cases of [validation](../validation.md) were diagnosed once as they are, and again without a part of
-the decision, one part after the other. A part that acts after the search is taken out of that same
-search, in all cases. The other parts need a search of their own: they are taken out in every so
-many of the cases, not chosen by what was answered. With so few, a part that changes no answer may
-still be needed elsewhere. `remake` makes the logs and models of the cases again."""
+the decision, one part after the other. The cases are every so many of the test, not chosen by what
+was answered. A part that acts after the search is taken out of that same search; the other parts
+need a search of their own, and were tested on fewer cases. With so few, a part that changes no
+answer may still be needed elsewhere. `remake` makes the logs and models of the cases again."""
 MEANING = {
     WHOLE: "the decision as it is",
     "placebo": "what a cause gains on nominal voyages is not subtracted",
