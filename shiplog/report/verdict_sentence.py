@@ -12,7 +12,7 @@ from shiplog.numbers import counted, percent
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
-SAME_ERROR = 0.0005  # share of the error: less than this is 0.0 %, in which it is written
+SAME_ERROR = 0.0005  # share of the error: a smaller change would be written as 0.0 %
 OTHER_EQUATIONS = (
     "Either the equations of the catalogue are not those of this ship, or something unknown acts."
 )

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hidden_stubs import programs
@@ -129,13 +130,16 @@ def test_of_one_search_a_verdict_is_made_again_only_without_a_part_that_matters(
 ):
     """The first part changes what is decided, the second one does not. The search is made once."""
     searched, asked = [], []
-    monkeypatch.setattr(setup, "trial_of", lambda: searched.append("set up"))
-    monkeypatch.setattr(trial_decision, "_searched", lambda: searched.append("searched"))
+    found = SimpleNamespace(search=SimpleNamespace(table=SimpleNamespace(banned=set())))
+    monkeypatch.setattr(setup, "trial_of", lambda numbers: searched.append("set up"))
+    monkeypatch.setattr(
+        trial_decision, "_searched", lambda numbers: searched.append("searched") or found
+    )
     monkeypatch.setattr(one_search, "_decided", lambda kept: thresholds.SLIGHT)
 
     def run_shiplog(arguments):
-        setup.trial_of()
-        trial_decision._searched()
+        setup.trial_of(None)
+        trial_decision._searched(None)
         asked.append(dict(zip(arguments[1::2], arguments[2::2], strict=True)))
         Path(asked[-1]["--json"]).write_text(f"slight {thresholds.SLIGHT}", encoding="utf-8")
         return 3

@@ -29,6 +29,8 @@ def diagnose(arguments: Sequence[str], parts: Mapping[str, Part]) -> None:
     """`shiplog diagnose RUN ... --out OUT --json FILE`, and next to FILE the verdict without each
     part. A verdict that these data do not allow, as `coverage`, is the same without any part."""
     given = list(arguments)
+    if not {"--out", "--json"} <= set(given):
+        sys.exit("No --out or no --json was given: name both, the verdicts are written there.")
     out, file = (given.index(option) + 1 for option in ("--out", "--json"))
     verdict, folder = Path(given[file]), Path(given[out])
     kept = _Kept()
@@ -39,7 +41,7 @@ def diagnose(arguments: Sequence[str], parts: Mapping[str, Part]) -> None:
             again = verdict.with_name(WITHOUT.format(name))
             with ExitStack() as stack:
                 part(stack)
-                if _decided(kept) == as_it_is:  # which takes back what was refuted, too
+                if _decided(kept) == as_it_is:
                     shutil.copyfile(verdict, again)
                     continue
                 given[out], given[file] = str(folder.with_name(f"d-{name}")), str(again)
@@ -63,18 +65,12 @@ def distribute(whole: Path, parts: Mapping[str, Path]) -> None:
 
 
 class _Kept:
-    """The set-up and the search of the first diagnosis, for those that follow."""
+    """The set-ups and searches of the first diagnosis, for those that follow; by the numbers of
+    causes that each begins with, since a given model is searched twice."""
 
     def __init__(self) -> None:
-        self.made: list[setup.Setup] = []
-        self.found: list[Any] = []
-
-    @property
-    def search(self) -> Search:
-        """As it was before any name was refuted, but that further sets may have been weighed."""
-        search = self.found[0].search
-        search.table.banned.clear()
-        return search
+        self.made: dict[tuple, setup.Setup] = {}
+        self.found: dict[tuple, Any] = {}
 
     @contextmanager
     def searches(self) -> Iterator[None]:
@@ -86,20 +82,32 @@ class _Kept:
                 stack.enter_context(patch.object(module, name, once))
             yield
 
-    def _once(self, made: Callable, kept: list) -> Callable:
+    def _once(self, made: Callable, kept: dict[tuple, Any]) -> Callable:
         def once(*given):
-            if not kept:
-                kept.append(made(*given))
-            return kept[0]
+            numbers = given[-1] or {}
+            key = tuple((label, *map(float, numbers[label])) for label in sorted(numbers))
+            if key not in kept:
+                kept[key] = made(*given)
+            self.take_back()
+            return kept[key]
 
         return once
 
+    def take_back(self) -> None:
+        """Every search as before any name was refuted; further sets may have been weighed."""
+        for found in self.found.values():
+            found.search.table.banned.clear()
 
-def _decided(kept: _Kept) -> tuple | None:
-    """All on which the verdict depends, but what held-out voyages say of it."""
+
+def _decided(kept: _Kept) -> object:
+    """All on which the verdict depends, but what held-out voyages say of it; like nothing else
+    where a second search depends on the first one's decision."""
     if not kept.found:
         return None
-    search = kept.search
+    if len(kept.found) > 1:
+        return object()
+    kept.take_back()
+    search: Search = next(iter(kept.found.values())).search
     decision, found = decide.decide(search)
     names = [one.cause.name for one in decision.named]
     slight = posterior.slight(search.table, posterior.best_with(found, names))

@@ -40,7 +40,7 @@ class Way:
 
 def go(name: str, one: DataSet, data: Path, out: Path) -> Way:
     """From the files to a verdict. Steps that were finished before are not done again."""
-    data, out = data.resolve(), out.resolve()  # a step runs in a folder of its own
+    data, out = data.resolve(), out.resolve()  # a step runs in the checkout
     folder = out / name.replace(", ", "-").replace(" ", "-")
     folder.mkdir(parents=True, exist_ok=True)
     done: list[dict[str, Any]] = []
