@@ -34,18 +34,14 @@ class IngestedLogs:
 
     @property
     def complete(self) -> bool:
-        """Every log was taken, and every message of it could be read."""
+        """Every log was taken, every message of it could be read, and no two channels exclude
+        each other."""
         return not self.refused and not self.damaged
 
     @property
     def damaged(self) -> list[VoyageReport]:
-        """Of logs of which something could not be read."""
-        kinds = {"crc", "truncated"}
-        return [
-            report
-            for report in self.reports
-            if report.messages_lost != 0 or any(f.kind in kinds for f in report.findings)
-        ]
+        """Of logs of which something could not be read, or cannot be right."""
+        return [report for report in self.reports if report.serious]
 
 
 def ingest_logs(

@@ -102,6 +102,14 @@ class Source(Section):
         "are interpolated, s; one and a half periods where left out"
     )  # fmt: skip
 
+    between: Literal["line", "hold"] = Field(
+        default="line", description='between two samples: "line", a straight line, or "hold", the '
+        "value of the former until the next one, as of an order that is sent when it changes"
+    )  # fmt: skip
+    missing: tuple[Number, ...] = Field(
+        default=(), description="raw values that stand for no value, such as 360 of an AIS course"
+    )  # fmt: skip
+
     @property
     def paths(self) -> tuple[str, ...]:
         return self.fields or ((self.field,) if self.field else ())
@@ -145,6 +153,14 @@ class Sensor(Source):
     sigma: Accuracy | Annotated[tuple[Accuracy, ...], Field(min_length=1)] | None = Field(
         default=None, description="accuracy, one standard deviation, in `unit`; of a position in m"
     )
+    resolution: Accuracy | None = Field(
+        default=None, description="the step in which it counts, in `unit`; of a position in m; "
+        "estimated from the record where left out"
+    )  # fmt: skip
+    limits: tuple[Number, Number] | None = Field(
+        default=None, description="[least, most] that can be, in `unit`, of a speed, a yaw rate or "
+        "a wind speed; those of its kind of ship where left out"
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _accurate(self) -> Sensor:
@@ -321,6 +337,7 @@ class Profile(Section):
     actuators: tuple[Actuator, ...] = ()
     site: Site = Site()
     table: dict[str, Column] = Field(default_factory=dict)
+    unchecked: tuple[str, ...] = ()  # keys whose line in the file still says CHECK
     source: str = Field(default="", exclude=True)  # name or path it was loaded from
 
     @model_validator(mode="after")

@@ -20,8 +20,11 @@ class Finding:
     low: float | None = None
     high: float | None = None
     unit: str = ""
+    reason: str = ""  # of a contradiction: one of REASONS
 
 
+REASONS = ("unit", "sign", "frame", "swapped", "clock", "mounting", "none known")
+SERIOUS = frozenset({"crc", "truncated", "contradiction"})  # `check` and `ingest` end with exit 3
 FINDING_KINDS = (
     "gap",
     "held",
@@ -40,6 +43,15 @@ FINDING_KINDS = (
     "yaw_rate_scale",
     "velocity_scale",
     "external",
+    "contradiction",  # two channels exclude each other
+    "status",  # not valid, by the instrument's own word
+    "implausible",
+    "not_available",
+    "wrapped",
+    "restarted",
+    "burst",
+    "two_sources",
+    "dropped",  # samples that are not used, with their number
 )
 
 
@@ -71,6 +83,16 @@ class VoyageReport:
     usable_s: int | None = None
     windows: int | None = None
     instruments: tuple[Instrument, ...] = field(default=())
+
+    @property
+    def contradictions(self) -> tuple[Finding, ...]:
+        """What two channels say that cannot both be right."""
+        return tuple(finding for finding in self.findings if finding.kind == "contradiction")
+
+    @property
+    def serious(self) -> bool:
+        """Whether something was lost, or two channels exclude each other."""
+        return self.messages_lost != 0 or any(f.kind in SERIOUS for f in self.findings)
 
     @property
     def slowest(self) -> Instrument | None:
