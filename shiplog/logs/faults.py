@@ -12,7 +12,7 @@ from shiplog.exceptions import listed
 from shiplog.logs.health_report import FINDING_KINDS, Finding
 from shiplog.units import SECOND_NS
 
-from . import dates
+from . import dates, leap_seconds
 from .container import Loss
 from .records import LARGEST_MESSAGE
 from .tables import Order, Tables
@@ -164,7 +164,10 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
             side = "ahead of" if median > 0 else "behind"
             channel = topics[0] if len(topics) == 1 else "log"
             far = dates.how_far(abs(median) * SECOND_NS)
-            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}."
+            when = dates.middle(frames[topics[0]]["log_time"]) or 0.0
+            _, scale = leap_seconds.known_difference(median, when)
+            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}"
+            sentence += f": {scale}." if scale else "."
             findings.append(
                 Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
             )
@@ -219,5 +222,5 @@ def _alike(
 
 
 def _topics(names: Iterable[str]) -> str:
-    names = list(names)
-    return names[0] if len(names) == 1 else f"{len(names)} topics"
+    names = sorted(names)
+    return listed(names) if len(names) <= dates.MOST_TOPICS else f"{len(names)} topics"

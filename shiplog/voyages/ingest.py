@@ -20,7 +20,14 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import (
+    clock_contradictions,
+    clocks,
+    fault_detection,
+    resampling,
+    sampling_findings,
+    sensor_consistency,
+)
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -77,15 +84,20 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
         usable_s=usable_s,
         windows=windows,
-        instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
+        instruments=tuple(
+            _instrument(*one) for one in aligned.samples if len(one[1].time) > 1 and not one[1].hold
+        ),
     )
     return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
 
 
 def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
-    """Seconds and windows of a voyage's 10 Hz rows, as `one_hertz.usable` counts them."""
+    """Seconds and windows of a voyage's 10 Hz rows, as `one_hertz.usable` counts them; no more
+    seconds than lie between the first row and the last, although the first average and the last
+    one are of half a second each."""
     named = table.lazy().with_columns(voyage=pl.lit(""))
-    return tables.usable(tables.resample([named], profile.columns, profile.circular))
+    seconds, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    return min(seconds, (table.height - 1) * resampling.STEP_NS // 1_000_000_000), windows
 
 
 def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
@@ -111,6 +123,9 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
+    clocks_agreed = clock_contradictions.agreed(reading, profile)
+    reading = clocks_agreed.reading
+    moved += clocks_agreed.findings
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -120,10 +135,18 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="check topic, field and `clock` of the heading in the profile; `shiplog profile "
             "LOG` drafts one from the topics of the log.",
         )
-    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
+    longest = resampling.longest_s(profile.ship.length_m)
+    driven = {
+        actuator.name: sampling_findings.order_of(
+            _actuator_samples(reading, actuator, longest), actuator, base
+        )
+        for actuator in profile.actuators
+    }
     every = {**sampled, **driven}
-    start, end = _span(base, list(every.values()))
-    moved += clocks.no_common_time(every, start, end)
+    moved += sampling_findings.findings(every, frozenset(driven))
+    start, end = _span(base, [one for one in every.values() if not one.hold])
+    if not clocks_agreed.contradicted:
+        moved += clocks.no_common_time(every, start, end)
     if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
@@ -140,6 +163,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     mark_gaps(grid)
     mark_holds(grid, profile, sampled)
     mark_jumps(grid, profile, sampled)
+    if clocks_agreed.contradicted:
+        grid.marks |= int(Quality.BLANK)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}
@@ -245,7 +270,10 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = frames.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
             :, None
         ]
-    samples = resampling.ordered(times, value, sensor.tolerance_s)
+    samples = resampling.ordered(
+        times, value, sensor.tolerance_s, sensor.between == "hold",
+        resampling.longest_s(profile.ship.length_m),
+    )  # fmt: skip
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
     elif kind == "geodetic":  # 179.99 and -179.99 deg are neighbours, not a way round the earth
@@ -358,12 +386,13 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Samples:
+def _actuator_samples(reading: Reading, actuator: Actuator, longest: float) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
-    return resampling.ordered(times, value, actuator.tolerance_s)
+    hold = actuator.between == "hold"
+    return resampling.ordered(times, value, actuator.tolerance_s, hold, longest)
 
 
 def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples) -> None:
