@@ -13,6 +13,7 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs import dates
+from shiplog.logs.faults import of_publishers
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile, Source
@@ -40,13 +41,15 @@ def of(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
 def without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
     """The log without the messages whose stamps cannot be of this voyage, and what they are."""
     frames, findings = dict(reading.frames), []
-    for source in _sources(profile):
+    for source in sources_of(profile):
         frame = frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
         clock, other = of(frame, source)
         known = frame.filter(pl.col(clock).is_not_null())
         times = known[clock].to_numpy()
+        if other == "publish_time" and not of_publishers(known):
+            other = clock  # the time of writing confirms nothing
         stray = resampling.strays(times, known[other].to_numpy())
         if not stray.any():
             continue
@@ -124,14 +127,15 @@ def no_common_time(sampled: dict[str, resampling.Samples], start: int, end: int)
     return findings
 
 
-def _sources(profile: Profile) -> list[Source]:
+def sources_of(profile: Profile) -> list[Source]:
+    """The sensors and the actuators."""
     return [*(sensor for _, sensor in profile.sensors.items()), *profile.actuators]
 
 
 def each(reading: Reading, profile: Profile) -> list[Clock]:
     """The clocks of a profile's sources, by topic and column."""
     found: dict[tuple[str, str], Clock] = {}
-    for source in _sources(profile):
+    for source in sources_of(profile):
         frame = reading.frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue

@@ -15,18 +15,18 @@ import polars as pl
 
 from shiplog import channels, frames
 from shiplog.channels import Quality
-from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
-from shiplog.logs.fields import is_number
+from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
-from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.logs.read import Contents, Reading, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
-    clock_contradictions,
     clocks,
     fault_detection,
+    required_topics,
     resampling,
     sampling_findings,
     sensor_consistency,
+    time_line,
 )
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
@@ -102,10 +102,10 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
 
 def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
     """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
-    table = _aligned(reading, profile).table
-    return sensor_consistency.findings(
-        sensor_consistency.estimates(table, profile), table.height, profile
-    )
+    aligned = _aligned(reading, profile)
+    clocks_apart = [one for one in aligned.left_out if one.kind == "contradiction"]
+    found = sensor_consistency.estimates(aligned.table, profile)
+    return [*clocks_apart, *sensor_consistency.findings(found, aligned.table.height, profile)]
 
 
 @dataclass(frozen=True)
@@ -120,12 +120,9 @@ class _Aligned:
 
 
 def _aligned(reading: Reading, profile: Profile) -> _Aligned:
-    _require(reading, profile)
-    reading, left_out = clocks.without_strays(reading, profile)
-    reading, moved = clocks.on_one_date(reading, profile)
-    clocks_agreed = clock_contradictions.agreed(reading, profile)
-    reading = clocks_agreed.reading
-    moved += clocks_agreed.findings
+    required_topics.require(reading, profile)
+    timed = time_line.one(reading, profile)
+    reading, moved = timed.reading, list(timed.findings)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -145,7 +142,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     every = {**sampled, **driven}
     moved += sampling_findings.findings(every, frozenset(driven))
     start, end = _span(base, [one for one in every.values() if not one.hold])
-    if not clocks_agreed.contradicted:
+    if not timed.contradicted:
         moved += clocks.no_common_time(every, start, end)
     if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
         raise LogUnreadable(
@@ -163,7 +160,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     mark_gaps(grid)
     mark_holds(grid, profile, sampled)
     mark_jumps(grid, profile, sampled)
-    if clocks_agreed.contradicted:
+    if timed.contradicted:
         grid.marks |= int(Quality.BLANK)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
@@ -174,7 +171,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    return _Aligned(table, grid, [*every.items()], [*left_out, *moved], datum)
+    return _Aligned(table, grid, [*every.items()], moved, datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -195,40 +192,6 @@ def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int
     stopped = [int(s.time[-1]) for s in sampled if len(s.time) and base[-1] - s.time[-1] <= moment]
     inside = base[(base >= max(started)) & (base <= min(stopped))]
     return (int(inside[0]), int(inside[-1])) if len(inside) > 1 else (int(base[0]), int(base[-1]))
-
-
-def _require(reading: Reading, profile: Profile) -> None:
-    """Every topic and field that the profile names is there, or say which ones are."""
-    log, topics = reading.contents.path.name, reading.contents.topics
-    for topic, paths in profile.wanted().items():
-        if topic not in topics:
-            raise ChannelMissing(
-                f"{log} has no topic {topic!r}{nearest(topic, topics)}. "
-                f"Topics found: {listed(topics)}.",
-                hint="correct the topic in the ship profile, choose another with --profile, or "
-                "draft one with `shiplog profile LOG`.",
-            )
-        reason = reading.health.undecodable.get(topic)
-        if reason:
-            raise ChannelMissing(
-                f"{log}: the topic {topic!r} cannot be decoded: {reason}.",
-                hint="record it as protobuf, ROS 2 CDR or JSON.",
-            )
-        frame = reading.frames.get(topic)
-        for path in sorted(paths):
-            if frame is not None and path not in frame.columns:
-                known = fields(reading.contents.path, [topic]).get(topic, {})
-                raise ChannelMissing(
-                    f"{log}: the topic {topic!r} has no field {path!r}{nearest(path, known)}. "
-                    f"Fields found: {listed(known)}.",
-                    hint="correct the field in the ship profile.",
-                )
-            if frame is not None and not is_number(frame.schema[path]):
-                raise ChannelMissing(
-                    f"{log}: the field {path!r} of the topic {topic!r} holds "
-                    f"{frame.schema[path]}, not one number.",
-                    hint=f'name one of its values in the ship profile, as field = "{path}[0]".',
-                )
 
 
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:

@@ -121,35 +121,37 @@ def _of_one_date(late: np.ndarray) -> np.ndarray:
     )
 
 
-def _pieces(late: np.ndarray, received: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
-    """Stretches [first, last) of the differences [m] s between which the clock was set."""
+def steps_of(late: np.ndarray) -> list[tuple[int, float]]:
+    """Where differences of two clocks [m] s step for good: the first value after each step, and its
+    size [s]. Medians on either side decide; single values do not."""
     if len(late) < 2 * SIDES:
-        return [(0, len(late))]
+        return []
     padded = np.concatenate((np.full(SIDES - 1, late[0]), late, np.full(SIDES - 1, late[-1])))
     medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, SIDES), axis=1)
     before, after = medians[: len(late) - 1], medians[SIDES : SIDES + len(late) - 1]
     centre = medians[SIDES // 2 : SIDES // 2 + len(late)]
     least = max(STEP_S, STEP_NOISES * 1.4826 * float(np.median(np.abs(late - centre))))
-    large = np.abs(after - before) > least
-    cuts = []
+    large = np.flatnonzero(np.abs(after - before) > least)
     step = np.abs(np.diff(late))
-    for group in np.split(
-        np.flatnonzero(large), np.flatnonzero(np.diff(np.flatnonzero(large)) > 1) + 1
-    ):
-        if len(group) == 0:
-            continue
+    found: list[tuple[int, float]] = []
+    for group in np.split(large, np.flatnonzero(np.diff(large) > 1) + 1) if len(large) else ():
         cut = int(group[np.argmax(step[group])]) + 1
-        if cuts and cut - cuts[-1] < SIDES // 2 + 1:
-            continue
-        size = float(after[cut - 1] - before[cut - 1])
-        either = [float(before[cut - 1]), float(after[cut - 1])]
-        if all(_is_latency(one) for one in either) and not _shows(
-            received, at[cut - 1], at[cut], size
-        ):
-            continue  # the receiver took longer from there on
-        cuts.append(cut)
-    edges = [0, *cuts, len(late)]
-    return [(a, b) for a, b in pairwise(edges) if b > a]
+        if not found or cut - found[-1][0] > SIDES // 2:
+            found.append((cut, float(after[cut - 1] - before[cut - 1])))
+    return found
+
+
+def _pieces(late: np.ndarray, received: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:
+    """Stretches [first, last) of the differences [m] s between which the clock was set; not those
+    from which on the receiver took longer."""
+    cuts = [
+        cut
+        for cut, size in steps_of(late)
+        if not (is_latency(float(np.median(late[max(cut - SIDES, 0) : cut])))
+                and is_latency(float(np.median(late[cut : cut + SIDES]))))
+        or _shows(received, at[cut - 1], at[cut], size)
+    ]  # fmt: skip
+    return [(a, b) for a, b in pairwise([0, *cuts, len(late)]) if b > a]
 
 
 def _shows(received: np.ndarray, first: int, last: int, size: float) -> bool:
@@ -176,7 +178,7 @@ def _boundary(received: np.ndarray, first: int, last: int) -> int:
     return int(lines[int(np.argmax(np.abs(step - np.median(step)))) + 1])
 
 
-def _is_latency(late: float) -> bool:
+def is_latency(late: float) -> bool:
     return -EARLY_S <= late <= LATEST_S
 
 
@@ -185,8 +187,8 @@ def _latency(pieces: list[tuple[int, int]], medians: list[float]) -> float:
     else unknown, and 0."""
     longest = sorted(range(len(pieces)), key=lambda k: pieces[k][0] - pieces[k][1])
     for k in longest:
-        if _is_latency(medians[k]):
-            return max(min(m for m in medians if _is_latency(m)), 0.0)
+        if is_latency(medians[k]):
+            return max(min(m for m in medians if is_latency(m)), 0.0)
     for k in longest:
         if _hours(medians[k]):
             return max(medians[k] - _hours(medians[k]), 0.0)
@@ -196,12 +198,12 @@ def _latency(pieces: list[tuple[int, int]], medians: list[float]) -> float:
 def _hours(late: float) -> float:
     """The whole hours [s] by which a clock is off that has a receiver's latency on top; else 0."""
     hours = HOUR_S * math.floor((late + EARLY_S) / HOUR_S)
-    return hours if _is_latency(late - hours) else 0.0
+    return hours if is_latency(late - hours) else 0.0
 
 
 def _error(late: float, latency: float) -> float:
     """s, what of a difference is the recorder's."""
-    if _is_latency(late):
+    if is_latency(late):
         return late - latency if late - latency > STEP_S else 0.0
     return _hours(late) or late - latency
 
