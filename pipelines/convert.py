@@ -103,10 +103,10 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         if lost:
             done.lost[str(path)] = ", ".join(lost)
         begun: set[str] = set()
-        for name, part in voyages:
+        for name, part, found in voyages:
             try:  # one bad voyage never ends the others
                 refuse_namesake(name, begun, path)
-                series = columns.series(part, profile)
+                series = columns.series(part, profile, found)
                 target = _written(out / f"{name}.mcap", series, profile, ship, path)
             except BaseException as error:
                 where = str(path) if name == path.stem else f"{path}: {name}"

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 
+import numpy as np
 import polars as pl
 
 from shiplog.exceptions import listed
-from shiplog.logs.health_report import Finding
+from shiplog.logs.health_report import FINDING_KINDS, Finding
 from shiplog.units import SECOND_NS
 
-from . import dates
+from . import dates, leap_seconds
 from .container import Loss
 from .records import LARGEST_MESSAGE
-from .tables import Order, Tables
+from .tables import MOST_STEPS, Order, Tables
 
 MOST_TOPICS = 5  # topics of a loss; of a large log it may be hundreds
+NOTED = "findings"  # metadata of a channel: what `convert` found and put right, as JSON
+MOST_NOTED = 100  # of one channel
+FEWEST, FEWEST_AGAIN = 20, 5  # messages of a topic, and of them in a stretch that is there twice
+TWICE = 1.6  # times the messages of other stretches; two recordings of one instrument have twice
 OFFSET = 0.05  # s: closer clocks than this are one clock
 CLOCK_PAIRS = (
     ("log_time", "publish_time", "The recorder's clock", "the publishers'"),
     ("publish_time", "stamp", "The publishers' clock", "the messages' own stamps"),
+    # where the publish times are of the writing of the file, and no clock of the publishers
+    ("log_time", "stamp", "The recorder's clock", "the messages' own stamps"),
 )
+PACE = 0.1  # of the recorder's: publish times that run otherwise are of the writing of a file
+LATE_PUBLISH_NS = 60 * SECOND_NS  # nothing is published so long after it was recorded
 
 
 def losses(
@@ -81,9 +92,19 @@ def left_out(orphans: int, tables: Tables) -> list[Finding]:
     return findings
 
 
-def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
-    """Messages written behind a later one of their own channel."""
-    back = [(topic, o) for topic, o in order if o.back]
+def disorder(
+    order: Iterable[tuple[str, Order]], again: Mapping[str, float] | None = None
+) -> list[Finding]:
+    """Messages written behind a later one of their own channel, and what `restarted` found."""
+    again = again or {}
+    back = [(topic, o) for topic, o in order if o.back and topic not in again]
+    if again:
+        size = max(again.values())
+        sentence = (
+            f"The log's times go back by up to {size:.3g} s on {_topics(again)} while the messages "
+            "go on: a recorder that was started again, or whose clock was set."
+        )
+        return [*disorder(back), Finding("restarted", "log", sentence, value=size, unit="s")]
     if not back:
         return []
     count = sum(o.back for _, o in back)
@@ -93,6 +114,48 @@ def disorder(order: Iterable[tuple[str, Order]]) -> list[Finding]:
         f"by up to {largest:.3g} s; the messages were sorted."
     )
     return [Finding("out_of_order", "log", sentence, value=largest, unit="s")]
+
+
+def as_metadata(findings: Iterable[Finding]) -> dict[str, str]:
+    """What `convert` found, as metadata of a channel; `noted` reads it back."""
+    found = [asdict(finding) for finding in findings][:MOST_NOTED]
+    return {NOTED: json.dumps(found)} if found else {}
+
+
+def noted(channels: Mapping[str, Mapping[str, str]]) -> list[Finding]:
+    """What `convert` found when it made the log, of channels' metadata by topic. What others wrote
+    under the same name is none of it."""
+    findings: list[Finding] = []
+    for metadata in channels.values():
+        try:
+            made = [Finding(**one) for one in json.loads(metadata.get(NOTED, "[]"))[:MOST_NOTED]]
+            findings += [one for one in made if one.kind in FINDING_KINDS and one.sentence]
+        except (ValueError, TypeError, AttributeError):
+            continue
+    return findings
+
+
+def restarted(
+    order: Iterable[tuple[str, Order]], frames: Mapping[str, pl.DataFrame]
+) -> dict[str, float]:
+    """Topics whose messages go on after their log time went back, and by how much [s]: of a
+    recorder that was started again, or whose clock was set, while the file stayed the same.
+
+    The times between are then there twice. Messages that were only written late are there once.
+    """
+    found: dict[str, float] = {}
+    for topic, one in order:
+        frame = frames.get(topic)
+        if not 0 < one.back <= MOST_STEPS or frame is None or frame.height < FEWEST:
+            continue
+        times = frame["log_time"].to_numpy()
+        for before, after, count in one.steps:
+            inside = np.searchsorted(times, before, "right") - np.searchsorted(times, after)
+            period = (before - one.first) / max(count - 1, 1)
+            once = (before - max(after, one.first)) / period if period > 0 else 0.0
+            if once >= FEWEST_AGAIN and inside >= TWICE * once:
+                found[topic] = max(found.get(topic, 0.0), (before - after) / SECOND_NS)
+    return found
 
 
 def twice(frame: pl.DataFrame) -> set[int]:
@@ -126,9 +189,12 @@ def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> li
 def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
     """Steady offsets between the recorder's, the publishers' and the messages' own clocks."""
     findings = []
+    written = {topic for topic, frame in frames.items() if not of_publishers(frame)}
     for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}
         for topic, frame in frames.items():
+            if (topic in written) != ({ahead, behind} == {"log_time", "stamp"}):
+                continue
             if len({ahead, behind} & dates.wrong(frame)) == 1:
                 continue  # `dates` says so
             median, low, high = spread(frame, ahead, behind)
@@ -141,11 +207,27 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
             side = "ahead of" if median > 0 else "behind"
             channel = topics[0] if len(topics) == 1 else "log"
             far = dates.how_far(abs(median) * SECOND_NS)
-            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}."
+            when = dates.middle(frames[topics[0]]["log_time"]) or 0.0
+            _, scale = leap_seconds.known_difference(median, when)
+            sentence = f"{one} is {far} {side} {other} on {_topics(topics)}"
+            sentence += f": {scale}." if scale else "."
             findings.append(
                 Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
             )
     return findings
+
+
+def of_publishers(frame: pl.DataFrame) -> bool:
+    """Whether a topic's publish times are a clock of its publisher. A writer that stamps "now"
+    writes an hour in a second, and years later: these are the times of the writing."""
+    both = frame.select("log_time", "publish_time").drop_nulls()
+    if both.height < 2:
+        return True
+    logged, published = (both[name] for name in ("log_time", "publish_time"))
+    spans = [float((one.max() or 0) - (one.min() or 0)) for one in (logged, published)]  # type: ignore[operator]
+    if float((published - logged).median() or 0.0) < LATE_PUBLISH_NS:  # type: ignore[arg-type]
+        return True
+    return spans[0] > 0 and abs(spans[1] - spans[0]) <= PACE * spans[0]
 
 
 def spread(frame: pl.DataFrame, ahead: str, behind: str) -> tuple[float | None, float, float]:
@@ -196,5 +278,5 @@ def _alike(
 
 
 def _topics(names: Iterable[str]) -> str:
-    names = list(names)
-    return names[0] if len(names) == 1 else f"{len(names)} topics"
+    names = sorted(names)
+    return listed(names) if len(names) <= dates.MOST_TOPICS else f"{len(names)} topics"

@@ -69,6 +69,7 @@ class Health:
     chunks_lost: int
     findings: tuple[Finding, ...]
     undecodable: dict[str, str]  # topic -> reason
+    restarted: Mapping[str, float] = field(default_factory=dict)  # topic -> s, see `faults`
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,18 +171,21 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     findings = faults.losses(found.losses, tally.first, lost, topics)
     findings += faults.appended(found.sections)
     findings += faults.left_out(tally.orphans, tables)
-    findings += faults.disorder([(found.channels[n].topic, o) for n, o in tally.order.items()])
+    order = [(found.channels[n].topic, one) for n, one in tally.order.items()]
+    again = faults.restarted(order, frames)
+    findings += faults.disorder(order, again)
     suspects = {topic: times for topic, frame in frames.items() if (times := faults.twice(frame))}
-    again = salvage.repeated(found.path, suspects) if suspects else {}
+    twice = salvage.repeated(found.path, suspects) if suspects else {}
     for topic, frame in frames.items():
-        findings += faults.repeats(topic, frame, tally.first or 0, again.get(topic, []))
+        findings += faults.repeats(topic, frame, tally.first or 0, twice.get(topic, []))
     findings += faults.clocks(frames)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
+    findings += faults.noted(noted)
     findings += dates.impossible(frames, noted)
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,
-        tuple(findings), tables.undecodable,
+        tuple(findings), tables.undecodable, again,
     )  # fmt: skip
 
 

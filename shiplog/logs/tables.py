@@ -19,6 +19,7 @@ from .messages import Decoder, Undecodable
 # Rows go with the file's size, not with its messages: three million empty messages fit into
 # 13 kB. Messages of instruments take 5 bytes and more, however well they are packed.
 LEAST_ROWS, ROWS_PER_BYTE = 1_000_000, 0.5
+MOST_STEPS = 20  # steps back of a channel that are kept: more are disorder, and no restart
 
 log = logging.getLogger(__name__)
 
@@ -70,6 +71,9 @@ class Order:
     last: int
     back: int = 0  # how many steps back in time
     largest: int = 0  # ns
+    first: int = 0  # ns, the first log time
+    # steps back: log times before and after [ns], and how many messages came before
+    steps: list[tuple[int, int, int]] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -87,13 +91,17 @@ class Tally:
             self.orphans += len(times)
         if not known or not len(times):
             return
-        self.counts[channel] = self.counts.get(channel, 0) + len(times)
+        so_far = self.counts.get(channel, 0)
+        self.counts[channel] = so_far + len(times)
         earliest = int(times.min())
         self.first = earliest if self.first is None else min(self.first, earliest)
-        order = self.order.setdefault(channel, Order(int(times[0])))
+        order = self.order.setdefault(channel, Order(int(times[0]), first=int(times[0])))
         steps = np.diff(times, prepend=order.last)
         order.back += int((steps < 0).sum())
         order.largest = max(order.largest, -int(steps.min()))
+        for at in np.flatnonzero(steps < 0)[: MOST_STEPS - len(order.steps)].tolist():
+            before = int(times[at - 1]) if at else order.last
+            order.steps.append((before, int(times[at]), so_far + at))
         order.last = int(times[-1])
 
     def add(self, channel: int, count: int, known: bool) -> None:

@@ -13,6 +13,7 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs import dates
+from shiplog.logs.faults import of_publishers
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile, Source
@@ -40,13 +41,15 @@ def of(frame: pl.DataFrame, source: Source) -> tuple[str, str]:
 def without_strays(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
     """The log without the messages whose stamps cannot be of this voyage, and what they are."""
     frames, findings = dict(reading.frames), []
-    for source in _sources(profile):
+    for source in sources_of(profile):
         frame = frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
         clock, other = of(frame, source)
         known = frame.filter(pl.col(clock).is_not_null())
         times = known[clock].to_numpy()
+        if other == "publish_time" and not of_publishers(known):
+            other = clock  # the time of writing confirms nothing
         stray = resampling.strays(times, known[other].to_numpy())
         if not stray.any():
             continue
@@ -83,17 +86,17 @@ def on_one_date(reading: Reading, profile: Profile) -> tuple[Reading, list[Findi
     all are moved onto the recorder's, if that can be, or stay where they are.
     """
     frames, findings = dict(reading.frames), []
-    clocks = _clocks(reading, profile)
+    clocks = each(reading, profile)
     if not clocks:
         return reading, []
-    groups = _groups(clocks)
-    dated = [group for group in groups if dates.possible(_date(group))]
-    reference = max(dated, key=_date) if dated else max(groups, key=len)
+    groups = groups_of(clocks)
+    dated = [group for group in groups if dates.possible(date_of(group))]
+    reference = max(dated, key=date_of) if dated else max(groups, key=len)
     recorded = float(np.median([clock.date - clock.ahead for clock in clocks]))
-    onto_recorder = -_ahead(reference) if not dated and dates.possible(recorded) else 0.0
+    onto_recorder = -ahead_of(reference) if not dated and dates.possible(recorded) else 0.0
     for group in groups:
-        apart = _ahead(group) - _ahead(reference)
-        tied = _steady(group) and _steady(reference) and abs(apart) > dates.DAY_NS
+        apart = ahead_of(group) - ahead_of(reference)
+        tied = steady(group) and steady(reference) and abs(apart) > dates.DAY_NS
         shift = round(onto_recorder - (apart if tied else 0.0))
         if shift == 0:
             continue
@@ -111,6 +114,8 @@ def no_common_time(sampled: dict[str, resampling.Samples], start: int, end: int)
     for name, samples in sampled.items():
         if len(samples.time) == 0 or (samples.time[-1] >= start and samples.time[0] <= end):
             continue
+        if samples.hold and samples.time[0] <= end:
+            continue  # the last order before the voyage holds in it
         far = float(max(start - samples.time[-1], samples.time[0] - end))
         sentence = (
             f"{name} has no time in common with the heading: it is {dates.how_far(far)} away. Set "
@@ -122,13 +127,15 @@ def no_common_time(sampled: dict[str, resampling.Samples], start: int, end: int)
     return findings
 
 
-def _sources(profile: Profile) -> list[Source]:
+def sources_of(profile: Profile) -> list[Source]:
+    """The sensors and the actuators."""
     return [*(sensor for _, sensor in profile.sensors.items()), *profile.actuators]
 
 
-def _clocks(reading: Reading, profile: Profile) -> list[Clock]:
+def each(reading: Reading, profile: Profile) -> list[Clock]:
+    """The clocks of a profile's sources, by topic and column."""
     found: dict[tuple[str, str], Clock] = {}
-    for source in _sources(profile):
+    for source in sources_of(profile):
         frame = reading.frames.get(source.topic)
         if frame is None or frame.height == 0:
             continue
@@ -145,7 +152,7 @@ def _clocks(reading: Reading, profile: Profile) -> list[Clock]:
     return list(found.values())
 
 
-def _groups(clocks: list[Clock]) -> list[list[Clock]]:
+def groups_of(clocks: list[Clock]) -> list[list[Clock]]:
     """Those of one clock each: their distances from the recorder's overlap."""
     groups: list[list[Clock]] = []
     most = -np.inf
@@ -157,15 +164,15 @@ def _groups(clocks: list[Clock]) -> list[list[Clock]]:
     return groups
 
 
-def _date(group: list[Clock]) -> float:
+def date_of(group: list[Clock]) -> float:
     return float(np.median([clock.date for clock in group]))
 
 
-def _ahead(group: list[Clock]) -> float:
+def ahead_of(group: list[Clock]) -> float:
     return float(np.median([clock.ahead for clock in group]))
 
 
-def _steady(group: list[Clock]) -> bool:
+def steady(group: list[Clock]) -> bool:
     return all(clock.high - clock.low <= ONE_CLOCK_NS for clock in group)
 
 

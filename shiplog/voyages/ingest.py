@@ -15,12 +15,19 @@ import polars as pl
 
 from shiplog import channels, frames
 from shiplog.channels import Quality
-from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
-from shiplog.logs.fields import is_number
+from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
-from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.logs.read import Contents, Reading, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import (
+    clocks,
+    fault_detection,
+    required_topics,
+    resampling,
+    sampling_findings,
+    sensor_consistency,
+    time_line,
+)
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -77,23 +84,28 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
         usable_s=usable_s,
         windows=windows,
-        instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
+        instruments=tuple(
+            _instrument(*one) for one in aligned.samples if len(one[1].time) > 1 and not one[1].hold
+        ),
     )
     return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
 
 
 def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
-    """Seconds and windows of a voyage's 10 Hz rows, as `one_hertz.usable` counts them."""
+    """Seconds and windows of a voyage's 10 Hz rows, as `one_hertz.usable` counts them; no more
+    seconds than lie between the first row and the last, although the first average and the last
+    one are of half a second each."""
     named = table.lazy().with_columns(voyage=pl.lit(""))
-    return tables.usable(tables.resample([named], profile.columns, profile.circular))
+    seconds, windows = tables.usable(tables.resample([named], profile.columns, profile.circular))
+    return min(seconds, (table.height - 1) * resampling.STEP_NS // 1_000_000_000), windows
 
 
 def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
     """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
-    table = _aligned(reading, profile).table
-    return sensor_consistency.findings(
-        sensor_consistency.estimates(table, profile), table.height, profile
-    )
+    aligned = _aligned(reading, profile)
+    clocks_apart = [one for one in aligned.left_out if one.kind == "contradiction"]
+    found = sensor_consistency.estimates(aligned.table, profile)
+    return [*clocks_apart, *sensor_consistency.findings(found, aligned.table.height, profile)]
 
 
 @dataclass(frozen=True)
@@ -108,9 +120,9 @@ class _Aligned:
 
 
 def _aligned(reading: Reading, profile: Profile) -> _Aligned:
-    _require(reading, profile)
-    reading, left_out = clocks.without_strays(reading, profile)
-    reading, moved = clocks.on_one_date(reading, profile)
+    required_topics.require(reading, profile)
+    timed = time_line.one(reading, profile)
+    reading, moved = timed.reading, list(timed.findings)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -120,10 +132,18 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="check topic, field and `clock` of the heading in the profile; `shiplog profile "
             "LOG` drafts one from the topics of the log.",
         )
-    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
+    longest = resampling.longest_s(profile.ship.length_m)
+    driven = {
+        actuator.name: sampling_findings.order_of(
+            _actuator_samples(reading, actuator, longest), actuator, base
+        )
+        for actuator in profile.actuators
+    }
     every = {**sampled, **driven}
-    start, end = _span(base, list(every.values()))
-    moved += clocks.no_common_time(every, start, end)
+    moved += sampling_findings.findings(every, frozenset(driven))
+    start, end = _span(base, [one for one in every.values() if not one.hold])
+    if not timed.contradicted:
+        moved += clocks.no_common_time(every, start, end)
     if (end - start) // resampling.STEP_NS > max(LEAST_ROWS, MOST_ROWS * len(base)):
         raise LogUnreadable(
             f"{reading.contents.path.name} holds {len(base)} heading samples whose stamps lie "
@@ -140,6 +160,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     mark_gaps(grid)
     mark_holds(grid, profile, sampled)
     mark_jumps(grid, profile, sampled)
+    if timed.contradicted:
+        grid.marks |= int(Quality.BLANK)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}
@@ -149,7 +171,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    return _Aligned(table, grid, [*every.items()], [*left_out, *moved], datum)
+    return _Aligned(table, grid, [*every.items()], moved, datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -170,40 +192,6 @@ def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int
     stopped = [int(s.time[-1]) for s in sampled if len(s.time) and base[-1] - s.time[-1] <= moment]
     inside = base[(base >= max(started)) & (base <= min(stopped))]
     return (int(inside[0]), int(inside[-1])) if len(inside) > 1 else (int(base[0]), int(base[-1]))
-
-
-def _require(reading: Reading, profile: Profile) -> None:
-    """Every topic and field that the profile names is there, or say which ones are."""
-    log, topics = reading.contents.path.name, reading.contents.topics
-    for topic, paths in profile.wanted().items():
-        if topic not in topics:
-            raise ChannelMissing(
-                f"{log} has no topic {topic!r}{nearest(topic, topics)}. "
-                f"Topics found: {listed(topics)}.",
-                hint="correct the topic in the ship profile, choose another with --profile, or "
-                "draft one with `shiplog profile LOG`.",
-            )
-        reason = reading.health.undecodable.get(topic)
-        if reason:
-            raise ChannelMissing(
-                f"{log}: the topic {topic!r} cannot be decoded: {reason}.",
-                hint="record it as protobuf, ROS 2 CDR or JSON.",
-            )
-        frame = reading.frames.get(topic)
-        for path in sorted(paths):
-            if frame is not None and path not in frame.columns:
-                known = fields(reading.contents.path, [topic]).get(topic, {})
-                raise ChannelMissing(
-                    f"{log}: the topic {topic!r} has no field {path!r}{nearest(path, known)}. "
-                    f"Fields found: {listed(known)}.",
-                    hint="correct the field in the ship profile.",
-                )
-            if frame is not None and not is_number(frame.schema[path]):
-                raise ChannelMissing(
-                    f"{log}: the field {path!r} of the topic {topic!r} holds "
-                    f"{frame.schema[path]}, not one number.",
-                    hint=f'name one of its values in the ship profile, as field = "{path}[0]".',
-                )
 
 
 def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
@@ -245,7 +233,10 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = frames.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
             :, None
         ]
-    samples = resampling.ordered(times, value, sensor.tolerance_s)
+    samples = resampling.ordered(
+        times, value, sensor.tolerance_s, sensor.between == "hold",
+        resampling.longest_s(profile.ship.length_m),
+    )  # fmt: skip
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
     elif kind == "geodetic":  # 179.99 and -179.99 deg are neighbours, not a way round the earth
@@ -358,12 +349,13 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Samples:
+def _actuator_samples(reading: Reading, actuator: Actuator, longest: float) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
-    return resampling.ordered(times, value, actuator.tolerance_s)
+    hold = actuator.between == "hold"
+    return resampling.ordered(times, value, actuator.tolerance_s, hold, longest)
 
 
 def _actuator(grid: VoyageGrid, actuator: Actuator, samples: resampling.Samples) -> None:

@@ -3,13 +3,18 @@
 Every value between two samples is interpolated between them; where a sample is missing there is
 no value: a stale reading is a gap and not data. Interpolating rather than holding matters: holding
 an actuator shifts it by half a period, which a diagnosis later reads as a delay of the rudder.
+What is sent only when it changes is another thing: an order holds until the next one.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+
+from shiplog.logs.conversion import bursts
+from shiplog.voyages import stamp_steps
 
 RATE_HZ = 10.0
 STEP_NS = 100_000_000
@@ -17,6 +22,9 @@ EXACT_NS = 1_000  # a sample this close to a grid time is that grid time's own
 LEAST_TOLERANCE_S = 0.15
 AROUND = 10  # samples on either side of a span that say whether a message is missing in it
 MOST_PERIODS = 3.0  # a longer span is a gap whatever the samples around it say
+LONGEST_S = 5.0  # between samples of a motion: a helm order is given and met within it
+GRAVITY = 9.81  # m/s²
+SLOW_FROUDE = 0.2  # of a ship in harbour; at that speed it goes its own length in sqrt(L/g) / 0.2
 
 # A stamp that is far from the others is another clock's: of a receiver before its first fix
 # (1970, 1980), of a week counter that rolled over, or of a damaged byte.
@@ -36,7 +44,14 @@ class Samples:
     whole   [n]     no message is missing before the next sample, however far off its stamp is
     blank   [m]     ns, times at which a message came without a usable value
 
+    hold        each value holds until the next sample
+    longest_s   s, the longest time between samples that this ship's motion can bear
+    step_s      s, in which the stamps count, where that is coarse against the period; else 0
     resolution  the step in which the instrument counts, SI (position in m); 0 where none shows
+    burst       what was spread of samples that bore one stamp
+    dropped     samples that are not used, since another one has their stamp; of them `beside` are
+                another instrument's
+    taken_for_order  its samples show that it is sent when it changes
     """
 
     time: np.ndarray
@@ -47,6 +62,24 @@ class Samples:
     period_s: float
     tolerance_s: float
     resolution: float = 0.0
+    hold: bool = False
+    longest_s: float = math.inf
+    step_s: float = 0.0
+    burst: bursts.Spread | None = None
+    dropped: int = 0
+    beside: int = 0
+    taken_for_order: bool = False
+
+    @property
+    def sparse(self) -> bool:
+        """Its samples are further apart than anything is interpolated over."""
+        far = self.taken_for_order or self.period_s > self.tolerance_s
+        return not self.hold and len(self.time) > 1 and far
+
+    @property
+    def unsure_s(self) -> float:
+        """s, by how much the time of a sample can be off, by what its stamps show."""
+        return max(self.step_s, self.burst.unsure_s if self.burst else 0.0)
 
     def nearest_rows(self, times: np.ndarray) -> np.ndarray:
         """Grid rows [m] bool that are the nearest to a sample; times [m] ns."""
@@ -106,26 +139,54 @@ def strays(time: np.ndarray, other: np.ndarray) -> np.ndarray:
     return stray
 
 
-def ordered(time: np.ndarray, value: np.ndarray, tolerance_s: float | None) -> Samples:
-    """Sort by measurement time, set blank rows aside, drop repeated stamps (the first stays). A
-    stamp is blank where each of its rows is: one may hold what another instrument measured.
+def longest_s(length_m: float) -> float:
+    """The longest time between two samples [s] of which a straight line says what the ship did:
+    the time in which it goes its own length, L / U = sqrt(L / g) / Fn at Fn = 0.2, and 5 s at
+    least. A ship of 10 m has 5 s, one of 330 m 29 s."""
+    return max(LONGEST_S, math.sqrt(length_m / GRAVITY) / SLOW_FROUDE)
 
-    time [n] ns, value [n, k]; the tolerance is one and a half median periods unless given, and
-    only a given one is kept to the letter.
+
+def ordered(
+    time: np.ndarray,
+    value: np.ndarray,
+    tolerance_s: float | None,
+    hold: bool = False,
+    longest: float = math.inf,
+) -> Samples:
+    """Sort by measurement time and set blank rows aside. A stamp is blank where each of its rows
+    is: one may hold what another instrument measured. Several samples of one stamp are spread over
+    the time since the stamp before, as `bursts` has it; what then still shares a time is dropped,
+    and counted.
+
+    time [n] ns in the order of arrival, value [n, k]; the tolerance is one and a half periods
+    unless given, and a step of the stamps more where they count in coarse ones, but never more
+    than `longest` [s]. Only a given one is kept to the letter; of what holds, it is the longest
+    time that a value does.
     """
-    order = np.argsort(time, kind="stable")
-    time, value = time[order], value[order]
     finite = np.isfinite(value).all(axis=1)
-    unmeasured, time, value = time[~finite], time[finite], value[finite]
-    first = np.ones(len(time), bool)
-    first[1:] = np.diff(time) > 0
-    time, value = time[first], value[first]
+    unmeasured, time, value = np.sort(time[~finite]), time[finite], value[finite]
     blank = np.setdiff1d(unmeasured, time)
-    period = float(np.median(np.diff(time))) * 1e-9 if len(time) > 1 else 1.0 / RATE_HZ
-    tolerance = tolerance_s or max(1.5 * period, LEAST_TOLERANCE_S)
+    spread = bursts.spread(time, value)
+    order = np.argsort(spread.time, kind="stable")
+    time, value = spread.time[order], value[order]
+    own = ~(spread.again | spread.beside)[order]
+    own[1:] &= np.diff(time) > 0
+    dropped = len(time) - int(own.sum()) - int(spread.again.sum())
+    time, value = time[own], value[own]
+    period, step = stamp_steps.period_and_step(time)
+    period = period or 1.0 / RATE_HZ
+    tolerance = tolerance_s or max(1.5 * period, LEAST_TOLERANCE_S, period + step)
+    if tolerance_s is None:
+        tolerance = math.inf if hold else min(tolerance, max(longest, LEAST_TOLERANCE_S))
     none = np.zeros(len(time), bool)
-    whole = none if tolerance_s else _whole(time, period)
-    return Samples(time, value, none, whole, blank, period, tolerance)
+    whole = none if tolerance_s or hold else _whole(time, period) & (
+        np.diff(time, append=time[-1:]) * 1e-9 <= longest
+    )  # fmt: skip
+    return Samples(
+        time, value, none, whole, blank, period, tolerance, hold=hold, longest_s=longest,
+        step_s=step, burst=spread if spread.bursts else None, dropped=dropped,
+        beside=int(spread.beside.sum()),
+    )  # fmt: skip
 
 
 def _whole(time: np.ndarray, period_s: float) -> np.ndarray:
@@ -163,6 +224,8 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
         return OnGrid(
             empty, np.ones(count, bool), _near(times, samples.blank), np.zeros(count, bool)
         )
+    if samples.hold:
+        return _held(times, samples)
     right = np.searchsorted(known, times, side="left").clip(0, len(known) - 1)
     left = (right - (known[right] > times)).clip(0)
     span = known[right] - known[left]
@@ -180,6 +243,21 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     )
     blank = ~usable & _near(times, samples.blank)
     return OnGrid(value, ~usable & ~blank, blank, spike)
+
+
+def _held(times: np.ndarray, samples: Samples) -> OnGrid:
+    """The value of the last sample before each time, until the next one, or a blank, or the
+    tolerance is over. Before the first sample there is none."""
+    at = np.searchsorted(samples.time, times + EXACT_NS, side="right") - 1
+    last = samples.time[at.clip(0)]
+    usable = (at >= 0) & ((times - last) * 1e-9 <= samples.tolerance_s)
+    blanked = np.zeros(len(times), bool)
+    if len(samples.blank):
+        no = np.searchsorted(samples.blank, times + EXACT_NS, side="right") - 1
+        blanked = (no >= 0) & (samples.blank[no.clip(0)] > last)
+    value = samples.value[at.clip(0)].copy()
+    value[~usable | blanked] = np.nan
+    return OnGrid(value, ~usable & ~blanked, blanked, np.zeros(len(times), bool))
 
 
 def _near(times: np.ndarray, marked: np.ndarray) -> np.ndarray:

@@ -43,11 +43,15 @@ class VoyageGrid:
         return float(self.times[-1] - self.times[0]) * 1e-9
 
     def place(self, name: str, samples: resampling.Samples) -> np.ndarray:
-        """A source's values on the grid [m, k]; its gaps, blanks and spikes noted."""
+        """A source's values on the grid [m, k]; its gaps, blanks and spikes noted. Of one that is
+        too slow throughout, `sampling_findings` says so once."""
         placed = resampling.onto(self.times, samples)
         self.note(placed.blank, Quality.BLANK, "blank", name, "is blank")
         self.note(placed.spike, Quality.SPIKE, "spike", name, "spikes")
-        self.note(placed.gap, Quality.GAP, "gap", name, "has no sample")
+        if samples.sparse:
+            self.marks[placed.gap] |= int(Quality.GAP)
+        else:
+            self.note(placed.gap, Quality.GAP, "gap", name, "has no sample")
         return placed.value
 
     def note(self, mask: np.ndarray, flag: Quality, kind: str, name: str, what: str) -> None:

@@ -16,7 +16,10 @@ from shiplog import units
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.delimited import DelimitedTable
+from shiplog.logs.conversion.steps_back import along
 from shiplog.logs.dates import UNDATED
+from shiplog.logs.faults import as_metadata
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.profile import Column, Profile, Source
 from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS
@@ -51,7 +54,7 @@ def required(profile: Profile | None, path: Path) -> Profile:
 
 def voyages(
     table: DelimitedTable, profile: Profile, path: Path
-) -> tuple[Iterator[tuple[str, pl.DataFrame]], list[str]]:
+) -> tuple[Iterator[tuple[str, pl.DataFrame, list[Finding]]], list[str]]:
     """The table in SI, a column a channel and `time` in ns, one part a voyage; and which rows are
     in none, since their time or their voyage is blank. Rows that are blank throughout are no rows.
 
@@ -104,18 +107,33 @@ def voyages(
 
 def _in_order(
     parts: list[tuple[str, pl.DataFrame]], path: Path
-) -> Iterator[tuple[str, pl.DataFrame]]:
-    """Each voyage's rows in the order of time, under a name that a file can have."""
+) -> Iterator[tuple[str, pl.DataFrame, list[Finding]]]:
+    """Each voyage's rows in the order of time, under a name that a file can have, and what their
+    clock shows. A voyage whose recorder was started again is several: NAME_1, NAME_2."""
     for name, part in parts:
-        back = int((part["time"].diff() < 0).sum())
-        if back:
-            log.warning("%s: %s goes back in time %d times; sorted", path.name, name, back)
-        part = part.sort("time", maintain_order=True)
-        yield re.sub(r'[\\/:*?"<>|]', "_", name), part.drop("voyage", strict=False)
+        rows = part.drop("voyage", strict=False)
+        filled = rows.select(pl.exclude("time").is_not_null())
+        course = along(rows["time"].to_numpy(), filled.hash_rows() if filled.width else None)
+        rows = rows.with_columns(time=pl.Series(course.time))
+        several = int(course.part.max(initial=0)) + 1
+        for number in range(several):
+            one = rows.filter(pl.Series(course.part == number)) if several > 1 else rows
+            called = f"{name}_{number + 1}" if several > 1 else name
+            findings = [found for of, found in course.findings if of in (None, number)]
+            for finding in findings:
+                log.warning("%s: %s: %s", path.name, called, finding.sentence)
+            back = int((one["time"].diff() < 0).sum())
+            if back:
+                log.warning("%s: %s goes back in time %d times; sorted", path.name, called, back)
+                sentence = f"The rows of the table go back in time {back} times; they were sorted."
+                findings.append(Finding("out_of_order", "log", sentence, value=float(back)))
+            one = one.sort("time", maintain_order=True)
+            yield re.sub(r'[\\/:*?"<>|]', "_", called), one, findings
 
 
-def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
-    """SI columns back into each topic's fields and units: what the profile will read again."""
+def series(table: pl.DataFrame, profile: Profile, findings: Iterable[Finding] = ()) -> list[Series]:
+    """SI columns back into each topic's fields and units: what the profile will read again. The
+    findings on the table go with the first of them."""
     time = table["time"].to_numpy()
     topics: dict[str, dict[str, np.ndarray]] = {}
     noted: dict[str, dict[str, str]] = {}
@@ -128,6 +146,8 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
             else:
                 si = table[name].fill_null(np.nan).to_numpy()
             columns[path] = si / factor + offset
+    first = next(iter(topics), "")
+    noted[first] = noted.get(first, {}) | as_metadata(findings)
     return named_apart(
         _topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()
     )

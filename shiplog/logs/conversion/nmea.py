@@ -10,7 +10,7 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -27,6 +27,8 @@ from shiplog.logs.conversion.nmea_sentences import (
     facts,
     family,
 )
+from shiplog.logs.conversion.receive_clock import against_utc
+from shiplog.logs.faults import as_metadata
 from shiplog.logs.write import Series
 from shiplog.units import SECOND_NS, UNIX_NS, unix_unit
 
@@ -39,7 +41,6 @@ PROPRIETARY = re.compile(r"\$(P[A-Z0-9]{3,}),")  # a maker's own, after his thre
 NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
 OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
 SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
-LATE_S = 0.5  # clocks that differ by more are reported: at 10 m/s a ship is 5 m further by then
 EPOCH = date(1970, 1, 1)
 LAST_YEAR = 2261  # whose nanoseconds since 1970 still have 64 bits
 
@@ -211,7 +212,9 @@ class _Reader:
             most = ", ".join(f"{kind} ({n})" for kind, n in self.unused.most_common(8))
             log.info("%s: sentences not used: %s", name, most)
         clock = _Clock(self, topics, name)
-        return [clock.series(topic, rows) for topic, rows in sorted(topics.items())]
+        made = [clock.series(topic, rows) for topic, rows in sorted(topics.items())]
+        noted = as_metadata(clock.clock.findings)
+        return [replace(made[0], metadata={**made[0].metadata, **noted}), *made[1:]]
 
     def _chosen(self, name: str) -> dict[str, Rows]:
         """By topic: the best sentence for position and velocity; two talkers are two topics."""
@@ -246,24 +249,26 @@ class _Clock:
         self.name = name
         if reader.utc and reader.dated is None:
             log.warning("%s: no RMC or ZDA says the date; times count from 1970-01-01", name)
-        late = [
-            got - own
-            for rows in topics.values()
-            for own, got in zip(self.own(rows).tolist(), rows.received, strict=True)
-            if own >= 0 and got >= 0
-        ]
         self.days = 0
-        self.late = int(np.median(late)) if late else 0
-        if reader.of_day is not None and late:  # stamps without a date: only the day is made good
-            self.days = round(self.late / DAY_NS) * DAY_NS
-            self.late -= self.days
-        if abs(self.late) > LATE_S * SECOND_NS:
-            log.warning(
-                "%s: its receive stamps are %+.2f s against GNSS time; sentences without a time of "
-                "their own are put back by that", name, self.late / SECOND_NS,
-            )  # fmt: skip
-        else:
-            self.late = 0
+        place, own, received, kind = self._lines(list(topics.values()))
+        both = (own >= 0) & (received >= 0)
+        if reader.of_day is not None and both.any():  # stamps without a date: the day is made good
+            days = np.median((received - own)[both]) / DAY_NS
+            self.days = round(days) * DAY_NS
+            received = np.where(received >= 0, received - self.days, -1)
+        self.clock = against_utc(received, own, kind)
+        self.wrong = dict(zip(place.tolist(), self.clock.wrong.tolist(), strict=True))
+        for finding in self.clock.findings:
+            log.warning("%s: %s", name, finding.sentence)
+
+    def _lines(self, rows: list[Rows]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Place, UTC, receive stamp and topic [n] of the sentences, in the order of the file."""
+        place = np.concatenate([np.array(one.place, np.int64) for one in rows])
+        own = np.concatenate([self.own(one) for one in rows])
+        received = np.concatenate([np.array(one.received, np.int64) for one in rows])
+        kind = np.repeat(np.arange(len(rows)), [len(one.place) for one in rows])
+        _, first = np.unique(place, return_index=True)
+        return place[first], own[first], received[first], kind[first]
 
     def own(self, rows: Rows) -> np.ndarray:
         """UTC [n] ns of sentences, those before the first date put onto its day; -1 is none."""
@@ -281,14 +286,13 @@ class _Clock:
                 f"{self.name} has no time: neither RMC, GGA or ZDA nor a stamp before each line.",
                 hint="record RMC with the other sentences, or have the logger stamp each line.",
             )
-        time = np.where(
-            own >= 0, own, np.where(stamped, received - self.late, self._between(place))
-        )
+        wrong = np.array([self.wrong[one] for one in rows.place], np.int64)
+        time = np.where(own >= 0, own, np.where(stamped, received - wrong, self._between(place)))
         known = time >= 0
         schema, names = SENTENCE_TOPICS[family(rows.kind)]
         values = np.array(rows.values, float).reshape(len(place), -1)[known]
         columns = dict(zip(names, values.T, strict=False))
-        logged = np.where(stamped, received, time)[known]
+        logged = np.where(stamped, received - wrong, time)[known]
         return Series(topic, schema, time[known], columns, log_time=logged, frame_id="nmea")
 
     def _between(self, place: np.ndarray) -> np.ndarray:

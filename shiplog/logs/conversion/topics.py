@@ -13,6 +13,7 @@ from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import named_apart, plain, refuse_scaled, schema_of
 from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
+from shiplog.logs.conversion.steps_back import of_one_recording
 from shiplog.logs.write import THE_MESSAGES_OWN, Series
 from shiplog.profile import Profile
 
@@ -79,6 +80,7 @@ def _one(path: Path, profile: Profile | None) -> list[Series]:
         n: clock.instants(frame[n], (c.unit if c else None) or _unit(n), c.format if c else None)
         for n, c in columns.items()
     }
+    clocks = {n: of_one_recording(times, path.name) for n, times in clocks.items()}
     stamp, logged = clocks[names[0]], clocks[names[-1]]
     keep = (logged if logged_name else stamp).is_not_null()
     order = logged.filter(keep).arg_sort()
