@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +17,9 @@ from shiplog.logs.bags import bag_to_log, bags_once, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
-from shiplog.logs.conversion.nmea import is_nmea, read_nmea
+from shiplog.logs.conversion.nmea import is_nmea, read_nmea_log
 from shiplog.logs.conversion.topics import folder_to_series
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
@@ -93,10 +94,10 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             done.lost[str(path)] = " ".join(left_out)
         yield _written(target, parts, profile, ship, path)
     elif is_nmea(path):
-        parts, damaged = read_nmea(path)
-        if damaged:
-            done.lost[str(path)] = counted(damaged, "damaged sentence")
-        yield _written(target, parts, profile, ship, path)
+        found = read_nmea_log([path], path.name)
+        if found.damaged:
+            done.lost[str(path)] = counted(found.damaged, "damaged sentence")
+        yield _written(target, found.series, profile, ship, path, found.findings)
     else:
         profile = columns.required(profile, path)
         voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
@@ -120,12 +121,18 @@ def _why(error: BaseException, doing: str) -> str:
 
 
 def _written(
-    target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
+    target: Path,
+    parts: list[Series],
+    profile: Profile | None,
+    ship: str,
+    source: Path,
+    findings: Sequence[Finding] = (),
 ) -> Path:
     refuse_existing(target)
     datum = profile.site.datum if profile else None
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
+    notes = {"table": source.name}
+    write_log(target, parts, ship=ship, datum=datum, notes=notes, findings=findings)
     log.info(
         "%s: %d topics, %d rows",
         target.name,
