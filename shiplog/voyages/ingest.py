@@ -20,7 +20,7 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import clocks, empty_course, fault_detection, resampling, sensor_consistency
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -111,6 +111,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
+    moved += empty_course.findings_of(reading, profile, _raw)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -238,6 +239,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
     elif kind in ("sog_cog", "from_bow"):
+        value = empty_course.known(value) if kind == "sog_cog" else value
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
         value = value[:, ::-1]

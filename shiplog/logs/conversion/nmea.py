@@ -134,6 +134,7 @@ class _Reader:
         kind = sentence.kind
         if kind not in USED and not (kind == "VDO" and sentence.own_ship):
             self.unused[kind] += 1
+            self.damaged += sentence.wrong != 0
             return
         place = len(self.received)
         form = len(sentence.fields)
@@ -202,7 +203,8 @@ class _Reader:
         clock = clock_of(resolved, received, np.array(self.length, np.int64), instruments, dateless)
         if not len(clock.known) and not (received >= 0).any():
             raise ChannelMissing(
-                f"{name} has no time: neither RMC, GGA or ZDA nor a stamp before each line.",
+                f"{name} has no time: neither RMC, GGA or ZDA nor a stamp before each line."
+                + (f" {self.damaged} sentences are damaged." if self.damaged else ""),
                 hint="record RMC with the other sentences, or have the logger stamp each line.",
             )
         spoken = topics_of(self.gathered, resolved, clock, [*self.senders])
@@ -213,6 +215,7 @@ class _Reader:
             )
         self._say(name, spoken, len(resolved.place) > 0 and not resolved.dated)
         findings = report.findings(spoken, resolved, clock, [talker for talker, _ in self.senders])
+        findings += [report.renamed(*one) for one in self.checksums.renamed.items()]
         if self.damaged:
             findings.insert(0, report.damaged(self.damaged, len(self.received)))
         for finding in findings:
@@ -240,7 +243,8 @@ class _Reader:
 
     def _why_none(self) -> str:
         words = Counter(w for rows in self.gathered.rows.values() for w in rows.why_not.values())
-        return f" Not valid by their own word: {listed(words)}." if words else ""
+        said = f" Not valid by their own word: {listed(words)}." if words else ""
+        return said + (f" {self.damaged} sentences are damaged." if self.damaged else "")
 
     def _say(self, name: str, spoken: Spoken, dateless: bool) -> None:
         if dateless:

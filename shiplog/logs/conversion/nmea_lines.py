@@ -34,6 +34,7 @@ EPOCH = date(1970, 1, 1)
 LAST_YEAR = 2261  # whose nanoseconds since 1970 still have 64 bits
 SENDS_CHECKSUMS = 0.5  # share of a talker's sentences with one from which on those without are cut
 OWN_DEVICE = 10  # sentences of one kind, none with a checksum: a device that sends none
+RENAMED, RENAMED_SHARE = 20, 0.9  # sentences of a kind with checksums wrong in the same bits
 RARE_TALKER = 10  # sentences; of fewer nothing says what the talker does
 
 
@@ -47,6 +48,7 @@ class Sentence:
     source: str  # the recorder's name of the instrument, or ""
     received: int  # ns, by the recorder's clock; -1 where the line has no stamp
     vouched: bool  # its checksum is there, and right
+    wrong: int  # bits in which its checksum is wrong
     own_ship: bool  # `!`: encapsulated, as of AIS
     length: int  # characters on the line
 
@@ -132,14 +134,13 @@ class Lines:
             if talker[0] == "P":  # five letters of a maker, as PASHR
                 self.unused[talker + kind] += 1
                 continue
+            wrong = 0
             if check is not None:
                 characters = match[0][1 : match.start(4) - match.start() - 1]
-                if reduce(xor, characters.encode("latin-1", "replace")) != int(check, 16):
-                    self.damaged += 1
-                    continue
+                wrong = reduce(xor, characters.encode("latin-1", "replace")) ^ int(check, 16)
             fields = [field.strip() for field in body.split(",")]
             sentences.append(Sentence(
-                talker, kind, fields, source, received, check is not None,
+                talker, kind, fields, source, received, check is not None and not wrong, wrong,
                 match[0][0] == "!", len(match[0]),
             ))  # fmt: skip
         return sentences
@@ -151,22 +152,25 @@ class Checksums:
     def __init__(self) -> None:
         self.sent: Counter[tuple[str, str]] = Counter()  # by talker and kind
         self.bare: dict[tuple[str, str], list[int]] = {}  # places of sentences without one
+        self.wrong: dict[tuple[str, str], list[tuple[int, int]]] = {}  # bits and place
+        self.renamed: dict[tuple[str, str], int] = {}  # sentences by talker and kind
 
     def note(self, sentence: Sentence, place: int) -> None:
         key = (sentence.talker, sentence.kind)
-        if sentence.vouched:
+        if sentence.wrong:
+            self.wrong.setdefault(key, []).append((sentence.wrong, place))
+        elif sentence.vouched:
             self.sent[key] += 1
         else:
             self.bare.setdefault(key, []).append(place)
 
     def cut(self) -> list[int]:
-        """Places of the sentences that have lost their checksum, and so may have lost more.
+        """Places of the sentences that are damaged: their checksum is wrong, or was lost with more.
 
         A talker that sends checksums sends them always: a sentence without one was cut. Only a
         kind that never has one is a device of its own under the same letters.
         """
-        if not self.bare:
-            return []
+        cut = self._wrong()
         sent: Counter[str] = Counter()
         bare: Counter[str] = Counter()
         for (talker, _), count in self.sent.items():
@@ -174,7 +178,6 @@ class Checksums:
         for (talker, _), places in self.bare.items():
             bare[talker] += len(places)
         everywhere = sent.total() > SENDS_CHECKSUMS * (sent.total() + bare.total())
-        cut: list[int] = []
         for (talker, kind), places in self.bare.items():
             of_kind = self.sent[talker, kind]
             if of_kind == 0 and len(places) >= OWN_DEVICE:
@@ -183,4 +186,21 @@ class Checksums:
             unknown = sent[talker] == 0 and bare[talker] < RARE_TALKER
             if sends or of_kind >= len(places) or (unknown and everywhere):
                 cut += places
+        return cut
+
+    def _wrong(self) -> list[int]:
+        """Places of the sentences with a wrong checksum.
+
+        Damage is never twice the same. Checksums that are wrong in the same bits throughout are of
+        a multiplexer that renamed the talker and left them as they were: those are whole.
+        """
+        cut: list[int] = []
+        for key, wrong in self.wrong.items():
+            (bits, count), *_ = Counter(bits for bits, _ in wrong).most_common(1)
+            if count >= RENAMED and count >= RENAMED_SHARE * (len(wrong) + self.sent[key]):
+                self.sent[key] += count
+                self.renamed[key] = count
+            else:
+                bits = 0
+            cut += [place for other, place in wrong if other != bits]
         return cut
