@@ -25,6 +25,14 @@ def damaged(count: int, whole: int) -> Finding:
     return Finding("dropped", "log", sentence, value=float(count))
 
 
+def renamed(key: tuple[str, str], count: int) -> Finding:
+    sentence = (
+        f"The checksums of {count} sentences {''.join(key)} are wrong, all in the same bits: their "
+        "talker was renamed on the way. They are used."
+    )
+    return Finding("two_sources", "log", sentence, value=float(count))
+
+
 def findings(spoken: Spoken, resolved: Resolved, clock: Clock, talkers: list[str]) -> list[Finding]:
     """All but the damage. Times are seconds from the log's first message."""
     begin = min(int(np.min(one.log_time)) for one in spoken.series if len(one.time))
