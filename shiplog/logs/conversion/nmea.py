@@ -81,13 +81,9 @@ def read_nmea_log(paths: Sequence[Path], name: str) -> NmeaLog:
     """One log of a text, or of several that one recorder wrote, an instrument each.
 
     Raises ChannelMissing as `read_nmea` does."""
-    reader = _Reader()
     if len(paths) == 1:
-        lines = Lines()
-        for line in _text(paths[0]):
-            for sentence in lines.of(line):
-                reader.take(sentence)
-        return reader.finish(name, [lines])
+        return read_sentences(_text(paths[0]), name)
+    reader = _Reader()
     files = [(Lines(path.stem), path) for path in paths]
     merged = heapq.merge(*(_stamped(*one) for one in files), key=lambda item: item[0])
     for _, sentence in merged:
@@ -102,6 +98,15 @@ def lines_to_series(lines: Iterable[str], name: str, received: Sequence[int]) ->
         for sentence in read.of(line, stamp):
             reader.take(sentence)
     return reader.finish(name, [read]).series
+
+
+def read_sentences(lines: Iterable[str], name: str) -> NmeaLog:
+    """The same of lines. Raises ChannelMissing."""
+    reader, read = _Reader(), Lines()
+    for line in lines:
+        for sentence in read.of(line):
+            reader.take(sentence)
+    return reader.finish(name, [read])
 
 
 def _text(path: Path) -> Iterator[str]:

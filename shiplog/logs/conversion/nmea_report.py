@@ -40,7 +40,7 @@ def findings(spoken: Spoken, resolved: Resolved, clock: Clock, talkers: list[str
     found += _receivers(spoken)
     found += [_other_clock(other, talkers) for other in resolved.others]
     found += _recorder(clock, begin)
-    found += [_compass(*one) for one in spoken.compasses]
+    found += [compass(*one) for one in spoken.compasses]
     found += [
         Finding("two_sources", topic, f"{sentences} lie {metres:.1f} m apart at the same time: "
                 "two receivers send under one talker.", value=metres, unit="m")
@@ -167,7 +167,7 @@ def _recorder(clock: Clock, begin: int) -> list[Finding]:
     return found
 
 
-def _compass(topic: str, kind: str, made: magnetic.Variation | None) -> Finding:
+def compass(topic: str, kind: str, made: magnetic.Variation | None) -> Finding:
     """The variation that made a compass true, or that none could be found."""
     if made is None:
         sentence = (
