@@ -114,13 +114,13 @@ def by_model(time: np.ndarray, track: Track) -> tuple[np.ndarray | None, str]:
         name = model.model
         if not FIRST_YEAR <= year < LAST_YEAR:
             name += ", beyond its years"
-    smooth = np.unwrap(np.array(values), period=360.0)
+    smooth = np.asarray(np.unwrap(np.array(values, float), period=360.0), float)
     return np.interp((time - begin).astype(float), (grid - begin).astype(float), smooth), name
 
 
 @lru_cache
 def _model(year: int) -> GeoMag:
-    return GeoMag(base_year=year)
+    return GeoMag(base_year=datetime(year, 1, 1, tzinfo=UTC))
 
 
 def _year(time_ns: int) -> float:

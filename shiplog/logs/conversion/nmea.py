@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import heapq
 import logging
+from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -31,7 +32,7 @@ from shiplog.logs.conversion.nmea_lines import (
 )
 from shiplog.logs.conversion.nmea_sentences import SENTENCES, TIME_AT
 from shiplog.logs.conversion.nmea_topics import Gathered, Rows, Spoken, topics_of
-from shiplog.logs.conversion.nmea_utc import Times, resolve
+from shiplog.logs.conversion.nmea_utc import Resolved, Times, kept, resolve
 from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series
 from shiplog.units import SECOND_NS
@@ -129,8 +130,7 @@ class _Reader:
     def __init__(self) -> None:
         self.gathered = Gathered()
         self.times, self.checksums = Times(), Checksums()
-        self.received: list[int] = []
-        self.length: list[int] = []
+        self.received, self.length = array("q"), array("i")  # of each sentence, by its place
         self.senders: dict[tuple[str, str], int] = {}  # talker and source, in order of appearance
         self.damaged = 0
         self.unused: Counter[str] = Counter()
@@ -233,12 +233,10 @@ class _Reader:
         gone[cut] = True
         self.gathered.drop(gone)
         keep = ~gone[np.array(self.times.place, np.int64)]
-        for name in ("place", "of_day", "day", "trusted", "sender"):
-            values = getattr(self.times, name)
-            setattr(self.times, name, [v for v, k in zip(values, keep, strict=True) if k])
-        self.gathered.form = [v for v, k in zip(self.gathered.form, keep, strict=True) if k]
+        self.times = kept(self.times, keep)
+        self.gathered.form = array("q", np.array(self.gathered.form)[keep].tolist())
 
-    def _not_valid_where_still(self, resolved) -> None:
+    def _not_valid_where_still(self, resolved: Resolved) -> None:
         """Sentences by a clock that stands still are placeholders, whatever else they say."""
         still = set(resolved.place[resolved.still].tolist())
         for rows in self.gathered.rows.values() if still else ():

@@ -281,18 +281,19 @@ def _steps(late: np.ndarray, at: np.ndarray, received: np.ndarray) -> list[int]:
     begins = [0]
     if len(late) < 2 * AROUND:
         return begins
-    i = AROUND
-    while i <= len(late) - AROUND:
+    jumps = np.flatnonzero(np.abs(np.diff(late)) > 0.5 * STEP_NS) + 1
+    for i in jumps[(jumps >= AROUND) & (jumps <= len(late) - AROUND)].tolist():
+        if i < begins[-1] + AROUND and begins[-1]:
+            continue
         before = late[max(begins[-1], i - AROUND) : i]
         after = late[i : i + AROUND]
         step = float(np.median(after) - np.median(before))
-        jitter = max(np.median(np.abs(before - np.median(before))),
-                     np.median(np.abs(after - np.median(after))))  # fmt: skip
+        jitter = max(
+            np.median(np.abs(before - np.median(before))),
+            np.median(np.abs(after - np.median(after))),
+        )
         if abs(step) > max(STEP_NS, 6.0 * jitter) and abs(late[i] - late[i - 1]) > 0.5 * abs(step):
             begins.append(i)
-            i += AROUND
-        else:
-            i += 1
     return begins
 
 

@@ -138,7 +138,9 @@ class Lines:
             if check is not None:
                 characters = match[0][1 : match.start(4) - match.start() - 1]
                 wrong = reduce(xor, characters.encode("latin-1", "replace")) ^ int(check, 16)
-            fields = [field.strip() for field in body.split(",")]
+            fields = body.split(",")
+            if " " in body or "\t" in body:
+                fields = [field.strip() for field in fields]
             sentences.append(Sentence(
                 talker, kind, fields, source, received, check is not None and not wrong, wrong,
                 match[0][0] == "!", len(match[0]),

@@ -35,7 +35,8 @@ def renamed(key: tuple[str, str], count: int) -> Finding:
 
 def findings(spoken: Spoken, resolved: Resolved, clock: Clock, talkers: list[str]) -> list[Finding]:
     """All but the damage. Times are seconds from the log's first message."""
-    begin = min(int(np.min(one.log_time)) for one in spoken.series if len(one.time))
+    logged = [one.time if one.log_time is None else one.log_time for one in spoken.series]
+    begin = min(int(times.min()) for times in logged if len(times))
     found = _statuses(spoken, begin)
     found += _receivers(spoken)
     found += [_other_clock(other, talkers) for other in resolved.others]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from array import array
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -40,14 +42,14 @@ class Rows:
     """One kind of sentence of one sender."""
 
     kind: str  # of SENTENCE_TOPICS
-    place: list[int] = field(default_factory=list)  # which sentence of the file it was
+    place: array = field(default_factory=partial(array, "q"))  # which sentence of the file it was
     values: list[tuple[float, ...]] = field(default_factory=list)
     why_not: dict[int, str] = field(default_factory=dict)  # row: why it is no measurement
 
     def drop(self, gone: np.ndarray) -> None:
         keep = np.flatnonzero(~gone[np.array(self.place, np.int64)])
         new = {int(old): k for k, old in enumerate(keep)}
-        self.place = [self.place[i] for i in keep]
+        self.place = array("q", [self.place[i] for i in keep])
         self.values = [self.values[i] for i in keep]
         self.why_not = {new[i]: why for i, why in self.why_not.items() if i in new}
 
@@ -60,7 +62,7 @@ class Gathered:
     """
 
     rows: dict[tuple[str, int], Rows] = field(default_factory=dict)
-    form: list[int] = field(default_factory=list)
+    form: array = field(default_factory=partial(array, "q"))
 
     def drop(self, gone: np.ndarray) -> None:
         for rows in self.rows.values():
@@ -172,7 +174,7 @@ def _receivers(
 
 
 def _epochs(
-    mine: np.ndarray, resolved: Resolved, form: list[int],
+    mine: np.ndarray, resolved: Resolved, form: array,
     where: dict[int, tuple[float, ...]], kinds: dict[int, str],
 ) -> Epochs:  # fmt: skip
     """Sentences [n] of a sender with UTC, those of one time together."""

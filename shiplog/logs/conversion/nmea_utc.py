@@ -8,7 +8,9 @@ its own: an old one counts weeks up to 1024 and begins again (IS-GPS-200, 20.3.3
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -29,11 +31,11 @@ OTHER_SHARE = 0.05  # of the log's sentences with UTC: another clock with fewer 
 class Times:
     """The sentences with a UTC, in the order of the file."""
 
-    place: list[int] = field(default_factory=list)  # which sentence of the file
-    of_day: list[int] = field(default_factory=list)  # ns
-    day: list[int] = field(default_factory=list)  # since 1970; -1 where the sentence has no date
-    trusted: list[bool] = field(default_factory=list)  # the receiver has a fix
-    sender: list[int] = field(default_factory=list)
+    place: array = field(default_factory=partial(array, "q"))  # which sentence of the file
+    of_day: array = field(default_factory=partial(array, "q"))  # ns
+    day: array = field(default_factory=partial(array, "q"))  # since 1970; -1 without a date
+    trusted: array = field(default_factory=partial(array, "b"))  # the receiver has a fix
+    sender: array = field(default_factory=partial(array, "i"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,3 +250,11 @@ def _take_untrusted(
         near = near or abs(now - (low if low is not None else int(high or 0))) <= NEAR_NS
         if after and before and near:
             utc[i] = now
+
+
+def kept(times: Times, keep: np.ndarray) -> Times:
+    """Only the sentences of `keep` [n]."""
+    return Times(*(
+        array(one.typecode, np.array(one)[keep].tolist())
+        for one in (times.place, times.of_day, times.day, times.trusted, times.sender)
+    ))  # fmt: skip
