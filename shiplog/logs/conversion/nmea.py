@@ -273,12 +273,16 @@ def _day(sentence: Sentence) -> int:
             return -1
         if len(text) != 6 or not text.isdecimal():
             raise ValueError(text)
-        year = int(text[4:])
-        year += 1900 if year >= FIRST_YEARS else 2000
-        return (date(year, int(text[2:4]), int(text[:2])) - EPOCH).days
+        return (date(_year(text[4:]), int(text[2:4]), int(text[:2])) - EPOCH).days
     if sentence.kind == "ZDA" and len(fields) > 3 and all(fields[1:4]):
-        year = int(fields[3])
+        year = _year(fields[3])
         if not EPOCH.year <= year <= LAST_YEAR:
             raise ValueError(f"the year {year}")
         return (date(year, int(fields[2]), int(fields[1])) - EPOCH).days
     return -1
+
+
+def _year(text: str) -> int:
+    """Two digits are of this century, or of the last decades before it."""
+    year = int(text)
+    return year if year > 99 else year + (1900 if year >= FIRST_YEARS else 2000)

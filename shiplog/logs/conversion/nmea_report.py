@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from shiplog.logs.conversion import magnetic
 from shiplog.logs.conversion.nmea_clock import Clock
 from shiplog.logs.conversion.nmea_topics import Spoken
