@@ -21,6 +21,7 @@ from shiplog.logs.conversion.nmea_utc import ROLLOVER_DAYS, Resolved
 from shiplog.units import SECOND_NS, YEAR_2000_NS
 
 LATENCY_NS = int(1.5 * SECOND_NS)  # the most that is taken for a receiver's
+SMALL_NS = SECOND_NS // 2  # most receivers are faster
 EARLY_NS = -SECOND_NS // 10  # a stamp so much before its own UTC is still jitter
 STEP_NS = SECOND_NS // 4  # of the recorder's clock, that is told from jitter of the latency
 DRIFT_NS = SECOND_NS // 4  # over the log: a clock that nothing sets
@@ -328,16 +329,27 @@ def _offset(
     zone = np.rint(late / ZONE_NS).astype(np.int64) * ZONE_NS
     rest = late - zone
     plausible = (rest >= EARLY_NS) & (rest <= LATENCY_NS)
-    shown = plausible[at].mean() > 0.1 and not recorder.drift_ns
-    latency = max(int(rest[at][plausible[at]].min()), 0) if shown else 0
+    latency = None if recorder.drift_ns else _latency(rest[at], plausible[at])
+    recorder.latency_ns = None if latency is None else latency + extra
+    latency = latency or 0
     offset = np.where(plausible & (np.abs(rest - latency) <= STEP_NS), zone, late - latency)
     if recorder.drift_ns:
         offset = late
-    recorder.latency_ns = latency + extra if shown else None
     changes = np.flatnonzero(np.diff(offset[at]))
     begins = [0, *(changes + 1)] if len(changes) < 12 else [0]
     recorder.offsets = [(int(utc[i]), int(offset[at[i]])) for i in begins]
     return offset
+
+
+def _latency(rest: np.ndarray, plausible: np.ndarray) -> int | None:
+    """The receiver's latency [ns], of what may be one [m]; None where the clock hides it.
+
+    A small one is believed of any part of the log, a large one of the last: there the clock was
+    set, if it was."""
+    small = plausible & (rest <= SMALL_NS)
+    if small.mean() > 0.1:
+        return max(int(rest[small].min()), 0)
+    return int(rest[-1]) if plausible[-1] else None
 
 
 def _least_late(

@@ -155,7 +155,7 @@ def _receivers(
                 kinds[place] = kind
         if not where:
             continue
-        mine = np.flatnonzero(resolved.sender == sender)
+        mine = np.flatnonzero((resolved.sender == sender) & (resolved.utc >= 0))
         epochs = _epochs(mine, resolved, gathered.form, where, kinds)
         labels = label(epochs)
         if labels is not None:
