@@ -145,7 +145,7 @@ def test_what_python_takes_for_a_number_and_no_instrument_sends(field):
 
 
 def test_the_own_ship_of_an_ais_transponder():
-    """Bits laid down by hand: type 1, 9.9 kn, 5 deg 30 min N, 10 deg W, course 341.5, heading 32."""
+    """Bits laid down by hand: type 1, 9.9 kn, 5.5 deg N, 10 deg W, course 341.5, heading 32."""
     fields = [(1, 6), (0, 2), (211_000_000, 30), (0, 4), (0, 8), (99, 10), (0, 1),
               (-10 * 600_000, 28), (5 * 600_000 + 300_000, 27), (3415, 12), (32, 9), (12, 6),
               (0, 2), (0, 3), (0, 1), (0, 19)]  # fmt: skip

@@ -20,7 +20,7 @@ from shiplog.units import SECOND_NS, UNIX_NS, unix_unit
 SENTENCE = re.compile(
     r"[$!]([A-Z0-9]{2})([A-Z]{3}),([^$!\r\n*\\]*)(?:\*([0-9A-Fa-f]{1,2}))?"
 )  # talker, kind, fields, checksum
-HEADLESS = re.compile(r"^[A-Z]{0,5},[^$!]*\*[0-9A-Fa-f]{2}\s*$")  # its beginning was lost
+HEADLESS = re.compile(r"^[^$!]*,[^$!]*\*[0-9A-Fa-f]{2}\s*$")  # its beginning was lost
 PROPRIETARY = re.compile(r"\$(P[A-Z0-9]{3,}),")  # a maker's own, after his three letters
 ISO = re.compile(
     r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(?: ?(Z|UTC|[+-]\d\d:?\d\d))?"

@@ -22,6 +22,7 @@ GAIN = (
 )
 SHARE = 0.1  # of the fixes: a second receiver has as many
 LEAST = 20  # fixes, that a rhythm shows in
+WITHIN = 0.8  # share of the fixes that say how rough a track is
 REPEATED = 0.2  # share of fixes that repeat the one before: a receiver slower than its output
 FILLS = 0.6  # periods from the nearest sample of the other: a sample in its silence
 MOST_FILL = 0.9  # share of the samples that do so
@@ -57,7 +58,7 @@ def label(epochs: Epochs) -> np.ndarray | None:
     time = _ordinal(epochs.utc[known])
     merged = _roughness(metres, time)
     best: tuple[float, np.ndarray] | None = None
-    for labels in _labellings(epochs):
+    for labels in _labellings(epochs, metres, time, known, merged):
         part = labels[known]
         if not _alternate(part) or min(np.bincount(part)) < SHARE * len(part):
             continue
@@ -68,7 +69,9 @@ def label(epochs: Epochs) -> np.ndarray | None:
     return None if best is None else _by_size(best[1])
 
 
-def _labellings(epochs: Epochs) -> Iterator[np.ndarray]:
+def _labellings(
+    epochs: Epochs, metres: np.ndarray, time: np.ndarray, known: np.ndarray, merged: float
+) -> Iterator[np.ndarray]:
     """Ways in which the epochs [n] may be of several receivers."""
     form = _classes(epochs.form, 3)
     if form is not None:
@@ -82,6 +85,28 @@ def _labellings(epochs: Epochs) -> Iterator[np.ndarray]:
     if again.any():
         yield again
     yield np.arange(len(epochs.of_day)) % 2
+    if merged > 0.25 * APART_M:
+        near = np.zeros(len(epochs.of_day), np.int64)
+        near[known] = _two_tracks(metres, time)
+        yield near
+
+
+def _two_tracks(metres: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Which of two tracks [n] each fix continues: a new one begins where a fix is off the first."""
+    tracks: list[tuple[float, np.ndarray, np.ndarray]] = []  # time, place and velocity
+    labels = []
+    for now, here in zip(time.tolist(), metres, strict=True):
+        off = [float(np.hypot(*(p + v * (now - t) - here))) for t, p, v in tracks]
+        best = int(np.argmin(off)) if off else 0
+        if not tracks or (len(tracks) < 2 and off[best] > APART_M):
+            best = len(tracks)
+            tracks.append((now, here, tracks[0][2] if tracks else np.zeros(2)))
+        t, p, v = tracks[best]
+        if now > t:
+            v = 0.5 * v + 0.5 * (here - p) / (now - t)
+        tracks[best] = now, here, v
+        labels.append(best)
+    return np.array(labels, np.int64)
 
 
 def _classes(values: np.ndarray, most: int) -> np.ndarray | None:
@@ -122,13 +147,14 @@ def _ordinal(utc: np.ndarray) -> np.ndarray:
 
 
 def _roughness(metres: np.ndarray, time: np.ndarray) -> float:
-    """Median distance [m] of a fix from the line between its neighbours."""
+    """Distance [m] of a fix from the line between its neighbours, that 80 % are within: of a
+    second receiver with a tenth of the fixes three in ten are beyond."""
     if len(metres) < 3:
         return 0.0
     span = time[2:] - time[:-2]
     share = np.where(span > 0, (time[1:-1] - time[:-2]) / np.where(span > 0, span, 1.0), 0.5)
     line = metres[:-2] + share[:, None] * (metres[2:] - metres[:-2])
-    return float(np.median(np.linalg.norm(metres[1:-1] - line, axis=1)))
+    return float(np.quantile(np.linalg.norm(metres[1:-1] - line, axis=1), WITHIN))
 
 
 def _distance(metres: np.ndarray, time: np.ndarray, labels: np.ndarray) -> float:

@@ -168,10 +168,8 @@ def _other(
     utc: np.ndarray, place: np.ndarray, clock: np.ndarray, at: np.ndarray, sender: np.ndarray
 ) -> OtherClock:
     """What a track of `utc` [n] at `place` [n] is against the log's clock [m] at `at` [m]."""
-    nearest = np.searchsorted(at, place).clip(0, len(at) - 1)
-    before = (nearest - 1).clip(0)
-    nearest = np.where(place - at[before] < at[nearest] - place, before, nearest)
-    ahead = utc - clock[nearest]
+    before = (np.searchsorted(at, place, side="right") - 1).clip(0)
+    ahead = utc - clock[before]
     days = np.rint(ahead / DAY_NS)
     median = int(np.median(ahead))
     same = np.mean(np.abs(ahead - days * DAY_NS) <= SAME_NS) > 0.8
