@@ -15,7 +15,7 @@ def convert(
     tables: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV or Parquet tables, NMEA 0183 text or Signal K logs, folders of one of them per "
+            help="CSV or Parquet tables, NMEA 0183 text, Signal K logs, folders of one of them per "
             "topic or instrument, ROS bags."
         ),
     ],
