@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +17,10 @@ from shiplog.logs.bags import bag_to_log, bags_once, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
-from shiplog.logs.conversion.nmea import is_nmea, read_nmea
-from shiplog.logs.conversion.topics import folder_to_series
+from shiplog.logs.conversion.nmea import is_nmea, read_nmea_log
+from shiplog.logs.conversion.nmea_folder import read_folder
+from shiplog.logs.conversion.signalk import is_signalk, read_signalk
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
@@ -63,9 +65,9 @@ def draft(path: Path, vessel: str | None = None) -> str:
     with saying(f"{path.name}: drafting"):
         if not path.exists() or path.suffix.lower() == ".mcap":
             return draft_log(path, vessel)
-        if is_table(path) and not is_nmea(path):
+        if is_table(path) and not is_signalk(path) and not is_nmea(path):
             return draft_table(path, vessel)
-        if not (is_bag(path) or is_nmea(path) or path.is_dir()):
+        if not (is_bag(path) or is_signalk(path) or is_nmea(path) or path.is_dir()):
             return draft_log(path, vessel)
         with files.temporary_folder() as folder:
             done = Converted()
@@ -88,15 +90,16 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
-        parts, left_out = folder_to_series(path, profile)
-        if left_out:
-            done.lost[str(path)] = " ".join(left_out)
-        yield _written(target, parts, profile, ship, path)
-    elif is_nmea(path):
-        parts, damaged = read_nmea(path)
-        if damaged:
-            done.lost[str(path)] = counted(damaged, "damaged sentence")
-        yield _written(target, parts, profile, ship, path)
+        folder = read_folder(path, profile)
+        lost = [counted(folder.damaged, "damaged sentence") + "."] if folder.damaged else []
+        if lost := [*lost, *folder.left_out]:
+            done.lost[str(path)] = " ".join(lost)
+        yield _written(target, folder.series, profile, ship, path, folder.findings)
+    elif is_signalk(path) or is_nmea(path):
+        found = read_signalk(path) if is_signalk(path) else read_nmea_log([path], path.name)
+        if found.damaged:
+            done.lost[str(path)] = counted(found.damaged, "damaged sentence")
+        yield _written(target, found.series, profile, ship, path, found.findings)
     else:
         profile = columns.required(profile, path)
         voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
@@ -120,12 +123,18 @@ def _why(error: BaseException, doing: str) -> str:
 
 
 def _written(
-    target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
+    target: Path,
+    parts: list[Series],
+    profile: Profile | None,
+    ship: str,
+    source: Path,
+    findings: Sequence[Finding] = (),
 ) -> Path:
     refuse_existing(target)
     datum = profile.site.datum if profile else None
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
+    notes = {"table": source.name}
+    write_log(target, parts, ship=ship, datum=datum, notes=notes, findings=findings)
     log.info(
         "%s: %d topics, %d rows",
         target.name,

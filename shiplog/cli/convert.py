@@ -15,7 +15,8 @@ def convert(
     tables: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV or Parquet tables, folders of one table per topic, NMEA 0183 text, ROS bags."
+            help="CSV or Parquet tables, NMEA 0183 text, Signal K logs, folders of one of them per "
+            "topic or instrument, ROS bags."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the logs.")],
@@ -28,7 +29,7 @@ def convert(
     ] = None,
     json_to: JsonOption = None,
 ) -> None:
-    """Tables, NMEA 0183 text and ROS bags to MCAP logs.
+    """Tables, NMEA 0183 text, Signal K logs and ROS bags to MCAP logs.
 
     Example: shiplog convert tables/*.parquet --profile esso-osaka --out logs
     """

@@ -21,6 +21,7 @@ from shiplog.logs.read import Contents, Reading, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
     clocks,
+    empty_course,
     fault_detection,
     required_topics,
     resampling,
@@ -123,6 +124,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     required_topics.require(reading, profile)
     timed = time_line.one(reading, profile)
     reading, moved = timed.reading, list(timed.findings)
+    moved += empty_course.findings_of(reading, profile, _raw)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -226,6 +228,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
     elif kind in ("sog_cog", "from_bow"):
+        value = empty_course.known(value) if kind == "sog_cog" else value
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
         value = value[:, ::-1]

@@ -283,8 +283,9 @@ def nmea_topics(tmp_path, lines):
 def test_starboard_stays_starboard_where_port_alone_is_not_valid(tmp_path):
     two = ["$AGRSA,5.0,A,3.0,A", "$AGRSA,6.0,A,3.0,V", "$AGRSA,7.0,V,4.0,A"]
     topics = nmea_topics(tmp_path, [*BURST[:2], *two])
-    assert topics["/rudder/starboard"].columns["angle_deg"].tolist() == [5.0, 6.0]
-    assert topics["/rudder/port"].columns["angle_deg"].tolist() == [3.0, 4.0]
+    starboard, port = (topics[f"/rudder/{s}"].columns["angle_deg"] for s in ("starboard", "port"))
+    np.testing.assert_equal(starboard, [5.0, 6.0, np.nan])  # not valid: blank
+    np.testing.assert_equal(port, [3.0, np.nan, 4.0])
     one = nmea_topics(tmp_path, [*BURST[:2], "$AGRSA,5.0,A,0.0,V", "$AGRSA,6.0,A,,"])
     assert one["/rudder/main"].columns["angle_deg"].tolist() == [5.0, 6.0]
     assert not [topic for topic in one if topic.startswith("/rudder/") and topic != "/rudder/main"]

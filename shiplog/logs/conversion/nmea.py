@@ -1,67 +1,69 @@
-"""NMEA 0183 text to topics of the contract, with the clock that its lines leave open.
+"""NMEA 0183 text to topics of the contract, with findings of what its sentences say of themselves.
 
-A sentence has its own time only where it carries UTC (RMC, GGA, GLL). The others take the receive
-stamp of their line, or without one a place between the UTC times before and after them.
+Lines become sentences (`nmea_lines`), sentences facts (`nmea_sentences`); what a talker, its
+receivers and clocks are shows only in the whole file (`nmea_receivers`, `nmea_utc`, `nmea_clock`).
 """
 
 from __future__ import annotations
 
+import heapq
 import logging
-import re
+from array import array
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import UTC, date, datetime
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 
 import numpy as np
-import pynmea2
 
 from shiplog.exceptions import ChannelMissing, listed
-from shiplog.logs.conversion.clock import DAY_NS
-from shiplog.logs.conversion.nmea_sentences import (
-    INSTEAD,
-    SENTENCE_TOPICS,
-    SENTENCES,
-    NotValid,
-    facts,
-    family,
+from shiplog.logs.conversion import nmea_report as report
+from shiplog.logs.conversion import nmea_status
+from shiplog.logs.conversion.nmea_ais import vdo
+from shiplog.logs.conversion.nmea_clock import clock_of
+from shiplog.logs.conversion.nmea_lines import (
+    EPOCH,
+    LAST_YEAR,
+    SENTENCE,
+    Checksums,
+    Lines,
+    Sentence,
 )
-from shiplog.logs.conversion.receive_clock import against_utc
-from shiplog.logs.faults import as_metadata
+from shiplog.logs.conversion.nmea_sentences import SENTENCES, TIME_AT
+from shiplog.logs.conversion.nmea_topics import Gathered, Rows, Spoken, topics_of
+from shiplog.logs.conversion.nmea_utc import Resolved, Times, kept, resolve
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series
-from shiplog.units import SECOND_NS, UNIX_NS, unix_unit
+from shiplog.units import SECOND_NS
 
 log = logging.getLogger(__name__)
 
-SUFFIXES = (".nmea", ".txt", ".log", ".nma", ".gps", ".csv", ".dat", ".raw")
-SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z]{3},[^$!\r\n*]*(?:\*[0-9A-Fa-f]{2})?")
-ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
-PROPRIETARY = re.compile(r"\$(P[A-Z0-9]{3,}),")  # a maker's own, after his three letters
-NUMBER = re.compile(r"(?<!\d)(\d{10,19})(?:\.(\d+))?(?!\d)")
-OF_DAY = re.compile(r"(?<![\d:])(\d\d):(\d\d):(\d\d)(?:[.,](\d+))?")
 SENTENCE_SHARE = 0.5  # share of the first lines with a sentence that make a text an NMEA log
-EPOCH = date(1970, 1, 1)
-LAST_YEAR = 2261  # whose nanoseconds since 1970 still have 64 bits
+LOOKED_AT_BYTES, LOOKED_AT_LINES = 65_536, 200
+FIRST_YEARS = 80  # two digits of a year from there on are of the last century
+USED = frozenset({*SENTENCES, "ZDA"})
+READ = {**SENTENCES, "VDO": vdo}
 
 
-@dataclass(slots=True)
-class Rows:
-    """The sentences of one topic and talker; times in ns, -1 where there is none."""
+@dataclass(frozen=True, slots=True)
+class NmeaLog:
+    """What a text of NMEA came to."""
 
-    kind: str  # of nmea_sentences.SENTENCE_TOPICS
-    own: list[int] = field(default_factory=list)  # UTC in the sentence
-    received: list[int] = field(default_factory=list)
-    place: list[int] = field(default_factory=list)  # which sentence of the file it was
-    values: list[tuple[float, ...]] = field(default_factory=list)
+    series: list[Series]
+    damaged: int  # sentences
+    findings: list[Finding] = field(default_factory=list)
 
 
 def is_nmea(path: Path) -> bool:
-    """Whether the text holds NMEA sentences, whatever it is called."""
-    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
+    """Whether a text holds NMEA sentences, whatever it is called."""
+    if not path.is_file():
         return False
     with path.open("rb") as stream:
-        lines = stream.read(16_384).decode("latin-1").splitlines()[:100]
+        start = stream.read(LOOKED_AT_BYTES)
+    if b"\0" in start[:1024]:
+        return False
+    lines = start.decode("latin-1").splitlines()[:LOOKED_AT_LINES]
     filled = [line for line in lines if line.strip()]
     sentences = sum(bool(SENTENCE.search(line)) for line in filled)
     return bool(filled) and sentences >= SENTENCE_SHARE * len(filled)
@@ -72,243 +74,215 @@ def read_nmea(path: Path) -> tuple[list[Series], int]:
 
     Raises ChannelMissing where no sentence says anything of a ship, or none has a time.
     """
+    found = read_nmea_log([path], path.name)
+    return found.series, found.damaged
+
+
+def read_nmea_log(paths: Sequence[Path], name: str) -> NmeaLog:
+    """One log of a text, or of several that one recorder wrote, an instrument each.
+
+    Raises ChannelMissing as `read_nmea` does."""
+    if len(paths) == 1:
+        return read_sentences(_text(paths[0]), name)
     reader = _Reader()
-    with path.open("r", encoding="latin-1") as stream:
-        for line in stream:
-            reader.take(line)
-    return reader.finish(path.name), reader.damaged
+    files = [(Lines(path.stem), path) for path in paths]
+    merged = heapq.merge(*(_stamped(*one) for one in files), key=lambda item: item[0])
+    for _, sentence in merged:
+        reader.take(sentence)
+    return reader.finish(name, [lines for lines, _ in files])
 
 
 def lines_to_series(lines: Iterable[str], name: str, received: Sequence[int]) -> list[Series]:
     """Sentences with the recorder's time [ns] of each, as topics. Raises ChannelMissing."""
-    reader = _Reader()
+    reader, read = _Reader(), Lines()
     for line, stamp in zip(lines, received, strict=True):
-        reader.take(line, stamp)
-    return reader.finish(name)
+        for sentence in read.of(line, stamp):
+            reader.take(sentence)
+    return reader.finish(name, [read]).series
+
+
+def read_sentences(lines: Iterable[str], name: str) -> NmeaLog:
+    """The same of lines. Raises ChannelMissing."""
+    reader, read = _Reader(), Lines()
+    for line in lines:
+        for sentence in read.of(line):
+            reader.take(sentence)
+    return reader.finish(name, [read])
+
+
+def _text(path: Path) -> Iterator[str]:
+    with path.open("r", encoding="latin-1") as stream:
+        yield from stream
+
+
+def _stamped(lines: Lines, path: Path) -> Iterator[tuple[int, Sentence]]:
+    """The sentences of a file, each with the last receive stamp before it [ns]."""
+    last = -1
+    for line in _text(path):
+        for sentence in lines.of(line):
+            last = max(last, sentence.received)
+            yield last, sentence
 
 
 class _Reader:
-    """Sentences one after the other, with the date and the UTC that hold so far."""
+    """Sentences one after the other, as the facts that they are."""
 
     def __init__(self) -> None:
-        self.rows: dict[tuple[str, str], Rows] = {}  # by topic and talker
-        self.utc: list[tuple[int, int]] = []  # (place, ns) of each new UTC
-        self.last: int | None = None  # ns, the UTC before
-        self.dated: tuple[int, int] | None = None  # place of the first date, and what it adds
-        self.of_day: int | None = None  # ns, the last receive stamp that had no date
-        self.damaged = self.invalid = self.place = 0
+        self.gathered = Gathered()
+        self.times, self.checksums = Times(), Checksums()
+        self.received, self.length = array("q"), array("i")  # of each sentence, by its place
+        self.senders: dict[tuple[str, str], int] = {}  # talker and source, in order of appearance
+        self.damaged = 0
         self.unused: Counter[str] = Counter()
 
-    def take(self, line: str, received: int | None = None) -> None:
-        """One line: its receive stamp, and the sentences in it."""
-        found = list(SENTENCE.finditer(line))
-        if not found:
-            own = PROPRIETARY.search(line)
-            self.unused.update([own[1]] if own else [])
-            self.damaged += "$" in line and own is None
-            return
-        if received is None:
-            received = self._stamp(line[: found[0].start()] + " " + line[found[-1].end() :])
-        for match in found:
-            self.place += 1
-            self._sentence(match.group().strip(), -1 if received is None else received)
-
-    def _sentence(self, text: str, received: int) -> None:
-        kind = text[3:6]
-        if text[0] == "!" or kind not in (*SENTENCES, "ZDA"):
+    def take(self, sentence: Sentence) -> None:
+        kind = sentence.kind
+        if kind not in USED and not (kind == "VDO" and sentence.own_ship):
             self.unused[kind] += 1
+            self.damaged += sentence.wrong != 0
             return
+        place = len(self.received)
+        form = len(sentence.fields)
         try:
-            message = pynmea2.parse(text, check="*" in text)
-            decoded = facts(message)  # first: a sentence that is not valid moves no clock
-            own = self._own(message)
-        except NotValid:
-            self.invalid += 1
+            facts = [] if kind == "ZDA" else list(READ[kind](sentence.fields, sentence.vouched))
+            of_day = self._of_day(sentence)
+            day = _day(sentence)
+        except (ValueError, IndexError):
+            self.damaged += 1  # a field that is no number, or is not there
             return
-        except (pynmea2.ParseError, ValueError, TypeError, AttributeError, ArithmeticError):
-            self.damaged += 1  # a field that is no number raises whatever its converter raises
-            return
-        for topic, values in decoded or ():
-            rows = self.rows.setdefault((topic, message.talker), Rows(topic))
-            rows.own.append(own)
-            rows.received.append(received)
-            rows.place.append(self.place)
+        sender = self.senders.setdefault((sentence.talker, sentence.source), len(self.senders))
+        self.checksums.note(sentence, place)
+        self.received.append(sentence.received)
+        self.length.append(sentence.length)
+        for topic, values, why_not in facts:
+            rows = self.gathered.rows.get((topic, sender))
+            if rows is None:
+                rows = self.gathered.rows[topic, sender] = Rows(topic)
+            if why_not:
+                rows.why_not[len(rows.place)] = why_not
+            rows.place.append(place)
             rows.values.append(values)
+        if of_day >= 0:
+            self.times.place.append(place)
+            self.times.of_day.append(of_day)
+            self.times.day.append(day)
+            self.times.trusted.append(not (facts and facts[0].why_not))
+            self.times.sender.append(sender)
+            self.gathered.form.append(form * 1000 + len(sentence.fields[TIME_AT[kind]]) * 50
+                                      + len(sentence.fields[2]))  # fmt: skip
 
-    def _own(self, message) -> int:
-        """The UTC in a sentence [ns], -1 in one without. Raises ValueError for a date of no log."""
-        time = getattr(message, "timestamp", None)
-        if not time or isinstance(time, str):
+    def _of_day(self, sentence: Sentence) -> int:
+        """The UTC in a sentence [ns of its day], -1 without. Raises ValueError."""
+        at = TIME_AT.get(sentence.kind, -1)
+        text = sentence.fields[at] if 0 <= at < len(sentence.fields) else ""
+        if not text:
             return -1
-        of_day = ((time.hour * 60 + time.minute) * 60 + time.second) * SECOND_NS
-        of_day += time.microsecond * 1000
-        utc = of_day + (self._day_before(of_day) * DAY_NS)
-        day = None
-        if message.sentence_type == "RMC":
-            day = message.datestamp
-        elif message.sentence_type == "ZDA":
-            day = date(message.year, message.month, message.day)
-        if isinstance(day, date):
-            if not EPOCH.year <= day.year <= LAST_YEAR:
-                raise ValueError(f"the year {day.year}")
-            true = (day - EPOCH).days * DAY_NS + of_day
-            if self.dated is None:
-                self.dated = self.place, true - utc
-            utc = true
-        self.last = utc
-        if not self.utc or self.utc[-1][1] != utc:
-            self.utc.append((self.place, utc))
-        return utc
+        if len(text) < 6 or not (text[:6].isdecimal() and text[6:7] in ("", ".")):
+            raise ValueError(text)
+        hours, minutes, seconds = int(text[:2]), int(text[2:4]), int(text[4:6])
+        if hours > 23 or minutes > 59 or seconds > 60 or not (text[7:] or "0").isdecimal():
+            raise ValueError(text)
+        whole = ((hours * 60 + minutes) * 60 + seconds) * SECOND_NS
+        return whole + int(text[7:16].ljust(9, "0"))
 
-    def _day_before(self, of_day: int) -> int:
-        """The day that a time without a date belongs to: the nearest to the last one."""
-        if self.last is None:
-            return 0
-        day, before = divmod(self.last, DAY_NS)
-        return day + (of_day < before - DAY_NS // 2) - (of_day > before + DAY_NS // 2)
-
-    def _stamp(self, around: str) -> int | None:
-        """The receive stamp [ns] in the text around the sentence; None without one, or where it is
-        no time: a leap second, or a damaged digit."""
-        if iso := ISO.search(around):
-            zone = (iso[4] or "Z").replace("Z", "+00:00")
-            try:
-                whole = datetime.fromisoformat(f"{iso[1]}T{iso[2]}{zone}").astimezone(UTC)
-            except (ValueError, OverflowError):
-                return None
-            if not EPOCH.year <= whole.year <= LAST_YEAR:
-                return None
-            return int(whole.timestamp()) * SECOND_NS + _fraction(iso[3])
-        if (number := NUMBER.search(around)) and (unit := unix_unit(int(number[1]))):
-            scale = UNIX_NS[unit]
-            return int(number[1]) * scale + _fraction(number[2]) * scale // SECOND_NS
-        if clock := OF_DAY.search(around):
-            seconds = (int(clock[1]) * 60 + int(clock[2])) * 60 + int(clock[3])
-            of_day = seconds * SECOND_NS + _fraction(clock[4])
-            day = 0
-            if self.of_day is not None:  # counts on by itself: the GNSS date is added at the end
-                day, before = divmod(self.of_day, DAY_NS)
-                day += of_day < before - DAY_NS // 2
-            self.of_day = day * DAY_NS + of_day
-            return self.of_day
-        return None
-
-    def finish(self, name: str) -> list[Series]:
+    def finish(self, name: str, lines: Sequence[Lines]) -> NmeaLog:
         """The topics. Raises ChannelMissing where there is none, or no time at all."""
-        topics = self._chosen(name)
-        if not topics:
+        cut = self.checksums.cut()
+        for read in lines:
+            self.damaged += read.damaged
+            self.unused += read.unused
+        self.damaged += len(cut)
+        received = np.array(self.received, np.int64)
+        if cut:
+            self._drop(np.array(cut), len(received))
+        resolved = resolve(self.times, received)
+        self._not_valid_where_still(resolved)
+        if not self.gathered.valid():
             raise ChannelMissing(
                 f"{name} holds no valid sentence of position, heading, wind or actuators. "
-                f"Sentences found: {listed(self.unused)}.",
-                hint="record RMC, GGA, HDT, ROT, MWV, RSA or RPM.",
+                f"Sentences found: {listed(self.unused)}.{self._why_none()}",
+                hint="record RMC, GGA, HDT, HDG, ROT, MWV, RSA or RPM.",
             )
-        for count, what in (
-            (self.damaged, "damaged sentences (checksum or fields) left out"),
-            (self.invalid, "sentences left out whose own status says that they are not valid"),
-        ):
-            if count:
-                log.warning("%s: %d %s", name, count, what)
+        dateless = any(read.stamps.of_day is not None for read in lines)
+        instruments = [np.array(rows.place, np.int64) for rows in self.gathered.rows.values()]
+        clock = clock_of(resolved, received, np.array(self.length, np.int64), instruments, dateless)
+        if not len(clock.known) and not (received >= 0).any():
+            raise ChannelMissing(
+                f"{name} has no time: neither RMC, GGA or ZDA nor a stamp before each line."
+                + (f" {self.damaged} sentences are damaged." if self.damaged else ""),
+                hint="record RMC with the other sentences, or have the logger stamp each line.",
+            )
+        spoken = topics_of(self.gathered, resolved, clock, [*self.senders])
+        if not spoken.series:
+            raise ChannelMissing(
+                f"{name} has no valid sentence with a time.",
+                hint="record RMC with the other sentences, or have the logger stamp each line.",
+            )
+        self._say(name, spoken, len(resolved.place) > 0 and not resolved.dated)
+        findings = report.findings(spoken, resolved, clock, [talker for talker, _ in self.senders])
+        findings += [report.renamed(*one) for one in self.checksums.renamed.items()]
+        if self.damaged:
+            findings.insert(0, report.damaged(self.damaged, len(self.received)))
+        for finding in findings:
+            log.warning("%s: %s", name, finding.sentence)
+        return NmeaLog(spoken.series, self.damaged, findings)
+
+    def _drop(self, cut: np.ndarray, count: int) -> None:
+        """Leave out the sentences at the places `cut`."""
+        gone = np.zeros(count, bool)
+        gone[cut] = True
+        self.gathered.drop(gone)
+        keep = ~gone[np.array(self.times.place, np.int64)]
+        self.times = kept(self.times, keep)
+        self.gathered.form = array("q", np.array(self.gathered.form)[keep].tolist())
+
+    def _not_valid_where_still(self, resolved: Resolved) -> None:
+        """Sentences by a clock that stands still are placeholders, whatever else they say."""
+        still = set(resolved.place[resolved.still].tolist())
+        for rows in self.gathered.rows.values() if still else ():
+            for i, place in enumerate(rows.place):
+                if place in still:
+                    rows.why_not.setdefault(i, nmea_status.PLACEHOLDER)
+
+    def _why_none(self) -> str:
+        words = Counter(w for rows in self.gathered.rows.values() for w in rows.why_not.values())
+        said = f" Not valid by their own word: {listed(words)}." if words else ""
+        return said + (f" {self.damaged} sentences are damaged." if self.damaged else "")
+
+    def _say(self, name: str, spoken: Spoken, dateless: bool) -> None:
+        if dateless:
+            log.warning("%s: no RMC or ZDA says the date; times count from 1970-01-01", name)
+        if spoken.invalid:
+            log.warning(
+                "%s: %d sentences whose own status says that they are not valid",
+                name, spoken.invalid,
+            )  # fmt: skip
         if self.unused:
             most = ", ".join(f"{kind} ({n})" for kind, n in self.unused.most_common(8))
             log.info("%s: sentences not used: %s", name, most)
-        clock = _Clock(self, topics, name)
-        made = [clock.series(topic, rows) for topic, rows in sorted(topics.items())]
-        noted = as_metadata(clock.clock.findings)
-        return [replace(made[0], metadata={**made[0].metadata, **noted}), *made[1:]]
-
-    def _chosen(self, name: str) -> dict[str, Rows]:
-        """By topic: the best sentence for position and velocity; two talkers are two topics."""
-        there = {kind for kind, _ in self.rows}
-        wanted = {kind: kind for kind in there if kind.startswith("/")}
-        if "/rudder/port" not in there:  # RSA calls the only rudder the starboard one
-            wanted |= dict.fromkeys(there & {"/rudder/starboard"}, "/rudder/main")
-        for topic, kinds in INSTEAD.items():
-            best = [kind for kind in kinds if kind in there][:1]
-            wanted |= dict.fromkeys(best, topic)
-        topics: dict[str, Rows] = {}
-        for (kind, talker), rows in self.rows.items():
-            if kind not in wanted:
-                continue
-            topic = wanted[kind]
-            if sum(other == kind for other, _ in self.rows) > 1:
-                topic = f"{topic}/{talker.lower()}"
-                log.info("%s: several talkers send one sentence; %s is of %s", name, topic, talker)
-            topics[topic] = rows
-        return topics
+        for what in spoken.notes:
+            log.info("%s: %s", name, what)
 
 
-class _Clock:
-    """The times of a file's sentences, once all of it is read."""
-
-    def __init__(self, reader: _Reader, topics: dict[str, Rows], name: str) -> None:
-        until, added = reader.dated or (0, 0)
-        self.until, self.added = until, added
-        self.places = np.array([place for place, _ in reader.utc], np.int64)
-        self.utc = np.array([utc for _, utc in reader.utc], np.int64)
-        self.utc[self.places < until] += added
-        self.name = name
-        if reader.utc and reader.dated is None:
-            log.warning("%s: no RMC or ZDA says the date; times count from 1970-01-01", name)
-        self.days = 0
-        place, own, received, kind = self._lines(list(topics.values()))
-        both = (own >= 0) & (received >= 0)
-        if reader.of_day is not None and both.any():  # stamps without a date: the day is made good
-            days = np.median((received - own)[both]) / DAY_NS
-            self.days = round(days) * DAY_NS
-            received = np.where(received >= 0, received - self.days, -1)
-        self.clock = against_utc(received, own, kind)
-        self.wrong = dict(zip(place.tolist(), self.clock.wrong.tolist(), strict=True))
-        for finding in self.clock.findings:
-            log.warning("%s: %s", name, finding.sentence)
-
-    def _lines(self, rows: list[Rows]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Place, UTC, receive stamp and topic [n] of the sentences, in the order of the file."""
-        place = np.concatenate([np.array(one.place, np.int64) for one in rows])
-        own = np.concatenate([self.own(one) for one in rows])
-        received = np.concatenate([np.array(one.received, np.int64) for one in rows])
-        kind = np.repeat(np.arange(len(rows)), [len(one.place) for one in rows])
-        _, first = np.unique(place, return_index=True)
-        return place[first], own[first], received[first], kind[first]
-
-    def own(self, rows: Rows) -> np.ndarray:
-        """UTC [n] ns of sentences, those before the first date put onto its day; -1 is none."""
-        own = np.array(rows.own, np.int64)
-        return own + self.added * ((np.array(rows.place) < self.until) & (own >= 0))
-
-    def series(self, topic: str, rows: Rows) -> Series:
-        """One topic with its times. Raises ChannelMissing where nothing says any."""
-        place, own = np.array(rows.place, np.int64), self.own(rows)
-        received = np.array(rows.received, np.int64)
-        stamped = received >= 0
-        received = received - self.days * stamped
-        if not len(self.utc) and not stamped.any():
-            raise ChannelMissing(
-                f"{self.name} has no time: neither RMC, GGA or ZDA nor a stamp before each line.",
-                hint="record RMC with the other sentences, or have the logger stamp each line.",
-            )
-        wrong = np.array([self.wrong[one] for one in rows.place], np.int64)
-        time = np.where(own >= 0, own, np.where(stamped, received - wrong, self._between(place)))
-        known = time >= 0
-        schema, names = SENTENCE_TOPICS[family(rows.kind)]
-        values = np.array(rows.values, float).reshape(len(place), -1)[known]
-        columns = dict(zip(names, values.T, strict=False))
-        logged = np.where(stamped, received - wrong, time)[known]
-        return Series(topic, schema, time[known], columns, log_time=logged, frame_id="nmea")
-
-    def _between(self, place: np.ndarray) -> np.ndarray:
-        """Times [n] ns of the sentences at `place` [n]: spread evenly over the time from the UTC
-        before them to the next. -1 before the first UTC."""
-        if not len(self.utc):
-            return np.full(len(place), -1, np.int64)
-        before = np.searchsorted(self.places, place, side="right") - 1
-        period = int(np.median(np.diff(self.utc))) if len(self.utc) > 1 else 0
-        step = np.diff(self.utc, append=self.utc[-1] + period)
-        first = np.searchsorted(before, before, side="left")  # `before` only grows
-        many = np.searchsorted(before, before, side="right") - first
-        spread = self.utc[before] + step[before] * (np.arange(len(place)) - first) // many
-        return np.where(before >= 0, spread, -1)
+def _day(sentence: Sentence) -> int:
+    """Days since 1970 of the date in RMC and ZDA, -1 without one. Raises ValueError."""
+    fields = sentence.fields
+    if sentence.kind == "RMC":
+        text = fields[8]
+        if not text:
+            return -1
+        if len(text) != 6 or not text.isdecimal():
+            raise ValueError(text)
+        return (date(_year(text[4:]), int(text[2:4]), int(text[:2])) - EPOCH).days
+    if sentence.kind == "ZDA" and len(fields) > 3 and all(fields[1:4]):
+        year = _year(fields[3])
+        if not EPOCH.year <= year <= LAST_YEAR:
+            raise ValueError(f"the year {year}")
+        return (date(year, int(fields[2]), int(fields[1])) - EPOCH).days
+    return -1
 
 
-def _fraction(digits: str | None) -> int:
-    """ns of the digits behind a decimal point."""
-    return int((digits or "")[:9].ljust(9, "0"))
+def _year(text: str) -> int:
+    """Two digits are of this century, or of the last decades before it."""
+    year = int(text)
+    return year if year > 99 else year + (1900 if year >= FIRST_YEARS else 2000)

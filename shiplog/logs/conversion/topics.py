@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,9 @@ LOGGED = (
 UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", "msec": "ms"}
 
 
-def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
+def folder_to_series(
+    folder: Path, profile: Profile | None, without: Collection[Path] = ()
+) -> tuple[list[Series], list[str]]:
     """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
     the reasons of the tables that had to be left out. Hidden files are none.
 
@@ -47,7 +50,7 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
     """
     parts: list[Series] = []
     reasons: list[str] = []
-    for path in sorted(p for p in folder.glob("[!.]*") if is_table(p)):
+    for path in sorted(p for p in folder.glob("[!.]*") if is_table(p) and p not in without):
         try:
             parts += _one(path, profile)
         except ShiplogError as error:
