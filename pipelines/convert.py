@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -91,7 +91,7 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         parts, left_out = folder_to_series(path, profile)
         if left_out:
             done.lost[str(path)] = " ".join(left_out)
-        yield _written(target, parts, profile, ship, path)
+        yield _written(target, parts, profile, ship, path, left_out)
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
@@ -107,7 +107,7 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             try:  # one bad voyage never ends the others
                 refuse_namesake(name, begun, path)
                 series = columns.series(part, profile)
-                target = _written(out / f"{name}.mcap", series, profile, ship, path)
+                target = _written(out / f"{name}.mcap", series, profile, ship, path, lost)
             except BaseException as error:
                 where = str(path) if name == path.stem else f"{path}: {name}"
                 done.refused[where] = _why(error, f"{path.name}: {name}")
@@ -120,12 +120,18 @@ def _why(error: BaseException, doing: str) -> str:
 
 
 def _written(
-    target: Path, parts: list[Series], profile: Profile | None, ship: str, source: Path
+    target: Path,
+    parts: list[Series],
+    profile: Profile | None,
+    ship: str,
+    source: Path,
+    lost: Sequence[str] = (),
 ) -> Path:
     refuse_existing(target)
     datum = profile.site.datum if profile else None
     target.parent.mkdir(parents=True, exist_ok=True)
-    write_log(target, parts, ship=ship, datum=datum, notes={"table": source.name})
+    notes = {"table": source.name} | ({"dropped": "; ".join(lost)} if lost else {})
+    write_log(target, parts, ship=ship, datum=datum, notes=notes)
     log.info(
         "%s: %d topics, %d rows",
         target.name,

@@ -20,7 +20,13 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import (
+    clocks,
+    fault_detection,
+    plausible_values,
+    resampling,
+    sensor_consistency,
+)
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -74,7 +80,13 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
+        findings=(
+            *plausible_values.noted(reading.contents.metadata),
+            *reading.health.findings,
+            *aligned.left_out,
+            *grid.findings,
+            *consistency,
+        ),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
@@ -111,7 +123,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
-    sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
+    screen = plausible_values.Screen(profile)
+    sampled = {name: _samples(reading, screen, name) for name, _ in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
@@ -120,7 +133,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="check topic, field and `clock` of the heading in the profile; `shiplog profile "
             "LOG` drafts one from the topics of the log.",
         )
-    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
+    driven = {a.name: _actuator_samples(reading, screen, a) for a in profile.actuators}
     every = {**sampled, **driven}
     start, end = _span(base, list(every.values()))
     moved += clocks.no_common_time(every, start, end)
@@ -131,7 +144,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="set another `clock` for the heading in the profile, or record the log again "
             "with a clock that runs.",
         )
-    grid = VoyageGrid(resampling.grid(start, end))
+    grid = VoyageGrid(resampling.grid(start, end), explained=screen.explained)
+    grid.findings += screen.findings(start)
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
@@ -226,14 +240,16 @@ def _numbers(column: pl.Series) -> np.ndarray:
     return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
-def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
+def _samples(reading: Reading, screen: plausible_values.Screen, name: str) -> resampling.Samples:
     """A sensor's samples in a form that can be interpolated, spikes marked.
 
     Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
     components, since halfway between 359° and 1° is 0°.
     """
+    profile = screen.profile
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
     times, value = _raw(reading, sensor)
+    value = screen.clear(name, sensor, times, value)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
@@ -358,9 +374,12 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Samples:
+def _actuator_samples(
+    reading: Reading, screen: plausible_values.Screen, actuator: Actuator
+) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
+    value = screen.clear(actuator.name, actuator, times, value)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
     return resampling.ordered(times, value, actuator.tolerance_s)

@@ -133,6 +133,8 @@ def measured(
     if not fits and not (coordinate and words.unit_of(name) is None):
         return None
     doubts = ("a set-point, not a measurement",) if words.is_set_point(name) else ()
+    if example := table.undecided.get(name):
+        doubts = (*doubts, f'{example!r}: decimals, or thousands? Say decimal = "," or "."')
     if blank := facts.unavailable(channel, values):
         doubts = (*doubts, blank)
     if stated:
