@@ -19,6 +19,7 @@ from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
 from shiplog.logs.conversion.topics import folder_to_series
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
@@ -91,7 +92,7 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         parts, left_out = folder_to_series(path, profile)
         if left_out:
             done.lost[str(path)] = " ".join(left_out)
-        yield _written(target, parts, profile, ship, path, left_out)
+        yield _written(target, parts, profile, ship, path, columns.dropped(left_out))
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
@@ -107,7 +108,9 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             try:  # one bad voyage never ends the others
                 refuse_namesake(name, begun, path)
                 series = columns.series(part, profile)
-                target = _written(out / f"{name}.mcap", series, profile, ship, path, lost)
+                target = _written(
+                    out / f"{name}.mcap", series, profile, ship, path, columns.dropped(lost)
+                )
             except BaseException as error:
                 where = str(path) if name == path.stem else f"{path}: {name}"
                 done.refused[where] = _why(error, f"{path.name}: {name}")
@@ -125,13 +128,13 @@ def _written(
     profile: Profile | None,
     ship: str,
     source: Path,
-    lost: Sequence[str] = (),
+    findings: Sequence[Finding] = (),
 ) -> Path:
     refuse_existing(target)
     datum = profile.site.datum if profile else None
     target.parent.mkdir(parents=True, exist_ok=True)
-    notes = {"table": source.name} | ({"dropped": "; ".join(lost)} if lost else {})
-    write_log(target, parts, ship=ship, datum=datum, notes=notes)
+    notes = {"table": source.name}
+    write_log(target, parts, ship=ship, datum=datum, notes=notes, findings=findings)
     log.info(
         "%s: %d topics, %d rows",
         target.name,

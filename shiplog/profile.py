@@ -311,9 +311,10 @@ class Column(Section):
     channel: str = Field(description="what it holds; see the channels below")
     unit: str | None = Field(
         default=None, description='of numbers, such as "deg" or "kn"; SI where left out; a '
-        'latitude or longitude needs it. Of a time "s", "ms", "us" or "ns"; without one it is Unix '
-        "time by its size, a time of day where it "
-        "counts as hhmmss, or else seconds from any start"
+        'latitude or longitude needs it. Of a time "s", "ms", "us", "ns", "min", "h" '
+        'or "d" (days, also those that a spreadsheet, MATLAB or astronomers count); without one it '
+        "is Unix time by its size, a time of day where it counts as hhmmss, or else seconds from "
+        "any start"
     )  # fmt: skip
     sign: float = Field(
         default=1.0, description="-1 turns the column round, and any other number is a factor on it"
@@ -323,7 +324,8 @@ class Column(Section):
     )
     format: str | None = Field(
         default=None, description="of a time or date that is no ISO text, in strptime's letters: "
-        '"%d.%m.%Y %H:%M:%S"; of a number, too: "%H%M%S"'
+        '"%d.%m.%Y %H:%M:%S.%f"; of a number, too: "%H%M%S". Read are %Y %y %m %d %j %b %B %a %A '
+        "%H %I %p %M %S %f (any number of digits) %z %Z (of UTC) %%"
     )  # fmt: skip
     decimal: Literal[",", "."] | None = Field(
         default=None, description='the sign before decimals, where the table does not show it: "," '

@@ -17,7 +17,7 @@ import polars as pl
 from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding
 
-from . import dates, faults, preflight, rerun_route, salvage, scan
+from . import dates, faults, preflight, rerun_route, salvage, scan, stored_findings
 from .container import Survey
 from .sample import sample
 from .tables import Tables, Tally
@@ -178,6 +178,7 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     findings += faults.clocks(frames)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
     findings += dates.impossible(frames, noted)
+    findings += stored_findings.of_record(found.metadata)
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,

@@ -27,6 +27,8 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from shiplog import files
 from shiplog.exceptions import ShiplogError, listed, nearest
+from shiplog.logs import stored_findings
+from shiplog.logs.health_report import Finding
 from shiplog.units import SECOND_NS
 
 LOG_CONTRACT = "1"
@@ -84,11 +86,13 @@ def write_log(
     ship: str,
     datum: tuple[float, float] | None = None,
     notes: Mapping[str, str] | None = None,
+    findings: Sequence[Finding] = (),
 ) -> None:
     """Write one voyage. `path` appears when the log is whole, and not at all if anything fails.
 
     datum   latitude and longitude [deg] of the local plane's origin
     notes   further entries of the metadata record `voyage`
+    findings  what was found on the way here, for whoever reads the log
     """
     path = Path(path)
     _refuse_twins(series)
@@ -101,7 +105,7 @@ def write_log(
         _write(Writer(
             stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD,
             index_types=IndexType.ALL, enable_crcs=True,
-        ), series, voyage)  # fmt: skip
+        ), series, voyage, findings)  # fmt: skip
         stream.flush()
         os.fsync(stream.fileno())
 
@@ -126,9 +130,16 @@ def _refuse_twins(series: Sequence[Series]) -> None:
         )
 
 
-def _write(writer: Writer, series: Sequence[Series], voyage: Mapping[str, str]) -> None:
+def _write(
+    writer: Writer,
+    series: Sequence[Series],
+    voyage: Mapping[str, str],
+    findings: Sequence[Finding],
+) -> None:
     writer.start(profile="")
     writer.add_metadata("voyage", dict(voyage))
+    if findings:
+        writer.add_metadata(stored_findings.RECORD, stored_findings.as_record(findings))
     schemas: dict[tuple, int] = {}
     channels: list[int] = []
     clocks: list[tuple[np.ndarray, np.ndarray]] = []

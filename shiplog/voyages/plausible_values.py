@@ -8,7 +8,7 @@ may be wrong. A profile's `limits` of a sensor stand in their place.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -137,7 +137,7 @@ class Screen:
             at = at & ~still
         if not at.any():
             return
-        si[at] = np.nan  # also what stands next to it: half a velocity is none
+        si[at, i if channel in ("sog", "cog") else slice(None)] = np.nan
         self.left_out.append(LeftOut(
             "not_available", name, times[at],
             f"{name}: {at.sum()} of {len(at)} values of its {what} are {shown}, the mark "
@@ -337,10 +337,3 @@ def rows_explained(times: np.ndarray, known: np.ndarray, left_out: np.ndarray) -
     begins = np.concatenate(([np.iinfo(np.int64).min], known))
     low = np.searchsorted(left_out, begins[after], side="right")
     return np.searchsorted(left_out, ends[after], side="left") > low
-
-
-def noted(metadata: Mapping[str, Mapping[str, str]]) -> Iterator[Finding]:
-    """What `convert` left out of the table that a log was made of."""
-    what = metadata.get("voyage", {}).get("dropped")
-    if what:
-        yield Finding("dropped", "log", f"Left out of the table that this log was made of: {what}.")

@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 LOST_SHARE = 0.5  # of a column's values: more that are no numbers are a loss, and exit code 3
 NO_VALUE = ("--", "---", "n/a", "na", "#n/a", "nan", "null", "none", "nil", "missing")  # any case
 HEMISPHERES = {"latitude": "NS", "longitude": "EW"}
-FAREST_DEG = {"latitude": 90.0, "longitude": 360.0}
+FARTHEST_DEG = {"latitude": 90.0, "longitude": 360.0}
 # 4530.2012N, N 45.50335: one number and its letter
 GLUED = r"^([NSEW])?\s*(\d+(?:\.\d*)?)\s*[°º]?\s*([NSEW])?$"
 # 45°30.201'N, 45 30 12.1 S, E 13-35.05
@@ -79,7 +79,9 @@ def _short(word: str) -> str:
 
 def without(values: pl.Series, missing: Sequence[float | str]) -> pl.Series:
     """A column without the values that stand for none."""
-    stands = pl.Series([False] * len(values))
+    stands = pl.Series([False]).new_from_index(0, len(values))
+    if values.dtype == pl.Boolean:
+        values = values.cast(pl.String)
     for mark in missing:
         if isinstance(mark, str):
             if values.dtype == pl.String:
@@ -103,7 +105,7 @@ def _numbers(texts: pl.Series, column: Column) -> pl.Series:
     number = clock.number_of(texts)
     letters = HEMISPHERES.get(column.channel)
     if letters and column.unit == "deg":
-        degrees = coordinates(texts, letters, FAREST_DEG[column.channel])
+        degrees = coordinates(texts, letters, FARTHEST_DEG[column.channel])
         return number.fill_null(degrees)
     return number
 

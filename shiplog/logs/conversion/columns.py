@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
 from shiplog.logs.conversion import cells, clock
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.dates import UNDATED
+from shiplog.logs.health_report import Finding
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.numbers import counted
 from shiplog.profile import Column, Profile, Source
@@ -122,6 +123,12 @@ def _in_order(
             log.warning("%s: %s goes back in time %d times; sorted", path.name, name, back)
         part = part.sort("time", maintain_order=True)
         yield re.sub(r'[\\/:*?"<>|]', "_", name), part.drop("voyage", strict=False)
+
+
+def dropped(lost: Sequence[str]) -> list[Finding]:
+    """What was left out of a table, for whoever reads the log that is made of it."""
+    said = "Left out of the table that this log was made of: {}."
+    return [Finding("dropped", "log", said.format(what.rstrip("."))) for what in lost]
 
 
 def series(table: pl.DataFrame, profile: Profile) -> list[Series]:

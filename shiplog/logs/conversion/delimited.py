@@ -45,6 +45,7 @@ class DelimitedTable:
     units: dict[str, str] = field(default_factory=dict)
     lost: tuple[str, ...] = ()
     undecided: dict[str, str] = field(default_factory=dict)
+    nameless: tuple[str, ...] = ()  # columns that no line of the file names
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,7 @@ class Form:
     names: list[str]
     units: list[str]
     first: int  # line of the first row
+    nameless: bool = False  # no line names the columns
 
 
 def is_table(path: Path) -> bool:
@@ -131,7 +133,8 @@ def _read_text(path: Path, known: Collection[str], stated: Mapping[str, str]) ->
         cut = {"\t": "tabs", " ": "spaces"}.get(form.separator, repr(form.separator))
         log.info("%s: separated by %s%s", path.name, cut, commas)
     units = {n: u for n, u in zip(form.names, form.units, strict=False) if u}
-    return DelimitedTable(read.frame, units, rows.lost, read.undecided)
+    nameless = tuple(form.names) if form.nameless else ()
+    return DelimitedTable(read.frame, units, rows.lost, read.undecided, nameless)
 
 
 def _unlike_header(path: Path, form: Form, body: bytes, separator: str) -> ChannelMissing:
@@ -220,7 +223,7 @@ def _headed(cut: list[list[str]], count: int, separator: str, known: Collection[
     if header is None:
         names = [f"column_{i + 1}" for i in range(count)]
         log.warning("no line names the columns: they are called column_1 to column_%d", count)
-        return Form(separator, whole[0] - 1, names, [], whole[0])
+        return Form(separator, whole[0] - 1, names, [], whole[0], nameless=True)
     names = [re.sub(r"^#\s*", "", name.strip()) for name in cut[header]]
     after = cut[header + 1] if header + 1 < len(cut) else []
     later = cut[header + 2] if header + 2 < len(cut) else []

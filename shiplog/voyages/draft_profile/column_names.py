@@ -64,6 +64,7 @@ class FoundColumn:
     sign: float = 1.0
     offset: float = 0.0
     only: str = ""  # the vessel whose rows are meant
+    missing: tuple[int | str, ...] = ()  # values that stand for none; of a status, for no fix
     rank: tuple[int, ...] = ()  # the least is the most trusted
 
     @property
