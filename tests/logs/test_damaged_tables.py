@@ -88,6 +88,8 @@ SOUND = {
     "a last line in words": [HEADER, *ROWS, "END OF RECORD"],
     "rows of blanks": [HEADER, *ROWS, ",,,,,", ",,,,,"],
     "an inch in a remark": [HEADER + ",remark", *(row + ',pipe 5" wide' for row in ROWS)],
+    "another separator in each remark": [
+        HEADER + ",remark", *(row + ",zig | zag" for row in ROWS)],
     "carriage returns": [HEADER + "\r", *(row + "\r" for row in ROWS)],
     "quoted throughout": [
         ",".join(f'"{f}"' for f in row.split(",")) for row in (HEADER, *ROWS)],

@@ -196,23 +196,48 @@ def _wide(raw: bytes) -> str | None:
     return None
 
 
+@dataclass(frozen=True, slots=True)
+class _Cut:
+    """Lines cut by one separator: how many fields most have, and the first line of these."""
+
+    separator: str
+    lines: list[list[str]]
+    count: int
+    start: int
+
+    @property
+    def throughout(self) -> bool:
+        """Whether all lines from the first have as many fields."""
+        return all(len(fields) == self.count for fields in self.lines[self.start :] if any(fields))
+
+
 def _form(lines: list[str], known: Collection[str]) -> Form | None:
     """The separator that cuts most lines into the same number of fields, and the header."""
-    for separator in SEPARATORS:
-        cut = [_cut(line, separator) for line in lines]
-        counts = Counter(len(fields) for fields in cut if any(fields))
-        counts.pop(1, None)
-        if not counts:
-            continue
-        (count, times), *others = counts.most_common(2)
-        # What stands before the header is cut otherwise, and does not count; rows may end early.
-        alike = {count, *(other for other, _ in others)}
-        start = next(i for i, fields in enumerate(cut) if len(fields) in alike)
-        times += sum(often for _, often in others)
-        if times < REGULAR * sum(any(fields) for fields in cut[start:]):
-            continue
-        return _headed(cut, count, separator, known)
-    return None
+    cuts = [cut for separator in SEPARATORS if (cut := _regular(lines, separator)) is not None]
+    if not cuts:
+        return None
+    first, *others = cuts
+    for other in others:  # a remark of every row may have the first one in it, and the header not
+        if other.start < first.start and other.count >= first.count and other.throughout:
+            first = other
+    return _headed(first.lines, first.count, first.separator, known)
+
+
+def _regular(lines: list[str], separator: str) -> _Cut | None:
+    """The lines cut by a separator, if it cuts most of them alike."""
+    cut = [_cut(line, separator) for line in lines]
+    counts = Counter(len(fields) for fields in cut if any(fields))
+    counts.pop(1, None)
+    if not counts:
+        return None
+    (count, times), *others = counts.most_common(2)
+    # What stands before the header is cut otherwise, and does not count; rows may end early.
+    alike = {count, *(other for other, _ in others)}
+    start = next(i for i, fields in enumerate(cut) if len(fields) in alike)
+    times += sum(often for _, often in others)
+    if times < REGULAR * sum(any(fields) for fields in cut[start:]):
+        return None
+    return _Cut(separator, cut, count, next(i for i, f in enumerate(cut) if len(f) == count))
 
 
 def _headed(cut: list[list[str]], count: int, separator: str, known: Collection[str]) -> Form:
