@@ -94,7 +94,8 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         lost = [counted(folder.damaged, "damaged sentence") + "."] if folder.damaged else []
         if lost := [*lost, *folder.left_out]:
             done.lost[str(path)] = " ".join(lost)
-        yield _written(target, folder.series, profile, ship, path, folder.findings)
+        found = [*folder.findings, *columns.dropped(folder.left_out)]
+        yield _written(target, folder.series, profile, ship, path, found)
     elif is_signalk(path) or is_nmea(path):
         found = read_signalk(path) if is_signalk(path) else read_nmea_log([path], path.name)
         if found.damaged:
@@ -109,8 +110,9 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         for name, part, found in voyages:
             try:  # one bad voyage never ends the others
                 refuse_namesake(name, begun, path)
-                series = columns.series(part, profile, found)
-                target = _written(out / f"{name}.mcap", series, profile, ship, path)
+                series = columns.series(part, profile)
+                found = [*found, *columns.dropped(lost)]
+                target = _written(out / f"{name}.mcap", series, profile, ship, path, found)
             except BaseException as error:
                 where = str(path) if name == path.stem else f"{path}: {name}"
                 done.refused[where] = _why(error, f"{path.name}: {name}")

@@ -44,6 +44,11 @@ def _require_factor(sign: float) -> None:
         )
 
 
+def _require_order(limits: tuple[float, float] | None) -> None:
+    if limits is not None and limits[0] >= limits[1]:
+        raise ValueError(f"limits are {list(limits)}; the lower one stands first")
+
+
 class Ship(Section):
     """Particulars. Missing values are estimated where they are needed, and reported."""
 
@@ -168,6 +173,7 @@ class Sensor(Source):
         for sigma in given:
             if 0.0 < sigma < FINEST:
                 raise ValueError(f"`sigma` is {sigma:g}; it is 0 or at least {FINEST:g}")
+        _require_order(self.limits)
         return self
 
 
@@ -192,6 +198,10 @@ class Sensors(Section):
                 raise ValueError(
                     f"sensors.{name} of kind {kind!r} needs {fields} field(s), "
                     f"not {len(sensor.paths)}"
+                )
+            if sensor.limits is not None and name in ("position", "heading"):
+                raise ValueError(
+                    f"sensors.{name} has `limits`; velocity, yaw_rate and wind have some"
                 )
             if kind == "geodetic" and not (sensor.unit or sensor.units):
                 raise ValueError(f"sensors.{name} of kind {kind!r} {NO_ANGLE}")
@@ -249,8 +259,7 @@ class Actuator(Source):
 
     @model_validator(mode="after")
     def _limited(self) -> Actuator:
-        if self.limits is not None and self.limits[0] >= self.limits[1]:
-            raise ValueError(f"limits are {list(self.limits)}; the lower one stands first")
+        _require_order(self.limits)
         return self
 
     @property
@@ -302,9 +311,10 @@ class Column(Section):
     channel: str = Field(description="what it holds; see the channels below")
     unit: str | None = Field(
         default=None, description='of numbers, such as "deg" or "kn"; SI where left out; a '
-        'latitude or longitude needs it. Of a time "s", "ms", "us" or "ns"; without one it is Unix '
-        "time by its size, a time of day where it "
-        "counts as hhmmss, or else seconds from any start"
+        'latitude or longitude needs it. Of a time "s", "ms", "us", "ns", "min", "h" '
+        'or "d" (days, also those that a spreadsheet, MATLAB or astronomers count); without one it '
+        "is Unix time by its size, a time of day where it counts as hhmmss, or else seconds from "
+        "any start"
     )  # fmt: skip
     sign: float = Field(
         default=1.0, description="-1 turns the column round, and any other number is a factor on it"
@@ -314,7 +324,15 @@ class Column(Section):
     )
     format: str | None = Field(
         default=None, description="of a time or date that is no ISO text, in strptime's letters: "
-        '"%d.%m.%Y %H:%M:%S"; of a number, too: "%H%M%S"'
+        '"%d.%m.%Y %H:%M:%S.%f"; of a number, too: "%H%M%S". Read are %Y %y %m %d %j %b %B %a %A '
+        "%H %I %p %M %S %f (any number of digits) %z %Z (of UTC) %%"
+    )  # fmt: skip
+    decimal: Literal[",", "."] | None = Field(
+        default=None, description='the sign before decimals, where the table does not show it: "," '
+        "or \".\"; the other one then groups digits"
+    )  # fmt: skip
+    missing: tuple[Number | str, ...] = Field(
+        default=(), description='values that stand for no value, such as -999 or "n/a"'
     )  # fmt: skip
     only: str | int | None = Field(
         default=None, description="of a `vessel` column: the one value whose rows are this ship's"

@@ -33,4 +33,6 @@ TABLE_LABELS = {  # columns of a table that say whose row it is, and when
     "date": "belongs to a `time` that is a time of day",
     "voyage": "cuts the table into one log per value",
     "vessel": "tells the ships of a table apart",
+    "status": "says which rows have a fix: position and velocity are blank where it holds one of "
+    "its `missing`",
 }

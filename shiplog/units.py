@@ -15,7 +15,7 @@ TO_SI = {
     "rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60,
     "rps": 1.0, "rev/s": 1.0, "rpm": 1 / 60,
     "pwm": 1 / 400,  # half a servo's travel, 400 µs, is full command
-    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
+    "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86_400.0,
 }  # fmt: skip
 
 MEASURES = {  # what each unit measures
@@ -26,7 +26,7 @@ MEASURES = {  # what each unit measures
     "rate of turn": ("rad/s", "deg/s", "deg/min"),
     "shaft speed": ("rps", "rev/s", "rpm"),
     "servo pulse": ("pwm",),
-    "time": ("s", "ms", "us", "ns", "min", "h"),
+    "time": ("s", "ms", "us", "ns", "min", "h", "d"),
 }
 
 

@@ -135,7 +135,9 @@ position = { topic = "/p", fields = ["a", "o"], unit = "deg", lever_arm_m = [1.0
 sigma = 0.1 }
 velocity = { topic = "/v", fields = ["s", "c"], sign = [1.0, -1.0], offset = [0.0, 1.0], \
 sigma = [0.1, 0.2] }
-heading = { topic = "/h", field = "h", sign = -1.0, offset = 3.0, tolerance_s = 0.5 }
+heading = { topic = "/h", field = "h", sign = -1.0, offset = 3.0, tolerance_s = 0.5, \
+missing = [511.0], resolution = 0.1 }
+yaw_rate = { topic = "/h", field = "r", limits = [-1.0, 1.0] }
 [[actuators]]
 name = "rudder"
 kind = "rudder"
@@ -148,7 +150,7 @@ diameter_m = 0.1
 area_m2 = 0.01
 span_m = 0.1
 [table]
-v = { channel = "sog", sign = 2.0, offset = 1.0 }
+v = { channel = "sog", sign = 2.0, offset = 1.0, missing = [102.3] }
 """
 )
 NUMBERS = numbers(EVERY_NUMBER)

@@ -21,7 +21,7 @@ DEFINED = {
     "rad": 1, "deg": TURN / 360, "rad/s": 1, "deg/s": TURN / 360, "deg/min": TURN / 360 / 60,
     "rps": 1, "rev/s": 1, "rpm": Fraction(1, 60), "pwm": Fraction(1, 400),
     "s": 1, "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "ns": Fraction(1, 10**9),
-    "min": 60, "h": 3600,
+    "min": 60, "h": 3600, "d": 86_400,
 }  # fmt: skip
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 
 import numpy as np
 import polars as pl
 
 from shiplog.exceptions import listed
-from shiplog.logs.health_report import FINDING_KINDS, Finding
+from shiplog.logs.health_report import Finding
 from shiplog.units import SECOND_NS
 
 from . import dates, leap_seconds
@@ -19,8 +17,6 @@ from .records import LARGEST_MESSAGE
 from .tables import MOST_STEPS, Order, Tables
 
 MOST_TOPICS = 5  # topics of a loss; of a large log it may be hundreds
-NOTED = "findings"  # metadata of a channel: what `convert` found and put right, as JSON
-MOST_NOTED = 100  # of one channel
 FEWEST, FEWEST_AGAIN = 20, 5  # messages of a topic, and of them in a stretch that is there twice
 TWICE = 1.6  # times the messages of other stretches; two recordings of one instrument have twice
 OFFSET = 0.05  # s: closer clocks than this are one clock
@@ -114,25 +110,6 @@ def disorder(
         f"by up to {largest:.3g} s; the messages were sorted."
     )
     return [Finding("out_of_order", "log", sentence, value=largest, unit="s")]
-
-
-def as_metadata(findings: Iterable[Finding]) -> dict[str, str]:
-    """What `convert` found, as metadata of a channel; `noted` reads it back."""
-    found = [asdict(finding) for finding in findings][:MOST_NOTED]
-    return {NOTED: json.dumps(found)} if found else {}
-
-
-def noted(channels: Mapping[str, Mapping[str, str]]) -> list[Finding]:
-    """What `convert` found when it made the log, of channels' metadata by topic. What others wrote
-    under the same name is none of it."""
-    findings: list[Finding] = []
-    for metadata in channels.values():
-        try:
-            made = [Finding(**one) for one in json.loads(metadata.get(NOTED, "[]"))[:MOST_NOTED]]
-            findings += [one for one in made if one.kind in FINDING_KINDS and one.sentence]
-        except (ValueError, TypeError, AttributeError):
-            continue
-    return findings
 
 
 def restarted(

@@ -180,7 +180,6 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
         findings += faults.repeats(topic, frame, tally.first or 0, twice.get(topic, []))
     findings += faults.clocks(frames)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
-    findings += faults.noted(noted)
     findings += dates.impossible(frames, noted)
     findings += stored_findings.of_record(found.metadata)
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched

@@ -23,6 +23,7 @@ from shiplog.voyages import (
     clocks,
     empty_course,
     fault_detection,
+    plausible_values,
     required_topics,
     resampling,
     sampling_findings,
@@ -125,7 +126,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     timed = time_line.one(reading, profile)
     reading, moved = timed.reading, list(timed.findings)
     moved += empty_course.findings_of(reading, profile, _raw)
-    sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
+    screen = plausible_values.Screen(profile)
+    sampled = {name: _samples(reading, screen, name) for name, _ in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
@@ -137,7 +139,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     longest = resampling.longest_s(profile.ship.length_m)
     driven = {
         actuator.name: sampling_findings.order_of(
-            _actuator_samples(reading, actuator, longest), actuator, base
+            _actuator_samples(reading, screen, actuator, longest), actuator, base
         )
         for actuator in profile.actuators
     }
@@ -153,7 +155,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="set another `clock` for the heading in the profile, or record the log again "
             "with a clock that runs.",
         )
-    grid = VoyageGrid(resampling.grid(start, end))
+    grid = VoyageGrid(resampling.grid(start, end), explained=screen.explained)
+    grid.findings += screen.findings(start)
     datum = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
@@ -216,14 +219,16 @@ def _numbers(column: pl.Series) -> np.ndarray:
     return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
-def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
+def _samples(reading: Reading, screen: plausible_values.Screen, name: str) -> resampling.Samples:
     """A sensor's samples in a form that can be interpolated, spikes marked.
 
     Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
     components, since halfway between 359° and 1° is 0°.
     """
+    profile = screen.profile
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
     times, value = _raw(reading, sensor)
+    value = screen.clear(name, sensor, times, value)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
@@ -352,9 +357,12 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(reading: Reading, actuator: Actuator, longest: float) -> resampling.Samples:
+def _actuator_samples(
+    reading: Reading, screen: plausible_values.Screen, actuator: Actuator, longest: float
+) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
+    value = screen.clear(actuator.name, actuator, times, value)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
     hold = actuator.between == "hold"

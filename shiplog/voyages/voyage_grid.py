@@ -6,6 +6,7 @@ Faults are marked row by row and reported with their times; the values stay as t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +15,7 @@ from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
-from shiplog.voyages import fault_detection, resampling
+from shiplog.voyages import fault_detection, plausible_values, resampling
 
 STEP_S = resampling.STEP_NS * 1e-9
 
@@ -27,9 +28,13 @@ JUMP_RAD = math.radians(30.0)
 
 @dataclass
 class VoyageGrid:
-    """Times [m] ns, columns [m] SI, marks [m] of channels.Quality, and what was found."""
+    """Times [m] ns, columns [m] SI, marks [m] of channels.Quality, and what was found.
+
+    explained  of a source: times [ns] of values that were left out, with a finding of their own
+    """
 
     times: np.ndarray
+    explained: Mapping[str, np.ndarray] = field(default_factory=dict)
     columns: dict[str, np.ndarray] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
     marks: np.ndarray = field(init=False)
@@ -46,12 +51,15 @@ class VoyageGrid:
         """A source's values on the grid [m, k]; its gaps, blanks and spikes noted. Of one that is
         too slow throughout, `sampling_findings` says so once."""
         placed = resampling.onto(self.times, samples)
-        self.note(placed.blank, Quality.BLANK, "blank", name, "is blank")
+        left_out = self.explained.get(name, self.times[:0])
+        said = plausible_values.rows_explained(self.times, samples.time, left_out)
+        self.marks[said & (placed.blank | placed.gap)] |= int(Quality.BLANK)
+        self.note(placed.blank & ~said, Quality.BLANK, "blank", name, "is blank")
         self.note(placed.spike, Quality.SPIKE, "spike", name, "spikes")
         if samples.sparse:
             self.marks[placed.gap] |= int(Quality.GAP)
         else:
-            self.note(placed.gap, Quality.GAP, "gap", name, "has no sample")
+            self.note(placed.gap & ~said, Quality.GAP, "gap", name, "has no sample")
         return placed.value
 
     def note(self, mask: np.ndarray, flag: Quality, kind: str, name: str, what: str) -> None:

@@ -203,9 +203,10 @@ def test_a_word_in_a_column_of_a_folder_is_a_blank(tmp_path, caplog):
     assert "'state' holds no numbers" in caplog.text and "state" not in table.columns
 
 
-def test_a_short_first_row_is_filled_with_blanks(tmp_path):
-    (tmp_path / "t.csv").write_text("time,a,b\n0,1\n" + "".join(f"{i},2,3\n" for i in range(1, 6)))
-    assert read_table(tmp_path / "t.csv").frame["b"].to_list() == [None, 3, 3, 3, 3, 3]
+def test_short_first_rows_are_filled_with_blanks_where_they_are_a_habit(tmp_path):
+    rows = "".join(f"{i},2,3\n" for i in range(2, 6))
+    (tmp_path / "t.csv").write_text("time,a,b\n0,1\n1,1\n" + rows)
+    assert read_table(tmp_path / "t.csv").frame["b"].to_list() == [None, None, 3, 3, 3, 3]
 
 
 def test_commas_that_group_thousands_are_no_decimal_commas(tmp_path):
@@ -216,7 +217,9 @@ def test_commas_that_group_thousands_are_no_decimal_commas(tmp_path):
     assert rpm('time,rpm\n0,998\n1,"1,002"\n2,"1,234,567"\n') == [998, 1002, 1234567]
     assert rpm('time,rpm\n0,998.5\n1,"1,002.25"\n') == [998.5, 1002.25]
     assert rpm('time,rpm\n0,"1,5"\n1,"1,002"\n') == [1.5, 1.002]  # one of them is no group
-    assert rpm("time;rpm\n0;998\n1;1,002\n") == [998, 1.002]
+    assert rpm("time;rpm\n0;998\n1;1,002\n2;0,998\n") == [998, 1.002, 0.998]
+    rpm("time;rpm\n0;998\n1;1,002\n")  # and of this nobody can say
+    assert read_table(tmp_path / "t.csv").undecided == {"rpm": "1,002"}
 
 
 def test_two_columns_of_one_channel_are_refused(tmp_path):

@@ -55,7 +55,7 @@ def drafted(path: Path, columns: dict, without: tuple[str, ...] = ()):
         ("time", 1_700_000_000 + STEPS, None, False),
         ("timestamp_ms", 1_700_000_000_000 + STEPS * 100, "ms", False),
         ("timestamp_s", 1_700_000_000_000 + STEPS * 100, "ms", True),
-        ("Time", 45000.5 + STEPS / 86400, None, True),
+        ("Time", 45000.5 + STEPS / 86400, "d", True),
         ("time_s", STEPS * 1e-4, "s", True),
     ],
 )

@@ -52,18 +52,22 @@ def test_the_datum_is_no_position_before_the_first_fix(voyage, caplog):
     done = voyage(parts, text)
     assert done.datum == pytest.approx(fourth, abs=1e-12)
     assert done.table["x0"].to_numpy()[10:] == pytest.approx(0.0, abs=50.0)
-    assert "the datum is position 4" in caplog.text and "135 degrees" in caplog.text
+    (unfixed,) = [f for f in done.report.findings if f.kind == "not_available"]
+    assert "3 of 600" in unfixed.sentence and "without a fix" in unfixed.sentence
 
 
-@pytest.mark.parametrize("nowhere", [(91.0, 181.0), (12.0, 4000.0)], ids=["no fix", "damaged"])
-def test_a_position_of_no_place_is_blank(voyage, nowhere):
+@pytest.mark.parametrize(
+    ("nowhere", "kind"), [((91.0, 181.0), "not_available"), ((12.0, 4000.0), "implausible")],
+    ids=["no fix", "damaged"],
+)  # fmt: skip
+def test_a_position_of_no_place_is_blank(voyage, nowhere, kind):
     parts, text = geodetic(0.0, 135.0)
     clean = voyage(parts, text)
     fix = parts["/position"].columns
     fix["lat"][300:320], fix["lon"][300:320] = nowhere
     done = voyage(parts, text)
     (blank,) = [f for f in done.report.findings if f.channel == "position"]
-    assert blank.kind == "blank" and blank.end_s - blank.start_s == pytest.approx(2.0, abs=0.11)
+    assert blank.kind == kind and blank.end_s - blank.start_s == pytest.approx(2.0, abs=0.11)
     x0 = done.table["x0"]
     assert x0[290:330].null_count() == 20
     assert (x0 - clean.table["x0"]).drop_nulls().abs().max() < 1e-6

@@ -5,22 +5,21 @@ from __future__ import annotations
 import logging
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
-from shiplog import units
 from shiplog.exceptions import ChannelMissing, ProfileError, listed, nearest
-from shiplog.logs.conversion import clock
+from shiplog.logs.conversion import cells, clock
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.conversion.steps_back import along
 from shiplog.logs.dates import UNDATED
-from shiplog.logs.faults import as_metadata
 from shiplog.logs.health_report import Finding
 from shiplog.logs.write import SCHEMAS, Series
+from shiplog.numbers import counted
 from shiplog.profile import Column, Profile, Source
 from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS
 
@@ -39,6 +38,9 @@ FAMILY_SCHEMAS = {
 # A topic filled in fewer rows than this is slower than its table; in more, what is empty is lost.
 SLOW_SHARE = 0.5
 MOST_VESSELS = 8  # vessels that a message names
+RECEIVED = (  # channels that a receiver's status speaks of
+    "latitude", "longitude", "x0", "y0", "sog", "cog", "velocity_north", "velocity_east",
+)  # fmt: skip
 
 
 def required(profile: Profile | None, path: Path) -> Profile:
@@ -72,20 +74,27 @@ def voyages(
     _require(present, profile, frame, path)
     _refuse_two(present, profile, path)
     refuse_scaled(present, profile)
+    refuse_undecided({n: table.undecided[n] for n in present if n in table.undecided}, path)
+    frame = frame.with_columns(
+        cells.without(frame[name], column.missing)
+        for name, column in present.items() if column.missing and column.channel != "status"
+    )  # fmt: skip
     frame = _of_one_vessel(frame, present, profile, path)
-    time = _time(frame, present)
-    columns = [time.rename("time")]
+    lost = [*table.lost]
+    columns = [_time(frame, present).rename("time")]
     for name, column in present.items():
         if column.channel not in TABLE_LABELS:
-            columns.append(_si(frame[name], column, path))
+            read = cells.si(frame[name], column, path)
+            columns.append(read.values)
+            lost += [read.lost] if read.lost else []
         elif column.channel == "voyage":
             columns.append(text_of(frame[name]).rename("voyage"))
-    every = pl.DataFrame(columns)
+    every = _where_valid(pl.DataFrame(columns), frame, present, profile, path)
     si = every.filter(pl.col("time").is_not_null())
     timeless = every.filter(pl.col("time").is_null() & pl.any_horizontal(
         pl.exclude("time", "voyage").is_finite()
     )).height  # fmt: skip
-    lost = [f"{timeless} row{'s' * (timeless > 1)} without a time"] if timeless else []
+    lost += [f"{counted(timeless, 'row')} without a time"] if timeless else []
     if si.height == 0:
         raise ProfileError(
             f"{path.name}: no row of {listed(_named(present, 'time'))} holds a time.",
@@ -131,9 +140,14 @@ def _in_order(
             yield re.sub(r'[\\/:*?"<>|]', "_", called), one, findings
 
 
-def series(table: pl.DataFrame, profile: Profile, findings: Iterable[Finding] = ()) -> list[Series]:
-    """SI columns back into each topic's fields and units: what the profile will read again. The
-    findings on the table go with the first of them."""
+def dropped(lost: Sequence[str]) -> list[Finding]:
+    """What was left out of a table, for whoever reads the log that is made of it."""
+    said = "Left out of the table that this log was made of: {}."
+    return [Finding("dropped", "log", said.format(what.rstrip("."))) for what in lost]
+
+
+def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
+    """SI columns back into each topic's fields and units: what the profile will read again."""
     time = table["time"].to_numpy()
     topics: dict[str, dict[str, np.ndarray]] = {}
     noted: dict[str, dict[str, str]] = {}
@@ -146,8 +160,6 @@ def series(table: pl.DataFrame, profile: Profile, findings: Iterable[Finding] = 
             else:
                 si = table[name].fill_null(np.nan).to_numpy()
             columns[path] = si / factor + offset
-    first = next(iter(topics), "")
-    noted[first] = noted.get(first, {}) | as_metadata(findings)
     return named_apart(
         _topic(topic, time, columns, noted.get(topic, {})) for topic, columns in topics.items()
     )
@@ -279,6 +291,49 @@ def refuse_scaled(present: dict[str, Column], profile: Profile) -> None:
             )
 
 
+def refuse_undecided(undecided: dict[str, str], path: Path) -> None:
+    """Raises ProfileError for numbers that can be read in two ways."""
+    for name, example in undecided.items():
+        sign = "," if "," in example else "."
+        raise ProfileError(
+            f"{path.name}: the column {name!r} holds numbers such as {example!r}, and nothing in "
+            f"the file says whether the {'comma' if sign == ',' else 'dot'} stands before decimals "
+            "or groups thousands.",
+            hint=f'say it in [table], as "{name}" = {{ ..., decimal = "{sign}" }} for decimals, or '
+            f'decimal = "{"." if sign == "," else ","}" for thousands.',
+        )
+
+
+def _where_valid(
+    si: pl.DataFrame, frame: pl.DataFrame, present: dict[str, Column], profile: Profile, path: Path
+) -> pl.DataFrame:
+    """The channels of a receiver blank where a status next to them says that it has no fix.
+
+    Raises ProfileError for a status of which the profile does not say what means so.
+    """
+    for name in _named(present, "status"):
+        marks = present[name].missing
+        if not marks:
+            raise ProfileError(
+                f"[table] {name!r} is a status, and its `missing` does not say which of its values "
+                "mean that there is no fix.",
+                hint=f'say them in {profile.source}, as "{name}" = {{ channel = "status", missing '
+                f"= [0] }}. Its values: {busiest(text_of(frame[name]))}.",
+            )
+        without = cells.holds(frame[name], marks)
+        if not without.any():
+            continue
+        log.warning(
+            "%s: %d of %d rows have no fix, by %r; their position and velocity are blank",
+            path.name, int(without.sum()), len(without), name,
+        )  # fmt: skip
+        si = si.with_columns(
+            pl.when(without).then(None).otherwise(pl.col(c)).alias(c)
+            for c in RECEIVED if c in si.columns
+        )  # fmt: skip
+    return si
+
+
 def _of_one_vessel(
     frame: pl.DataFrame, present: dict[str, Column], profile: Profile, path: Path
 ) -> pl.DataFrame:
@@ -324,27 +379,6 @@ def _time(frame: pl.DataFrame, present: dict[str, Column]) -> pl.Series:
 
 def _named(present: dict[str, Column], channel: str) -> list[str]:
     return [name for name, column in present.items() if column.channel == channel]
-
-
-def _si(values: pl.Series, column: Column, path: Path) -> pl.Series:
-    """A column as SI numbers; words in it become blanks, and are reported."""
-    if values.dtype == pl.String:
-        number = clock.number_of(values)
-        words = values.filter(number.is_null() & (values.str.strip_chars() != ""))
-        if number.null_count() == len(number) and len(words):
-            raise ProfileError(
-                f"{path.name}: the column {values.name!r} holds no number, but {words[0]!r}.",
-                hint="name another column for this channel in [table].",
-            )
-        if len(words):
-            log.warning(
-                "%s: %d values of %s are no numbers, such as %r; taken as not measured",
-                path.name, len(words), values.name, words[0],
-            )  # fmt: skip
-    else:
-        number = values.cast(pl.Float64, strict=False)
-    factor = column.sign * units.factor(column.unit or "1")
-    return ((number - column.offset) * factor).rename(column.channel)
 
 
 def text_of(values: pl.Series) -> pl.Series:

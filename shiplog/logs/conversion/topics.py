@@ -52,7 +52,9 @@ def folder_to_series(
     reasons: list[str] = []
     for path in sorted(p for p in folder.glob("[!.]*") if is_table(p) and p not in without):
         try:
-            parts += _one(path, profile)
+            found, lost = _one(path, profile)
+            parts += found
+            reasons += lost
         except ShiplogError as error:
             reasons.append(error.message)
     if not parts:
@@ -64,8 +66,14 @@ def folder_to_series(
     return named_apart(parts), reasons
 
 
-def _one(path: Path, profile: Profile | None) -> list[Series]:
-    frame = read_table(path).frame
+def _one(path: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
+    table = read_table(path, profile.table if profile else None)
+    frame = table.frame.drop(table.undecided)
+    lost = [f"{path.name}: {what}." for what in table.lost] + [
+        f"{path.name}: the numbers of the column {name!r}, such as {example!r}, can be read in two "
+        f"ways; give it a `decimal` in [table]."
+        for name, example in table.undecided.items()
+    ]
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
     if profile:
         refuse_scaled(named, profile)
@@ -90,15 +98,17 @@ def _one(path: Path, profile: Profile | None) -> list[Series]:
     frame, logged = frame.filter(keep)[order], logged.filter(keep)[order]
     stamp = stamp.filter(keep)[order].fill_null(strategy="forward").fill_null(logged)
     if frame.height == 0:
-        return []
+        return [], lost
     topic = "/" + path.stem.replace("__", "/")
     text = next((n for n in frame.columns if n.lower() in ("sentence", "nmea")), None)
     if text is not None and frame[text].dtype == pl.String:
-        return lines_to_series(frame[text].fill_null("").to_list(), path.name, logged.to_list())
+        parts = lines_to_series(frame[text].fill_null("").to_list(), path.name, logged.to_list())
+        return parts, lost
     columns = _numbers(frame.drop(*clocks), path)
     if not columns:
-        return []
-    return [Series(topic, schema_of(topic, columns), stamp.to_numpy(), columns, logged.to_numpy())]
+        return [], lost
+    schema = schema_of(topic, columns)
+    return [Series(topic, schema, stamp.to_numpy(), columns, logged.to_numpy())], lost
 
 
 def _numbers(frame: pl.DataFrame, path: Path) -> dict[str, np.ndarray]:

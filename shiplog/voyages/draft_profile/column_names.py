@@ -64,6 +64,7 @@ class FoundColumn:
     sign: float = 1.0
     offset: float = 0.0
     only: str = ""  # the vessel whose rows are meant
+    missing: tuple[int | str, ...] = ()  # values that stand for none; of a status, for no fix
     rank: tuple[int, ...] = ()  # the least is the most trusted
 
     @property
@@ -133,6 +134,8 @@ def measured(
     if not fits and not (coordinate and words.unit_of(name) is None):
         return None
     doubts = ("a set-point, not a measurement",) if words.is_set_point(name) else ()
+    if example := table.undecided.get(name):
+        doubts = (*doubts, f'{example!r}: decimals, or thousands? Say decimal = "," or "."')
     if blank := facts.unavailable(channel, values):
         doubts = (*doubts, blank)
     if stated:

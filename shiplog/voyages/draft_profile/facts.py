@@ -67,7 +67,7 @@ def unavailable(channel: str, values: pl.Series) -> str:
     mark, numbers = NOT_AVAILABLE[channel], values.cast(pl.Float64).fill_nan(None).drop_nulls()
     if numbers.is_empty() or numbers.max() != mark:
         return ""
-    return f'{mark:g} is AIS\'s "not available"; blank it'
+    return f'{mark:g} is AIS\'s "not available": missing = [{mark:g}] blanks it'
 
 
 def holds(channel: str, values: pl.Series) -> bool:

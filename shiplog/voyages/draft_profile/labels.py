@@ -9,7 +9,7 @@ import polars as pl
 
 from shiplog import units
 from shiplog.exceptions import ProfileError, ShiplogError
-from shiplog.logs.conversion import clock
+from shiplog.logs.conversion import clock, written_times
 from shiplog.logs.conversion.columns import busiest, text_of
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.voyages.draft_profile import facts, words
@@ -27,12 +27,11 @@ TIME_UNITS = {  # how a name's last word says in what it counts time
     "s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "ms": "ms", "msec": "ms",
     "millis": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us",
     "microseconds": "us", "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns",
-    "min": "min", "mins": "min", "minutes": "min", "h": "h", "hours": "h",
+    "min": "min", "mins": "min", "minutes": "min", "h": "h", "hours": "h", "d": "d", "days": "d",
 }  # fmt: skip
 RATES_HZ = (0.02, 100.0)  # how often a ship's motion is recorded
 USUAL_HZ = (1.0, 10.0)  # and how often it mostly is
 DAY_S, MINUTE = 86_400.0, 100.0  # seconds of a day; of hhmmss, what a minute adds
-DAY_NUMBERS = (20_000.0, 80_000.0)  # of a spreadsheet, 1954 to 2119
 
 
 def found_labels(table: DelimitedTable, path: Path, vessel: str | None) -> list[FoundColumn]:
@@ -93,8 +92,13 @@ def _date(values: pl.Series) -> list[FoundColumn]:
     except ShiplogError as error:
         if words.bare(values.name) == "day":
             return []
-        return [FoundColumn(values.name, "date", None, (error.message,))]
+        return [FoundColumn(values.name, "date", None, (_asked(error),))]
     return [FoundColumn(values.name, "date", None)]
+
+
+def _asked(error: ShiplogError) -> str:
+    """What a line of a draft says of times that can be read in two ways or in none."""
+    return " ".join(f"{error.message} {error.hint or ''}".split()).rstrip(". ")
 
 
 def _is_dated(values: pl.Series, time: FoundColumn) -> bool:
@@ -114,7 +118,7 @@ def _time(values: pl.Series, table: DelimitedTable, with_date: bool) -> FoundCol
     try:
         times = clock.instants(values)
     except ShiplogError as error:
-        return FoundColumn(values.name, "time", None, (error.message,))
+        return FoundColumn(values.name, "time", None, (_asked(error),))
     if times.null_count() == len(times):
         return FoundColumn(values.name, "time", None, ("no time was understood",))
     naive = not isinstance(values.dtype, pl.Datetime) or values.dtype.time_zone is None
@@ -131,6 +135,8 @@ def _counted(number: pl.Series, table: DelimitedTable, with_date: bool) -> Found
     most, step = clock.typical(number), clock.typical(number.diff())
     stated = _stated_unit(name, table)
     unix = units.unix_unit(most)
+    if written_times.is_cut(number):
+        return FoundColumn(name, "time", stated, (written_times.cut(name, number).message,))
     if unix:
         same = stated in (None, unix)
         doubt = () if same else (f"called {stated}, and Unix time in {unix} by its size",)
@@ -152,9 +158,10 @@ def _counted(number: pl.Series, table: DelimitedTable, with_date: bool) -> Found
         return FoundColumn(name, "time", unit, ("of the step between rows",))
     if len(distance) > 1:
         return FoundColumn(name, "time", None, ("seconds, of the step between rows",))
-    spreadsheet = DAY_NUMBERS[0] < most < DAY_NUMBERS[1] and 0 < step < 1.0 / RATES_HZ[1]
-    if spreadsheet:
-        return FoundColumn(name, "time", None, ("days, as of a spreadsheet? Write seconds",))
+    if written_times.too_fast(number) is not None:
+        days = written_times.counts_days(most)
+        doubt = f"{days[0]} numbers of days" if days else "days? Hours? Not seconds, by its steps"
+        return FoundColumn(name, "time", "d", (doubt,))
     return FoundColumn(name, "time", None, _of_rate(step))
 
 

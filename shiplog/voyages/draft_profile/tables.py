@@ -25,6 +25,8 @@ from shiplog.voyages.draft_profile.column_names import (
 from shiplog.voyages.draft_profile.coordinates import on_earth
 from shiplog.voyages.draft_profile.driven import found_actuators
 from shiplog.voyages.draft_profile.labels import found_labels
+from shiplog.voyages.draft_profile.speed_units import fitting_speed
+from shiplog.voyages.draft_profile.status_columns import found_status
 from shiplog.voyages.draft_profile.toml_text import in_comment, quoted
 from shiplog.voyages.draft_profile.topics import NO_ACTUATOR, OPTIONAL
 
@@ -63,8 +65,12 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     found = {channel: candidates(rows, channel, taken, table) for channel in CHANNEL_COLUMNS}
     _choose_turning(found, labels, rows)
     chosen, second = _kinds(found, rows)
+    chosen = _with_fitting_speed(chosen, labels, rows)
     taken |= {f.column for _, _, columns in chosen for f in columns}
     taken |= {f.column for columns in found.values() for f in columns}
+    if any(name == "position" for name, _, _ in chosen):
+        labels += found_status(rows, taken)
+        taken |= {f.column for f in labels}
     actuators = found_actuators(rows, table, taken)
     parts = [
         f"# Drafted from {in_comment(path.name)}, {rows.height} rows. "
@@ -82,9 +88,35 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     listed_columns = [*labels, *(f for *_, fs in chosen for f in fs), *(f for _, f in actuators)]
     parts.append(_table(listed_columns, rows, second))
     mentioned = {f.column for f in (*listed_columns, *second)}
+    nameless = [n for n in frame.columns if n not in mentioned and n in table.nameless]
+    parts += [_nameless(rows[name]) for name in nameless]
+    mentioned |= {*nameless}
     if unused := [n for n in frame.columns if n not in mentioned]:
         parts.append("# Columns not used: " + in_comment(listed(unused, most=60)) + "\n")
     return "\n".join(parts)
+
+
+def _nameless(values: pl.Series) -> str:
+    """What to say of a column that no line names."""
+    return (
+        f'# {quoted(values.name)} = {{ channel = "..." }}  # CHECK: no line of the table names it; '
+        f"{facts.of_values(values)}"
+    )
+
+
+def _with_fitting_speed(
+    chosen: list[tuple[str, str, list[FoundColumn]]], labels: list[FoundColumn], rows: pl.DataFrame
+) -> list[tuple[str, str, list[FoundColumn]]]:
+    """Speeds whose unit is not stated in the one that fits the position."""
+    place = next((columns for name, _, columns in chosen if name == "position"), None)
+    times = [label for label in labels if label.channel == "time"]
+    if place is None:
+        return chosen
+    return [
+        (name, kind, [fitting_speed(c, place, times, rows) if c.channel == "sog" else c
+                      for c in columns])
+        for name, kind, columns in chosen
+    ]  # fmt: skip
 
 
 def _of_numbers(rows: pl.DataFrame, labels: set[str]) -> pl.DataFrame:
@@ -213,6 +245,7 @@ def _table(columns: list[FoundColumn], rows: pl.DataFrame, second: list[FoundCol
 def _line(one: FoundColumn, rows: pl.DataFrame) -> str:
     unit = f', unit = "{one.unit}"' if one.unit else ""
     more = f", only = {quoted(one.only)}" if one.only else ""
+    more += f", missing = {_listed(one.missing)}" if one.missing else ""
     more += f", sign = {one.sign:g}" if one.sign != 1.0 else ""
     more += f", offset = {one.offset}" if one.offset else ""
     check = f"CHECK: {'; '.join(one.doubts)}; " if one.doubts else ""
@@ -220,6 +253,10 @@ def _line(one: FoundColumn, rows: pl.DataFrame) -> str:
     if one.channel == "time":
         what = f"{what}; {_rate(rows[one.column], one.unit)}"
     return f'{quoted(one.column)} = {{ channel = "{one.channel}"{unit}{more} }}  # {check}{what}'
+
+
+def _listed(values: tuple[int | str, ...]) -> str:
+    return "[" + ", ".join(quoted(v) if isinstance(v, str) else str(v) for v in values) + "]"
 
 
 def _rate(values: pl.Series, unit: str | None) -> str:
