@@ -20,7 +20,13 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import (
+    clocks,
+    fault_detection,
+    plausible_measures,
+    resampling,
+    sensor_consistency,
+)
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -67,6 +73,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     table, grid = aligned.table, aligned.grid
     estimates = tuple(sensor_consistency.estimates(table, profile))
     consistency = sensor_consistency.findings(estimates, table.height, profile)
+    consistency += plausible_measures.of_log(table, profile, consistency)
     usable_s, windows = usable(table, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,
