@@ -127,17 +127,19 @@ def verdict(
         word = "undecided"
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
+    setting, catalogue = trial.reference.setting, trial.reference.model.causes
+    limits = verdicts.limits_json(decision, catalogue, setting)
+    hidden = verdicts.not_shown(limits)
     text = f"{none_named(context.lost)}."
     if not context.lost:
         text = sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
             ranking, context.wrong, decision.one_of, decision.either, decision.why,
+            hidden,
         )  # fmt: skip
     if context.against:  # first, whatever is said of the rest
         open_ = "No cause explains the rest." if word == "undecided" else text
         text = f"{contradictions.text(context.against)} {open_}"
-    setting, catalogue = trial.reference.setting, trial.reference.model.causes
-    limits = verdicts.limits_json(decision, catalogue, setting)
     if word == "undecided":
         notes += tests_of_open(decision.ranking, catalogue)
     return Verdict(
@@ -157,6 +159,7 @@ def verdict(
         wrong=tuple(context.wrong),
         unseen=tuple(verdicts.unseen_json(row) for row in context.unseen),
         limits=limits,
+        hidden=hidden,
         contradictions=tuple(one.as_json() for one in context.against),
         unavailable=unavailable,
         notes=tuple(notes),

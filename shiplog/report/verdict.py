@@ -225,6 +225,18 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
     return tuple(sorted(found, key=lambda one: one["share"]))
 
 
+def not_shown(limits: Sequence[dict]) -> dict:
+    """How many of the causes in the table of smallest sizes could not have shown at any realistic
+    size: `causes` of `of`, with their `names`."""
+    names = [
+        f"{one['name']} ({which})" if (which := next((one[k] for k in WHICH if k in one), ""))
+        else one["name"]
+        for one in limits
+        if one["share"] >= HOPELESS
+    ]  # fmt: skip
+    return {"causes": len(names), "of": len(limits), "names": names}
+
+
 def unseen_json(row: Dependence) -> dict:
     """One row of the table of inputs that the model does not have."""
     r2 = dict(zip((c.name for c in VELOCITY), row.r2, strict=True))

@@ -178,9 +178,9 @@ TABLE: dict[str, Limit] = {
          (0.01, "cm/s that are called m/s")),
     ),
     "drive of the model": Limit(
-        "thrust over resistance of the fitted model in steady motion ahead", "1", (0.2, 5.0),
-        (0.0, NEVER), ("actuators.{name}.sign", "actuators.{name}.unit"),
-        "1 where nothing else drives it: Newton's law",
+        "thrust over resistance of the fitted model in steady motion ahead", "1", (0.2, 10.0),
+        (-NEVER, NEVER), ("actuators.{name}.sign", "actuators.{name}.unit"),
+        "1 where nothing else drives or brakes it: Newton's law",
     ),
     "thrust of the model": Limit(
         "largest thrust of the fitted model over the weight", "1", (0.0, 3.0), (0.0, 300.0),
