@@ -19,6 +19,7 @@ from shiplog.diagnosis import (
     error_location,
     network_base,
     segments,
+    sign_conventions,
     trial_decision,
     trial_voyages,
 )
@@ -131,10 +132,16 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         notes.append(answer.without_nominal(run, store.path))
     if run.given:
         notes.append(answer.of_given(run))
-    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
-    barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
     before = _nominal_windows(of) if nominal is not None else None
+    if cut is not None and before is not None:
+        simulator = run.extended(run.config.seeds[0], recorded)
+        if why := sign_conventions.at_once(simulator, cut, before):
+            return DiagnosedTrial(
+                answer.other_convention(run, recorded, before_effect, why, of.against), out
+            )
+    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
+    barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
     decided = trial_decision.decided(
         run, nominal, recorded, cut, causes, lacking, reach, barred, before
     )

@@ -157,10 +157,7 @@ class HeldOut(Rollouts):
         hold = float(parts(counted.state[:, :1] - counted.state, counted.dt).sum(1).mean())
         other = sign_conventions.tried(self.before, counted, self.nominal)
         if sign_conventions.explains(other, own, after, hold, self._level):
-            return (
-                f"L is {other.loss:.0f} with {other.words} (look at {other.key} in the profile), "
-                f"and {own:.0f} as log and profile have it"
-            )
+            return sign_conventions.sentence(other, own)
         if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:
             return ""
         return (

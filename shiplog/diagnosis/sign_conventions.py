@@ -284,6 +284,23 @@ def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool
     return (each + np.angle(along.sum(1))[:, None]).reshape(-1)
 
 
+def at_once(simulator: ExtendedSimulator, cut: Windows, nominal: Windows) -> str:
+    """What a convention explains so well that no search for causes is needed: it leaves next to
+    nothing of what the trial has more than the nominal voyages. Empty where none does."""
+    own, level = _mean(simulator, cut), _mean(simulator, nominal)
+    found = tried(simulator, cut, nominal)
+    if own - found.loss < thresholds.ALL_EXCESS * (own - level):
+        return ""
+    return sentence(found, own) if explains(found, own, own, _hold(cut), level) else ""
+
+
+def sentence(found: Tried, own: float) -> str:
+    return (
+        f"L is {found.loss:.0f} with {found.words} (look at {found.key} in the profile), and "
+        f"{own:.0f} as log and profile have it"
+    )
+
+
 def explains(found: Tried, own: float, after: float, hold: float, level: float | None) -> bool:
     """Whether a convention is the explanation: it leaves less than half of the model's error, and
     less than constant velocities have; it takes away most of what the trial has more than the

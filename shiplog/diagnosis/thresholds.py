@@ -91,6 +91,10 @@ TURNED_SIGN = 0.5
 # the likelier explanation.
 MOST_OF_EXCESS = 0.8
 
+# The same, from which no causes are searched for: what is left is no more than a model's error
+# varies from campaign to campaign.
+ALL_EXCESS = 0.95
+
 # Nats. A cause would show in these data from this expected log Bayes factor on: e^5 is 150 to 1.
 SHOWS_NATS = 5.0
 

@@ -20,7 +20,7 @@ from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
-from shiplog.models.causes import Cause
+from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.report.verdict_sentence import less, sentence
@@ -32,6 +32,7 @@ from shiplog.voyages import parts, timescale
 from shiplog.voyages.contradicted import Contradicted
 from shiplog.voyages.recording import Record
 
+OTHERWISE = "the profile reads these logs otherwise than those of the model"
 RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
@@ -278,6 +279,28 @@ def contradicted(
         "undecided", sentence, run.name, before_effect, made_of(run, recorded),
         unavailable=verdicts.rejected_json(why),
         contradictions=tuple(one.as_json() for one in found),
+    )  # fmt: skip
+
+
+def other_convention(
+    run: Run, recorded: Record, before_effect: bool, why: str, found: Sequence[Contradicted] = ()
+) -> Verdict:
+    """The verdict where the profile reads these logs otherwise than those of the model: all that
+    the trial has more than the nominal voyages goes with one sign, place or unit.
+
+    why   as `sign_conventions.at_once` has it
+    """
+    said = f"{contradictions.text(found)} {none_named(why)}.".strip()
+    structure = {"family": "motion", "acts_on": [], "depends_on": list(verdicts.DEPENDS["motion"]),
+                 "evidence_nats": 0.0}  # fmt: skip
+    note = (
+        "No search for causes was made: correct the profile of these logs, ingest them again, and "
+        "diagnose again."
+    )
+    return Verdict(
+        "unknown", said, run.name, before_effect, made_of(run, recorded), structure=structure,
+        unavailable=verdicts.rejected_json({c.name: OTHERWISE for c in CATALOGUE}),
+        notes=(note,), contradictions=tuple(one.as_json() for one in found),
     )  # fmt: skip
 
 
