@@ -1,6 +1,7 @@
 """What can be of a ship, on ships whose sizes are published and motions known in closed form."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -294,3 +295,21 @@ def test_a_heading_that_the_course_contradicts_says_nothing_of_the_vane():
     }  # fmt: skip
     table = pl.DataFrame({n: columns[n] for n in profile.columns} | {"quality": zero.astype(int)})
     assert wind_convention.findings(table, profile) == []
+
+
+def test_the_page_has_every_row_with_its_limits():
+    """A limit that is asked and stands on no page would be a hidden one."""
+    page = (Path(__file__).parents[2] / "docs" / "plausibility.md").read_text("utf-8")
+    section = page.partition("\n## ")[0]
+    rows = {
+        cells[0]: cells[1:]
+        for line in section.splitlines()
+        if line.startswith("| ")
+        for cells in [[cell.strip() for cell in line.strip("|").split("|")]]
+    }
+    assert set(rows) - {"row"} - {"---"} == set(TABLE)
+    for name, limit in TABLE.items():
+        words = " ".join(rows[name])
+        for number in (*limit.usual, *limit.possible):
+            if math.isfinite(number) and number > 0.0:
+                assert f"{number:g}" in words, (name, number)
