@@ -94,7 +94,8 @@ TABLE: dict[str, Limit] = {
         ("ship.draught_m", "ship.length_m"), "2 of a sailing yacht to 100 of a pontoon",
     ),
     "centre of gravity": Limit(
-        "distance of the centre of gravity from midship over the length", "1", (0.0, 0.25), (0.0, 1.0),
+        "distance of the centre of gravity from midship over the length", "1", (0.0, 0.25),
+        (0.0, 1.0),
         ("ship.x_g_m", "ship.length_m"),
         "a tenth at most of ships on an even keel (Molland, 2008)", METRES,
     ),

@@ -7,6 +7,10 @@ import pytest
 from commands import call
 from short_voyages import BOTH, HULL, train
 
+from shiplog.diagnosis import contradicted_causes
+from shiplog.voyages import contradicted
+from shiplog.voyages.store import Store
+
 KNOTS = {
     "kind": "contradiction", "channel": "velocity", "start_s": 0.0, "end_s": 80.0,
     "sentence": "The velocity is 1.94 times what the position travels. Knots that are called m/s? "
@@ -89,6 +93,27 @@ def test_diagnose_says_it_first_and_names_no_cause(store, published, tmp_path, w
     assert why["current"] == why["rudder_offset"] == "velocity contradicts other channels"
     assert {"heading_offset", "wind_force", "fouling"} <= set(why)
     assert content["contradictions"][0]["voyage"] == which
+
+
+def test_a_contradiction_of_a_short_stretch_bars_the_causes_of_its_channel_alone(store, tmp_path):
+    """4 of 80 s: a twentieth."""
+    there = Store(planted(store, tmp_path, "trip_3", start_s=10.0, end_s=14.0))
+    (one,) = contradicted.of(there, ["trip_3"])
+    assert one.share == pytest.approx(0.05, rel=0.05)
+    assert contradicted.everywhere([one]) == ()
+    (half,) = contradicted.of(there, ["trip_3[0:40]"])
+    assert half.share == pytest.approx(0.1, rel=0.05)
+    assert contradicted.of(there, ["trip_3[40:80]"]) == ()
+    profile = there.profile(["trip_3"])
+    barred = contradicted_causes.barred(["wind"], profile)
+    assert set(barred) == {
+        "wind_force", "wind_direction_offset", "wind_speed_scale", "clock_offset"
+    }  # fmt: skip
+    assert {"rudder_offset", "rudder_lag"} <= set(
+        contradicted_causes.barred(["rudder_port"], profile)
+    )
+    assert {"current", "fouling"} <= set(contradicted_causes.barred(["surge"], profile))
+    assert len(contradicted_causes.barred(["ship"], profile)) > 15  # of no channel: every cause
 
 
 def test_diagnose_does_not_judge_voyages_of_another_profile(store, published, tmp_path):
