@@ -15,9 +15,11 @@ from pipelines.bars import reach, staged
 from shiplog import files
 from shiplog.diagnosis import (
     baseline_check,
+    contradicted_causes,
     error_location,
     network_base,
     segments,
+    sign_conventions,
     trial_decision,
     trial_voyages,
 )
@@ -35,9 +37,11 @@ from shiplog.training.load_model import Run
 from shiplog.training.provenance import Answer, provenance
 from shiplog.training.run_checks import refuse_other_ship
 from shiplog.unexpected import unexpected
-from shiplog.voyages import parts
+from shiplog.voyages import contradicted, parts
+from shiplog.voyages.contradicted import Contradicted
 from shiplog.voyages.recording import Record
 from shiplog.voyages.store import Store
+from shiplog.voyages.windows import Windows
 
 log = logging.getLogger(__name__)
 
@@ -74,10 +78,14 @@ def diagnose_run(
     before_effect = not parts.overlapping(names, run.trained_on) and not run.given
     nominal = _nominal(run, store, profile) if before_effect else None
     nominal, recorded = trial_voyages.in_ship_time(run, nominal, recorded)
-    if answer.enough(recorded):
+    used = [*names, *store.there(run.trained_on)]
+    against = contradicted.of(store, dict.fromkeys(used))
+    if contradicted.everywhere(against):
+        done = DiagnosedTrial(answer.contradicted(run, recorded, before_effect, against), out)
+    elif answer.enough(recorded):
         if nominal is not None and len(segments.begins(nominal)) < NOMINAL:
             nominal = None
-        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect)
+        campaign = Campaigns(run, store, names, profile, recorded, nominal, before_effect, against)
         done = _decided(campaign, out, causes)
     else:
         done = DiagnosedTrial(answer.too_little(run, recorded, before_effect), out)
@@ -93,6 +101,7 @@ class Campaigns:
     """A run and the trial voyages; `nominal` is None where its training voyages are not stored.
 
     before_effect   whether the run was trained on other voyages than these
+    against         short stretches that contradict themselves
     """
 
     run: Run
@@ -102,6 +111,7 @@ class Campaigns:
     recorded: Record
     nominal: Record | None
     before_effect: bool
+    against: Sequence[Contradicted] = ()
 
 
 def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
@@ -122,9 +132,19 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         notes.append(answer.without_nominal(run, store.path))
     if run.given:
         notes.append(answer.of_given(run))
-    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     cut = trial_voyages.windows_of(run, store, names, profile)
-    decided = trial_decision.decided(run, nominal, recorded, cut, causes, lacking, reach)
+    before = _nominal_windows(of) if nominal is not None else None
+    if cut is not None and before is not None:
+        simulator = run.extended(run.config.seeds[0], recorded)
+        if why := sign_conventions.at_once(simulator, cut, before):
+            return DiagnosedTrial(
+                answer.other_convention(run, recorded, before_effect, why, of.against), out
+            )
+    lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
+    barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
+    decided = trial_decision.decided(
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before
+    )
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
     untested = dict(decided.untested)
@@ -141,8 +161,8 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         notes += answer.of_physics(run, tried, found)
         network = network_base.Own(run, tried)
         if cut is not None:
-            before = run.extended(run.config.seeds[0], recorded)
-            held = HeldOut(cut, before, tried, network)
+            own = run.extended(run.config.seeds[0], recorded)
+            held = HeldOut(cut, own, tried, network, before)
             decision, found = held.simulated_with(decision)
     lost = held.lost(found) if held else ""
     if lost:
@@ -169,6 +189,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         error_location.by_channel(held) if held else (),
         error_location.depends_on(simulated[0], simulated[1].nothing, whole),
         alone,
+        of.against,
     )
     after = held.extended(decision) if held and decision.named else None
     verdict = answer.verdict(tried, decision, found, held, context)
@@ -181,6 +202,12 @@ def _nominal(run: Run, store: Store, profile: Profile) -> Record | None:
     if not there:
         return None
     return trial_voyages.record_of(store, there, profile)
+
+
+def _nominal_windows(of: Campaigns) -> Windows | None:
+    """Those that the run was trained on, as the store has them."""
+    there = of.store.there(of.run.trained_on)
+    return trial_voyages.windows_of(of.run, of.store, there, of.profile)
 
 
 def _write(done: DiagnosedTrial) -> None:

@@ -23,11 +23,12 @@ from shiplog.training.load_model import Run
 from shiplog.training.run_checks import (
     refuse_no_window,
     refuse_other_columns,
+    refuse_other_profile,
     refuse_other_window,
 )
 from shiplog.training.voyages_to_test import held_back, say_twins
 from shiplog.unexpected import unexpected
-from shiplog.voyages import windows
+from shiplog.voyages import contradicted, windows
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
 from shiplog.voyages.windows import Windows
@@ -51,9 +52,11 @@ def evaluate_runs(
     for other in opened[1:]:
         refuse_other_window(first, other)
         refuse_other_columns(first, other.profile.columns, other.name)
+        refuse_other_profile(first, other.profile, other.name)
     names = held_back(opened, store, voyages)
     profile = store.profile(names)
     refuse_other_columns(first, profile.columns, "the chosen voyages")
+    refuse_other_profile(first, profile, "the chosen voyages")
     rows = store.seconds(names, profile)
     for run in opened:
         say_twins(run, rows)
@@ -87,6 +90,7 @@ def evaluate_runs(
         baseline_losses=_baseline_losses(first, cut),
         inside=_inside(scored, bands, cut),
         forces=_forces(opened, rows),
+        contradicted=contradicted.of(store, names),
     )
 
 

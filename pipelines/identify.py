@@ -18,7 +18,13 @@ from shiplog.logs.health_report import CONTRACT
 from shiplog.report import tables
 from shiplog.simulation import prediction_interval
 from shiplog.simulation.sensitivities import Simulator, WindowSeries, losses, rollout
-from shiplog.training import identifiability, load_model, physics_files, run_folder
+from shiplog.training import (
+    identifiability,
+    load_model,
+    physics_files,
+    plausible_model,
+    run_folder,
+)
 from shiplog.training.cross_validation import CrossValidated, cross_validate
 from shiplog.training.held_out import (
     HeldOutErrors,
@@ -82,8 +88,8 @@ def _finish(
     else:
         notes, choices = _identify(run, ready)
         chosen = {"chosen": choices}
-    done = run.finish(provenance(hashes, began) | chosen)
-    return load_model.of_folder(done), notes
+    done = load_model.of_folder(run.finish(provenance(hashes, began) | chosen))
+    return done, [*notes, *plausible_model.questions(done)]
 
 
 def _begin(

@@ -9,6 +9,8 @@ from pipelines.bars import loading
 from shiplog.models import MODELS, NETWORK, PHYSICS
 from shiplog.paths import refuse_run
 from shiplog.training.options import TrainOptions
+from shiplog.training.run_checks import refuse_contradicted
+from shiplog.voyages import contradicted
 from shiplog.voyages.split import choose_physical_split, choose_split, say
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
@@ -25,7 +27,10 @@ def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     store = Store(store_path)
     split = choose(store, options.voyages, options.validation, options.data, options.window)
     say(split)
-    return train(store, out, options, split)
+    found = contradicted.of(store, (*split.training, *split.validation))
+    warning = refuse_contradicted(found, options.unchecked)
+    answer = train(store, out, options, split)
+    return answer.after(warning, contradictions=[one.as_json() for one in found])
 
 
 def _network(store: Store, out: Path, options: TrainOptions, split: Split) -> Answer:

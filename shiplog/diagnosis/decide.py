@@ -70,7 +70,7 @@ def decide(
             either, why = tuple(refuted), REFUTED
         else:
             verdict = "unknown"
-    elif found.none >= thresholds.STATED:
+    elif found.none_of_all >= thresholds.STATED:
         verdict = "none"
     if verdict in ("named", "unknown") and device:
         verdict, structure, side_force = "named", None, best.side_force

@@ -29,6 +29,7 @@ from shiplog.voyages.fault_detection import jumps, stretches
 from shiplog.voyages.recording import Record
 
 CHANNELS = tuple(c.name for c in channels.VELOCITY)
+UNITS = 300.0  # per cent of full thrust: a push by three ships of its size, or a wrong unit
 GUST = 1.2  # of the measured wind speed, from whichever side is worst
 STILL = 0.05  # of full power: below, a screw stands
 JETS_GONE_S = 5.0  # s that screws have stood before their jets are gone
@@ -68,10 +69,12 @@ class Stretch:
             else ("force", "N", "full thrust")
         )
         share = f" ({self.percent:.0f} % of {full})" if math.isfinite(self.percent) else ""
+        asked = UNITS < self.percent < math.inf
+        units = " Units? So large a force may be a wrong unit, sign or place in the profile."
         return (
             f"A {what} of {abs(self.peak):.3g} {unit} {towards}{share} "
             f"for {self.end_s - self.start_s:.0f} s: pushed, towed or held; no force of its own "
-            "does that."
+            f"does that.{units if asked else ''}"
         )
 
 

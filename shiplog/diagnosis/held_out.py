@@ -13,7 +13,7 @@ from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision, Named
 from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
-from shiplog.simulation.error_reduction import Gain, diverged, gain, parts
+from shiplog.simulation.error_reduction import RUNAWAY, Gain, diverged, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
 
@@ -72,10 +72,11 @@ class Rollouts:
 @dataclass(frozen=True)
 class HeldOut(Rollouts):
     """Windows and model, with the trial whose causes are judged on them. `own` is a network whose
-    causes were found on another model."""
+    causes were found on another model; `nominal` are the windows of the nominal voyages."""
 
     trial: Trial
     own: Own | None = None
+    nominal: Windows | None = None
 
     def states_after(self, decision: Decision, absent: str = "") -> np.ndarray:
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage;
@@ -147,22 +148,30 @@ class HeldOut(Rollouts):
     def lost(self, found: Gain | None) -> str:
         """Why no cause can be named; empty where one can.
 
-        Either a reversed sign reduces the error far more than all named causes do, or the model is
-        worse than holding the velocity, with the named causes in it too.
+        Either another convention explains the error better than all named causes do, or the model
+        is worse than holding the velocity, with the named causes in it too.
         """
         counted = self.cut.pick(np.flatnonzero(self.counted))
         own = float(self.losses_before[self.counted].sum(1).mean())
         after = own if found is None else min(own, found.after)
         hold = float(parts(counted.state[:, :1] - counted.state, counted.dt).sum(1).mean())
-        other, turned = sign_conventions.best(self.before, counted)
-        if turned < min(thresholds.TURNED_SIGN * after, hold):
-            return f"L is {turned:.0f} with {other}, and {own:.0f} as log and profile have it"
+        other = sign_conventions.tried(self.before, counted, self.nominal)
+        if sign_conventions.explains(other, own, after, hold, self._level):
+            return sign_conventions.sentence(other, own)
         if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:
             return ""
         return (
             f"The model is worse than one that keeps its velocities (L {own:.0f}, that one "
             f"{hold:.0f})"
         )
+
+    @property
+    def _level(self) -> float | None:
+        """Mean L of the nominal windows; None without any."""
+        if self.nominal is None:
+            return None
+        each = self.before.losses(self.nominal)
+        return float(np.minimum(np.nan_to_num(each, nan=RUNAWAY, posinf=RUNAWAY), RUNAWAY).mean())
 
     def _constants(self, decision: Decision) -> dict[str, np.ndarray]:
         return constants_of((n.cause for n in decision.named), self.trial.reference.setting)

@@ -62,6 +62,12 @@ class Posterior:
         return own >= thresholds.STATED or own == max(same.values(), default=0.0)
 
     @property
+    def none_of_all(self) -> float:
+        """Probability that nothing changed, as the ranking has it: causes that these data would
+        hardly show keep what they had before any data."""
+        return self.none / (1.0 + sum(self.hidden.values()))
+
+    @property
     def remainder(self) -> str | None:
         """The kind of remainder that is probable enough to be stated; none for `nominal`."""
         found = [k for k, p in self.kinds.items() if k != NOMINAL and p >= thresholds.STATED]

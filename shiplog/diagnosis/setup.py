@@ -27,6 +27,7 @@ class Setup:
 def trial_of(
     run: Run, nominal: Record | None, recorded: Record, own: Sequence[Cause],
     lacking: str = "", numbers: Mapping[str, np.ndarray] | None = None,
+    barred: Mapping[str, str] | None = None,
 ) -> Setup:  # fmt: skip
     """For a network, the ship's MMG is tested, fitted to the network's training voyages.
 
@@ -34,6 +35,7 @@ def trial_of(
     nominal   the voyages that the run was trained on, before these; None where there are none
     lacking   why the model cannot identify causes that change forces; empty where it can
     numbers   of causes found in these voyages, where no nominal campaign shows the discrepancy
+    barred    name → why a cause is not tested, in addition to what ship and model lack
     """
     setting = setting_of(run, nominal if nominal is not None else recorded, recorded)
     extension = run.extension
@@ -45,6 +47,9 @@ def trial_of(
     if lacking:
         untested |= {c.label: lacking for c in chosen if c.kind != "sensor"}
         chosen = [c for c in chosen if c.kind == "sensor"]
+    for cause in [c for c in chosen if c.name in (barred or {})]:
+        untested[cause.label] = (barred or {})[cause.name]
+        chosen.remove(cause)
     every: list[Cause] = [*held.values(), *(c for c in chosen if c.label not in held)]
     model, start = model_of(run, every, setting)
     if nominal is None:

@@ -86,6 +86,15 @@ WORSE_THAN_HOLDING = 2.0
 # was named, the sign is wrong and no cause is named.
 TURNED_SIGN = 0.5
 
+# Share of the error that the trial has more than the nominal voyages. Where causes explain the
+# trial about as well, a convention that takes away at least this much, with no number fitted, is
+# the likelier explanation.
+MOST_OF_EXCESS = 0.8
+
+# The same, from which no causes are searched for: what is left is no more than a model's error
+# varies from campaign to campaign.
+ALL_EXCESS = 0.95
+
 # Nats. A cause would show in these data from this expected log Bayes factor on: e^5 is 150 to 1.
 SHOWS_NATS = 5.0
 

@@ -54,11 +54,13 @@ class Decided:
 def decided(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
+    barred: Mapping[str, str] | None = None, before: Windows | None = None,
 ) -> Decided:  # fmt: skip
-    """As `setup.trial_of`; `cut` are the voyages' windows, and `reach` is called at each stage."""
+    """As `setup.trial_of`; `cut` are the voyages' windows, `before` those of the nominal voyages,
+    and `reach` is called at each stage."""
 
     def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
-        made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers)
+        made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers, barred)
         return _searched(run, made, reach, numbers)
 
     found = searched()
@@ -66,7 +68,9 @@ def decided(
         del found  # its products, before those of the next one
         found = searched(numbers)
     trial = found.trial
-    judge = None if cut is None else HeldOut(cut, trial_voyages.simulator(run, trial), trial)
+    judge = None
+    if cut is not None:
+        judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, nominal=before)
     reach("held-out voyages")
     decision, _, gain, refuted = refutation.judged(found.search, judge)
     return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)

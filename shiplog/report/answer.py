@@ -7,23 +7,32 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
-from shiplog.diagnosis import intermittent, next_manoeuvre, segments, thresholds
+from shiplog.diagnosis import (
+    contradicted_causes,
+    intermittent,
+    next_manoeuvre,
+    segments,
+    thresholds,
+)
 from shiplog.diagnosis.held_out import HeldOut
 from shiplog.diagnosis.interval import Interval
 from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
-from shiplog.models.causes import Cause
+from shiplog.models.causes import CATALOGUE, Cause
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.report.verdict_sentence import less, sentence
 from shiplog.simulation.error_reduction import Gain
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.training.load_model import Run
+from shiplog.voyages import contradicted as contradictions
 from shiplog.voyages import parts, timescale
+from shiplog.voyages.contradicted import Contradicted
 from shiplog.voyages.recording import Record
 
+OTHERWISE = "the profile reads these logs otherwise than those of the model"
 RECORDING = "diagnosis.rrd"  # in the folder of a diagnosis
 FEWEST_SEGMENTS = 4  # that a verdict needs
 # Families in which a model errs outside its training data; such an error resembles noise, too.
@@ -70,6 +79,7 @@ class Context:
     segment         length of the segments, s
     alone           share of the error that a second fit without any cause removes; None where the
                     model is not fitted again together with the causes
+    against         short stretches that contradict themselves
     """
 
     run: Run
@@ -84,6 +94,7 @@ class Context:
     wrong: Sequence[dict] = ()
     unseen: Sequence[Dependence] = ()
     alone: float | None = None
+    against: Sequence[Contradicted] = ()
 
 
 def verdict(
@@ -113,15 +124,23 @@ def verdict(
         times = intermittent.active_intervals(trial, decision.fit, decision.side_force)
         causes.append(verdicts.side_force_json(decision, times))
     word = _word(decision, bool(causes), held, context)
+    if context.against and word in ("unknown", "coverage"):
+        word = "undecided"
     structure = verdicts.structure_json(decision, context.run.profile.actuator_names)
     ranking = verdicts.probabilities_json(decision.ranking)
+    setting, catalogue = trial.reference.setting, trial.reference.model.causes
+    limits = verdicts.limits_json(decision, catalogue, setting)
+    hidden = verdicts.not_shown(limits)
     text = f"{none_named(context.lost)}."
     if not context.lost:
         text = sentence(
             word, causes, structure, found, decision.fit.noise_factor, context.alone,
             ranking, context.wrong, decision.one_of, decision.either, decision.why,
+            hidden,
         )  # fmt: skip
-    setting, catalogue = trial.reference.setting, trial.reference.model.causes
+    if context.against:  # first, whatever is said of the rest
+        open_ = "No cause explains the rest." if word == "undecided" else text
+        text = f"{contradictions.text(context.against)} {open_}"
     if word == "undecided":
         notes += tests_of_open(decision.ranking, catalogue)
     return Verdict(
@@ -140,7 +159,9 @@ def verdict(
         without="" if held is None else held.left_out,
         wrong=tuple(context.wrong),
         unseen=tuple(verdicts.unseen_json(row) for row in context.unseen),
-        limits=verdicts.limits_json(decision, catalogue, setting),
+        limits=limits,
+        hidden=hidden,
+        contradictions=tuple(one.as_json() for one in context.against),
         unavailable=unavailable,
         notes=tuple(notes),
     )
@@ -242,6 +263,45 @@ def made_of(run: Run, recorded: Record) -> str:
 
 def _on_its_own(run: Run, recorded: Record) -> bool:
     return bool(parts.overlapping(recorded.names, run.trained_on))
+
+
+def contradicted(
+    run: Run, recorded: Record, before_effect: bool, found: Sequence[Contradicted]
+) -> Verdict:
+    """The verdict while a gross contradiction stands: whatever a cause would be fitted to is
+    wrong, and none is tested."""
+    sentence = (
+        f"{contradictions.text(found)} No verdict: no cause is tested against such rows. Correct "
+        "the profile, ingest these logs again, and diagnose again."
+    )
+    why = contradicted_causes.every(contradictions.channels(found), run.profile)
+    return Verdict(
+        "undecided", sentence, run.name, before_effect, made_of(run, recorded),
+        unavailable=verdicts.rejected_json(why),
+        contradictions=tuple(one.as_json() for one in found),
+    )  # fmt: skip
+
+
+def other_convention(
+    run: Run, recorded: Record, before_effect: bool, why: str, found: Sequence[Contradicted] = ()
+) -> Verdict:
+    """The verdict where the profile reads these logs otherwise than those of the model: all that
+    the trial has more than the nominal voyages goes with one sign, place or unit.
+
+    why   as `sign_conventions.at_once` has it
+    """
+    said = f"{contradictions.text(found)} {none_named(why)}.".strip()
+    structure = {"family": "motion", "acts_on": [], "depends_on": list(verdicts.DEPENDS["motion"]),
+                 "evidence_nats": 0.0}  # fmt: skip
+    note = (
+        "No search for causes was made: correct the profile of these logs, ingest them again, and "
+        "diagnose again."
+    )
+    return Verdict(
+        "unknown", said, run.name, before_effect, made_of(run, recorded), structure=structure,
+        unavailable=verdicts.rejected_json({c.name: OTHERWISE for c in CATALOGUE}),
+        notes=(note,), contradictions=tuple(one.as_json() for one in found),
+    )  # fmt: skip
 
 
 def enough(recorded: Record) -> bool:

@@ -12,6 +12,8 @@ from shiplog.numbers import counted
 from shiplog.report import tables
 from shiplog.report.judgement import MEANING, Judgement, force_line, judge
 from shiplog.training.load_model import Run
+from shiplog.voyages import contradicted
+from shiplog.voyages.contradicted import Contradicted
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class EvaluatedRuns:
                squares on the first run's data
     inside     run, channel, share: of the samples inside the 90 % band, where a run has one
     forces     of the first physical run along the voyages, as Comparison has them; or None
+    contradicted   what was recorded on these voyages and contradicts itself
     """
 
     runs: tuple[Run, ...]
@@ -38,6 +41,7 @@ class EvaluatedRuns:
     baseline_losses: dict[str, np.ndarray]
     inside: pl.DataFrame
     forces: pl.DataFrame | None
+    contradicted: tuple[Contradicted, ...] = ()
 
     def answer(self, run: Run) -> dict:
         """The contract's JSON for one run, the share of samples inside its 90 % band, and the
@@ -48,11 +52,17 @@ class EvaluatedRuns:
         judged = self.judgement(run)
         return answer | {
             "too_short": list(self.too_short),
-            "sentence": judged.sentence,
+            "sentence": f"{self.warning} {judged.sentence}".strip(),
+            "contradictions": [one.as_json() for one in self.contradicted],
             "judgement": judged.as_json(),
             "band_90": dict(shares.iter_rows()),
             "winds": tables.winds(errors).drop("run").to_dicts(),
         }
+
+    @property
+    def warning(self) -> str:
+        """What comes first where the voyages cannot be right; else empty."""
+        return contradicted.text(self.contradicted)
 
     @property
     def means(self) -> dict[str, float]:
@@ -73,6 +83,7 @@ class EvaluatedRuns:
         errors = self.errors.filter(pl.col("run") == self.runs[0].name)
         count = counted(first["windows"], "window")
         lines = [
+            *([self.warning] if self.warning else []),
             *[self.judgement(run).sentence for run in self.runs],
             "",
             f"{MEANING} Means over {count} and over seeds:",

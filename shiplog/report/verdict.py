@@ -32,6 +32,8 @@ class Verdict:
     causes     in the contract's form
     sentence   the answer in words
     without    the data that the numbers of each held-out window were fitted without
+    contradictions  of the voyages' reports, while which no cause of their channels is named
+    hidden     how many causes could not have shown: `of`, `causes` (their number) and `names`
     """
 
     verdict: str
@@ -52,6 +54,8 @@ class Verdict:
     limits: tuple[dict, ...] = ()
     unavailable: tuple[dict, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    contradictions: tuple[dict, ...] = ()
+    hidden: dict | None = None
 
     def as_json(self) -> dict:
         found = {
@@ -69,6 +73,8 @@ class Verdict:
             "unavailable": list(self.unavailable),
             "explained": max(self.gain.reduction, 0.0) if self.gain and self.causes else 0.0,
             "notes": list(self.notes),
+            "contradictions": list(self.contradictions),
+            "not_shown": self.hidden or {"causes": 0, "of": 0, "names": []},
             "base": {"run": self.run, "before_effect": self.before_effect},
         }
         if self.structure is not None:
@@ -217,6 +223,18 @@ def limits_json(decision: Decision, causes: Sequence[Cause], setting: Setting) -
             key = next((k for k in WHICH if getattr(cause, k, "")), "channel")
             found[-1][key] = label.partition(":")[2]
     return tuple(sorted(found, key=lambda one: one["share"]))
+
+
+def not_shown(limits: Sequence[dict]) -> dict:
+    """How many of the causes in the table of smallest sizes could not have shown at any realistic
+    size: `causes` of `of`, with their `names`."""
+    names = [
+        f"{one['name']} ({which})" if (which := next((one[k] for k in WHICH if k in one), ""))
+        else one["name"]
+        for one in limits
+        if one["share"] >= HOPELESS
+    ]  # fmt: skip
+    return {"causes": len(names), "of": len(limits), "names": names}
 
 
 def unseen_json(row: Dependence) -> dict:

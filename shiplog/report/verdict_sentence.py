@@ -12,6 +12,7 @@ from shiplog.numbers import counted, percent
 from shiplog.simulation.error_reduction import Gain
 
 NOTED_NOISE = 1.15  # times the nominal process noise, from which "no change" mentions it
+MOST_HIDDEN = 8  # names of causes that could not have shown; the others are counted
 SAME_ERROR = 0.0005  # share of the error: a smaller change would be written as 0.0 %
 OTHER_EQUATIONS = (
     "Either the equations of the catalogue are not those of this ship, or something unknown acts."
@@ -30,6 +31,7 @@ def sentence(
     one_of: Sequence[str] = (),
     either: Sequence[str] = (),
     why: str = "",
+    hidden: dict | None = None,
 ) -> str:
     """The verdict in a few sentences: the share of the error that is explained, then the causes.
 
@@ -39,6 +41,7 @@ def sentence(
     one_of  names of which one acts in addition
     either  names that act, or else the structure does
     why     an undecided verdict is, as of `Decision`
+    hidden  how many causes could not have shown, as of `verdict.not_shown`
     """
     if verdict == "named":
         named = _named(causes, gain, alone, wrong)
@@ -58,7 +61,9 @@ def sentence(
                 "voyages do not confirm."
             )
         least = f"{thresholds.STATED:.0%}"
-        return f"Undecided: {' or '.join(text)}. No answer has a probability of {least}."
+        undecided = f"Undecided: {' or '.join(text)}. No answer has a probability of {least}."
+        first = ranking[0]["name"] if ranking else ""
+        return f"{undecided} {_hidden(hidden)}".strip() if first == "none" else undecided
     if verdict == "unknown":
         assert structure is not None
         return _unknown(structure, noise_factor)
@@ -69,12 +74,23 @@ def sentence(
     text = (
         "No change found: the errors are those that the model already has on its nominal voyages."
     )
+    text = f"{text} {_hidden(hidden)}".strip()
     if noise_factor < NOTED_NOISE:
         return text
     return (
         f"{text} Process noise is {noise_factor:.1f} times its nominal standard deviation: no more "
         "than it varies."
     )
+
+
+def _hidden(hidden: dict | None) -> str:
+    """How many causes no change can be said of, and which."""
+    if not hidden or not hidden["of"]:
+        return ""
+    if not hidden["causes"]:
+        return f"Each of {hidden['of']} causes could have shown."
+    which = listed((name.replace("_", " ") for name in hidden["names"]), most=MOST_HIDDEN)
+    return f"{hidden['causes']} of {hidden['of']} causes could not have shown: {which}."
 
 
 def _named(

@@ -8,10 +8,13 @@ from pathlib import Path
 
 import polars as pl
 
-from shiplog.exceptions import RunError, WindowError, listed
+from shiplog.exceptions import ProfileError, RunError, WindowError, listed
 from shiplog.profile import Profile
+from shiplog.profile_differences import differences
 from shiplog.training.run_config import Config
 from shiplog.training.run_folder import RunFolder
+from shiplog.voyages import contradicted
+from shiplog.voyages.contradicted import Contradicted
 from shiplog.voyages.store import Store
 
 
@@ -22,6 +25,18 @@ def refuse_other_ship(run: RunFolder, profile: Profile) -> None:
             f"{run.name} is of {run.profile.ship.name!r} with {listed(run.profile.columns)}; the "
             f"voyages are of {profile.ship.name!r} with {listed(profile.columns)}.",
             hint="diagnose a ship with a model of its own.",
+        )
+    refuse_other_profile(run, profile, "the voyages")
+
+
+def refuse_other_profile(run: RunFolder, profile: Profile, other: str) -> None:
+    """Raises RunError where `other`, a run or voyages, has another profile of the ship: other
+    sizes, places, lever arms or kinds of sensors."""
+    if differ := differences(run.profile, profile):
+        raise RunError(
+            f"{run.name} and {other} are of two profiles of {run.profile.ship.name!r}, which "
+            f"differ in {listed(differ)}.",
+            hint="ingest the logs again with the profile of the run, or train a run with theirs.",
         )
 
 
@@ -107,3 +122,20 @@ def refuse_none_trained(finished: Sized, failures: Mapping[str, str]) -> None:
             f"No set could be trained: {reasons}.",
             hint="mend that and give the same command again.",
         )
+
+
+def refuse_contradicted(found: Sequence[Contradicted], unchecked: bool) -> str:
+    """The warning with which a training on contradictory voyages begins; empty where there are
+    none. Raises ProfileError for them, unless `unchecked`.
+
+    found   contradictions of the voyages that it uses
+    """
+    if not found:
+        return ""
+    if not unchecked:
+        raise ProfileError(
+            contradicted.text(found),
+            hint="correct the profile and ingest these logs again, leave these voyages out with "
+            "--voyages, or train on them as they are with --unchecked.",
+        )
+    return f"Trained although sensors contradict each other. {contradicted.text(found)}"

@@ -23,6 +23,7 @@ from shiplog.voyages import (
     clocks,
     empty_course,
     fault_detection,
+    plausible_measures,
     plausible_values,
     required_topics,
     resampling,
@@ -76,6 +77,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     table, grid = aligned.table, aligned.grid
     estimates = tuple(sensor_consistency.estimates(table, profile))
     consistency = sensor_consistency.findings(estimates, table.height, profile)
+    consistency += plausible_measures.of_log(table, profile, consistency)
     usable_s, windows = usable(table, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,

@@ -36,6 +36,7 @@ from shiplog import files
 from shiplog.exceptions import StoreError, listed, nearest
 from shiplog.logs.health_report import CONTRACT, VoyageReport
 from shiplog.profile import Profile
+from shiplog.profile_differences import differences, readings
 from shiplog.profile_file import advice
 from shiplog.voyages import catalogue, one_hertz, parts
 from shiplog.voyages.catalogue import NEW, OLD, CatalogueEntry
@@ -175,7 +176,8 @@ class Store:
         return VoyageReport.from_json(catalogue.facts(self._folder(name))["report"])
 
     def profile(self, names: Iterable[str]) -> Profile:
-        """The profile the voyages were read through. Raises StoreError for two ships."""
+        """The profile the voyages were read through. Raises StoreError for two ships, and for two
+        profiles of one that differ in sizes, places or kinds of sensors."""
         chosen: Profile | None = None
         first = ""
         for name in names:
@@ -199,11 +201,18 @@ class Store:
                     f"{profile.ship.name!r} with {listed(profile.actuator_names)}.",
                     hint="choose voyages of one ship with --voyages.",
                 )
-            elif _mounted(profile) != _mounted(chosen):
+            elif differ := differences(chosen, profile):
+                raise StoreError(
+                    f"{first} and {name} were ingested with two profiles of {profile.ship.name!r}, "
+                    f"which differ in {listed(differ)}.",
+                    hint="ingest their logs again with one profile, or choose voyages of one with "
+                    "--voyages.",
+                )
+            elif other := readings(chosen, profile):
                 log.warning(
-                    "%s and %s were ingested with different lever arms or kinds of sensors; what "
-                    "is said of an antenna's place holds for %s. If nothing was moved, ingest them "
-                    "again with one profile", first, name, first,
+                    "%s and %s were read with another unit, sign or zero of %s from the same "
+                    "fields: if no instrument was changed, ingest them again with one profile",
+                    first, name, listed(other),
                 )  # fmt: skip
         if chosen is None:
             raise StoreError("No voyage was chosen.", hint="name some with --voyages.")
@@ -291,11 +300,6 @@ def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
     text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _mounted(profile: Profile) -> list[tuple]:
-    """Where each sensor is and what it measures, which ingest has made good."""
-    return [(name, one.kind, one.lever_arm_m) for name, one in profile.sensors.items()]
 
 
 def _refuse_beyond(name: str, lengths: dict[str, float]) -> None:

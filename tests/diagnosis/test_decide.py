@@ -110,6 +110,21 @@ def test_nothing(trial):
     assert found.verdict == "undecided"
 
 
+@pytest.mark.parametrize(("hidden", "expected"), [(0, "none"), (1, "none"), (2, "undecided")])
+def test_nothing_is_not_said_where_too_much_could_not_have_shown(trial, hidden, expected):
+    """Each of the causes that were only scanned keeps 0.05 of what nothing has: 0.99/1.05 is
+    0.94, and 0.99/1.1 is 0.9 at most."""
+    made = weighed.search(trial, {((), NOMINAL): 0.98, (DRAG, NOMINAL): 0.02})
+    score = made.table.found[(), NOMINAL].score
+    unseen = [c.label for c in made.table.catalogue if c.label != "drag"][:hidden]
+    for label in unseen:
+        made.scanned[label] = score + float(np.log(0.05))
+    found, posterior = decide(made)
+    assert found.verdict == expected
+    assert posterior.none_of_all == pytest.approx(0.98 / (1.0 + 0.049 * hidden), rel=1e-3)
+    assert found.ranking["none"] == pytest.approx(posterior.none_of_all)
+
+
 def test_noise_as_on_an_ordinary_day_is_nothing_and_its_factor_is_reported(trial):
     found = verdict(trial, {((), RAISED): 0.96, ((), NOMINAL): 0.04}, raised=1.3)
     assert (found.verdict, found.structure, found.fit.noise_factor) == ("none", None, 1.3)

@@ -120,3 +120,5 @@ def test_a_ship_in_tow_has_no_full_thrust_to_compare_with(sailed):
 def test_the_sentence_says_how_much_and_which_way():
     output = Stretch("v", 70.0, 85.0, "sway", -24.0, 600.0)
     assert output.sentence.startswith("A force of 24 N to port (600 % of full thrust) for 15 s")
+    assert "Units?" in output.sentence
+    assert "Units?" not in Stretch("v", 70.0, 85.0, "sway", -24.0, 299.0).sentence

@@ -127,3 +127,15 @@ def test_an_undecided_verdict_says_which_test_separates_its_candidates():
         "constant revolutions."
     ]
     assert not answer.tests_of_open({"rudder_lag": 0.95, "rudder_delay": 0.2}, causes)
+
+
+def test_what_is_not_detectable_in_the_table_is_what_could_not_have_shown():
+    limits = [
+        {"name": "thrust_loss", "actuator": "port", "share": 31.0, "parameters": {}},
+        {"name": "clock_offset", "channel": "wind", "share": 0.5, "parameters": {}},
+        {"name": "fouling", "share": 1e3, "parameters": {}},
+    ]
+    found = verdict.not_shown(limits)
+    assert found == {"causes": 2, "of": 3, "names": ["thrust_loss (port)", "fouling"]}
+    rows = page._limits(SimpleNamespace(limits=limits))
+    assert sum("not detectable" in row for row in rows) == 2

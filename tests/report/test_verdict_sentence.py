@@ -158,3 +158,22 @@ def test_a_force_of_unclear_pattern_may_be_a_thruster():
         "side force comes and goes: less clearly on or off than one device is, and more clearly "
         "than a force that varies."
     )
+
+
+def test_no_change_says_how_many_causes_could_not_have_shown():
+    names = ["fouling", "thrust_loss (port)", "payload"]
+    some = {"causes": 3, "of": 18, "names": names}
+    output = sentence("none", [], None, None, 1.0, hidden=some)
+    assert output.startswith("No change found")
+    assert output.endswith(
+        "3 of 18 causes could not have shown: fouling, payload, thrust loss (port)."
+    )
+    none = {"causes": 0, "of": 18, "names": []}
+    assert sentence("none", [], None, None, 1.0, hidden=none).endswith(
+        "Each of 18 causes could have shown."
+    )
+    ranking = [{"name": "none", "probability": 0.59}, {"name": "fouling", "probability": 0.06}]
+    output = sentence("undecided", [], None, None, 1.0, ranking=ranking, hidden=some)
+    assert output.startswith("Undecided: no change (59%)") and "3 of 18 causes" in output
+    likely = [{"name": "fouling", "probability": 0.59}, {"name": "none", "probability": 0.3}]
+    assert "could" not in sentence("undecided", [], None, None, 1.0, ranking=likely, hidden=some)

@@ -327,3 +327,35 @@ def test_each_window_is_one_observation_of_its_own_gradient():
     weighed = identify(Straight(), start, spread, data._replace(weight=np.full(COUNT, 2.0)))
     assert weighed.covariance == pytest.approx(twice.covariance, rel=1e-6)
     assert (np.diag(twice.covariance) < np.diag(one.covariance)).all()
+
+
+NAMES = (
+    "hull.y_vl", "hull.x_u", "propeller.c3", "wind.x1", "wind.y1", "thruster.port_ahead",
+    "thruster.port_astern", "thruster.starboard_ahead", "thruster.starboard_astern",
+)  # fmt: skip
+
+
+def limited(**values) -> list[str]:
+    named = {key.replace("__", "."): value for key, value in values.items()}
+    gone = {name for name, value in named.items() if abs(value) < 1e-6}
+    return identifiability.at_limits(named, gone, NAMES)
+
+
+def test_one_coefficient_at_its_limit_accuses_no_sensor():
+    (only,) = limited(hull__y_vl=0.00197)
+    assert only.startswith("hull.y_vl ran into the limit of its physical range at 0.00197")
+    assert "sensor" not in only
+
+
+def test_several_coefficients_at_their_limits_are_counted_and_grouped():
+    first, wind = limited(hull__y_vl=0.002, wind__x1=0.1, wind__y1=0.2)
+    assert first.startswith("3 of 9 coefficients ran into the limits of their physical ranges")
+    assert "hull.y_vl at 0.002" in first and "a sensor is wrong" in first
+    assert wind.startswith("2 of them are of the wind") and "mirrored" in wind
+
+
+def test_all_thrust_astern_that_vanished_asks_for_a_sign():
+    said = limited(thruster__port_astern=2.4e-14, thruster__starboard_astern=1e-13)
+    assert len(said) == 2 and said[1].startswith("All thrust astern vanished: is a `sign` turned")
+    one = limited(thruster__port_astern=2.4e-14)
+    assert not any("vanished" in sentence for sentence in one)

@@ -376,13 +376,26 @@ def test_a_store_that_is_a_file(tmp_path, voyage):
             call()
 
 
-def test_voyages_of_two_lever_arms_are_one_ship_and_are_said_to_be_two(tmp_path, voyage, caplog):
+def test_voyages_of_two_lever_arms_or_lengths_are_not_one_ship(tmp_path, voyage):
     store = Store(tmp_path / "store")
     store.add(voyage(name="one"))
     moved = sailing.PROFILE.replace("lever_arm_m = [0.7, -0.2]", "lever_arm_m = [0.0, 0.0]")
     store.add(voyage(name="two", text=moved))
-    assert store.profile(["one", "two"]).sensors.position.lever_arm_m == (0.7, -0.2)
-    assert "one and two were ingested with different lever arms" in caplog.text
+    with pytest.raises(StoreError, match=r"one and two were .* two profiles") as refused:
+        store.profile(["one", "two"])
+    assert "one profile" in refused.value.hint
+    assert store.profile(["two", "two"]).sensors.position.lever_arm_m == (0.0, 0.0)
+
+
+def test_a_field_that_two_voyages_read_otherwise_is_said(tmp_path, voyage, caplog):
+    """An instrument may have been changed between them: it is no refusal."""
+    store = Store(tmp_path / "store")
+    store.add(voyage(name="one"))
+    store.add(voyage(name="two", text=sailing.PROFILE.replace("sign = -1.0", "sign = 1.0")))
+    store.profile(["one", "two"])
+    assert (
+        "one and two were read with another unit, sign or zero of actuators.rudder" in caplog.text
+    )
     caplog.clear()
     store.profile(["two", "two"])
     assert not caplog.text
