@@ -20,8 +20,9 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import clocks, fault_detection, resampling
 from shiplog.voyages import one_hertz as tables
+from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
@@ -65,8 +66,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
     aligned = _aligned(reading, profile)
     table, grid = aligned.table, aligned.grid
-    estimates = tuple(sensor_consistency.estimates(table, profile))
-    consistency = sensor_consistency.findings(estimates, table.height, profile)
+    compared = compare(table, profile)
     usable_s, windows = usable(table, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,
@@ -74,12 +74,15 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
+        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *compared.findings),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(_instrument(*one) for one in aligned.samples if len(one[1].time) > 1),
+        not_compared=compared.not_compared,
     )
-    return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
+    return Voyage(
+        report.name, profile, reading.contents, table, report, aligned.datum, compared.estimates
+    )
 
 
 def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
@@ -88,12 +91,9 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
     return tables.usable(tables.resample([named], profile.columns, profile.circular))
 
 
-def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
+def consistency_of(reading: Reading, profile: Profile) -> Comparison:
     """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
-    table = _aligned(reading, profile).table
-    return sensor_consistency.findings(
-        sensor_consistency.estimates(table, profile), table.height, profile
-    )
+    return compare(_aligned(reading, profile).table, profile)
 
 
 @dataclass(frozen=True)
