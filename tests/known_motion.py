@@ -192,3 +192,37 @@ def table(raw: dict, p: Profile) -> pl.DataFrame:
     columns = {"x0": x, "surge": u, "y0": y, "sway": v, "heading": psi, "yaw_rate": r}
     columns |= {name: raw[name] for name in p.actuator_names}
     return pl.DataFrame({"time": 0.1 * np.arange(n), **columns, "quality": np.zeros(n, np.int32)})
+
+
+def steered(seconds, helm, shaft, length=20.0, speed=4.0, seed=1, waves=0.0, current=(0.0, 0.0),
+            heading=0.7, wind=0.0) -> Sailed:  # fmt: skip
+    """A ship that answers: T r' = K δ - r and u' = a n|n| - b u|u| with n = 5 for `speed`, waves as
+    a yaw of `waves` [deg/s] and gusts as sway of `wind` [m/s]; helm and shaft are functions of
+    (time, heading, rate, surge) so that an autopilot can be one of them. The rudder needs flow: it
+    turns the stern the other way when the ship goes astern, unless the propeller blows on it."""
+    dt, g = 0.05, np.random.default_rng(seed)
+    count = round(seconds / dt) + 1
+    lag, gain = length / speed, 0.9 * speed / length
+    psi, r, u = heading, 0.0, 0.0 if shaft(0.0, heading, 0.0, 0.0) == 0 else speed
+    rows = np.zeros((count, 5))
+    swell, gust = 0.0, 0.0
+    for i in range(count):
+        t = i * dt
+        delta, n = helm(t, psi, r, u), shaft(t, psi, r, u)
+        rows[i] = psi, r + swell, u, delta, n
+        flow = (u * abs(u) + 0.5 * max(n, 0.0) ** 2 * (speed / 5.0) ** 2) / (1.5 * speed**2)
+        r += dt * (gain * delta * flow - r) / lag
+        u += dt * (n * abs(n) / 25.0 * speed**2 - u * abs(u)) * 0.5 / length
+        swell = math.radians(waves) * math.sin(math.tau * t / 7.0 + math.sin(0.13 * t))
+        gust += dt * (-gust / 20.0) + math.sqrt(dt) * 0.2 * wind * g.normal()
+        psi += dt * (r + swell)
+        rows[i, 4] = n
+    pick = rows[::2]
+    t = 0.1 * np.arange(len(pick))
+    psi, rate, u = pick[:, 0], pick[:, 1], pick[:, 2]
+    v = -0.2 * length * rate + wind * np.sin(psi - 1.0)
+    c, s = np.cos(psi), np.sin(psi)
+    vn, ve = c * u - s * v + current[0], s * u + c * v + current[1]
+    over = Sailed(t, psi, rate, c * vn + s * ve, c * ve - s * vn, integral(vn, 0.1),
+                  integral(ve, 0.1), {"rudder": pick[:, 3], "propeller": pick[:, 4]})  # fmt: skip
+    return over

@@ -17,7 +17,7 @@ from shiplog.profile import Profile
 from shiplog.voyages import contradictions_drive as drive
 from shiplog.voyages import contradictions_places as places
 from shiplog.voyages import contradictions_turning as turning
-from shiplog.voyages.contradictions_actuators import Driven
+from shiplog.voyages.contradictions_actuators import ASTERN, Driven
 from shiplog.voyages.contradictions_evidence import Evidence, gather
 from shiplog.voyages.contradictions_track import Track, track
 
@@ -113,7 +113,7 @@ def _heading(t: Track, e: Evidence) -> Iterator[NotCompared]:
 
 
 def _actuators(t: Track, counted: list[Driven]) -> Iterator[NotCompared]:
-    sure = {one.name for one in counted if one.along or one.against}
+    sure = {o.name for o in counted if o.direction != ASTERN and (o.along or o.against)}
     left = [a.name for a in t.profile.actuators if a.name not in sure and a.kind != "azimuth"]
     if left:
         names = ", ".join(left)

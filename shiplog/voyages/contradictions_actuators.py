@@ -25,6 +25,9 @@ from shiplog.voyages.contradictions_regression import regress
 from shiplog.voyages.contradictions_track import ROWS, Track, Windows
 
 LENGTHS_S = (2, 4, 8, 16, 32, 64)
+ASTERN = "yaw rate astern"  # of a rudder, where the ship only goes astern
+SHIP_TIMES = 0.8  # L/U: a rudder is counted over no shorter windows, in which waves turn the ship
+LEAST_TURN_RAD = math.radians(15.0)  # range of headings, and less: it keeps its course
 FEWEST = 14  # windows in which an actuator works
 SURE = 3.0  # half 90 % intervals that a coefficient is from zero: five standard deviations
 PARTLY = 0.2  # least share of the change that an actuator explains by itself
@@ -42,7 +45,7 @@ class Driven:
     explains alone."""
 
     name: str
-    direction: str  # surge, sway or yaw rate
+    direction: str  # surge, sway, yaw rate, or ASTERN
     alone: float
     together: float
     total: float
@@ -119,10 +122,16 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
     found: list[Driven] = []
     rudders = _rudder_forces(t)
     if rudders:
-        steers = body.real > AHEAD * speed
+        small = np.ones(len(speed), bool)
         for name in rudders:
-            steers &= np.abs(t.driven[name]) < LARGEST_RUDDER
-        found += _counted(t, "yaw rate", yaw_rate, rudders, steers)
+            small &= np.abs(t.driven[name]) < LARGEST_RUDDER
+        ahead, astern = body.real > AHEAD * speed, body.real < -AHEAD * speed
+        least = SHIP_TIMES * length / max(float(np.median(speed)), 1e-6)
+        if np.ptp(np.quantile(t.turned[t.usable], (0.05, 0.95))) > LEAST_TURN_RAD:
+            mostly = (ahead & small).sum() >= (astern & small).sum()
+            where = (ahead if mostly else astern) & small
+            way = "yaw rate" if mostly else ASTERN
+            found += _counted(t, way, yaw_rate, rudders, where, least)
     if thrusts:
         everywhere = np.ones(len(speed), bool)
         ahead = {name: part[0] for name, part in thrusts.items() if _acts(part[0], thrusts)}
@@ -147,9 +156,11 @@ def _acts(part: np.ndarray, thrusts: dict, share: float = 0.2) -> bool:
 
 
 def _counted(
-    t: Track, direction: str, moved: np.ndarray, forces: dict[str, np.ndarray], where: np.ndarray
-) -> Iterator[Driven]:
-    """Each force against the change of one velocity, at the length of window that tells most."""
+    t: Track, direction: str, moved: np.ndarray, forces: dict[str, np.ndarray], where: np.ndarray,
+    least: float = 0.0,
+) -> Iterator[Driven]:  # fmt: skip
+    """Each force against the change of one velocity, at the length of window that tells most, of
+    those from `least` [s] on."""
     if not forces:
         return
     known = t.measured & where
@@ -160,6 +171,8 @@ def _counted(
     velocity = t.binned(moved)
     best: dict[str, Driven] = {}
     for seconds in LENGTHS_S:
+        if seconds < least and seconds != LENGTHS_S[-1]:
+            continue
         w = t.windows(seconds)
         rows = inside[(w.last + 1) * ROWS] - inside[w.first * ROWS]
         w = w.chosen(rows >= 0.9 * ROWS * (seconds + 1))

@@ -13,7 +13,7 @@ import numpy as np
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Actuator
 from shiplog.voyages import contradictions_actuators as actuators
-from shiplog.voyages.contradictions_actuators import Driven
+from shiplog.voyages.contradictions_actuators import ASTERN, Driven
 from shiplog.voyages.contradictions_evidence import ALONG_DEG, SPREAD, Evidence, Way, of_voyage
 from shiplog.voyages.contradictions_track import Track
 from shiplog.voyages.contradictions_words import offset_line, sign_line
@@ -35,6 +35,8 @@ def driven(t: Track, e: Evidence) -> list[Driven]:
 
 def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding]:
     """One a fault: of an actuator's sign, of two exchanged, or of the heading's zero."""
+    if e.faulty & {"heading", "velocity", "position"}:
+        return
     astern = _bow(t, e, found)
     if astern is not None:
         yield astern
@@ -48,16 +50,14 @@ def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding
         return
     for actuator in t.profile.actuators:
         ways = by_name.get(actuator.name, [])
-        against = [one for one in ways if one.against]
+        against = [one for one in ways if one.against and one.direction != ASTERN]
         if not against or any(one.along for one in ways):
             continue
         yield _sign(t, e, actuator, against)
 
 
 def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> Finding:
-    sign = actuator.sign if isinstance(actuator.sign, float) else actuator.sign[0]
-    line = f'sign = {-sign:.4g} on the actuator "{actuator.name}"'.replace("= -1 ", "= -1.0 ")
-    line = line.replace("= 1 ", "= 1.0 ")
+    line = _sign_line(actuator)
     if actuator.kind == "rudder":
         what = f"The bow turns to port where the rudder {actuator.name} is positive"
         sure = _sense(t, e)
@@ -105,50 +105,97 @@ def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
 
 
 def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
-    """A ship that is driven ahead and goes astern or abeam for the whole voyage, whatever its
-    heading: the heading has another zero. Of a ship that can go sideways nothing is said."""
+    """A ship that is driven ahead and goes astern or abeam for the whole voyage, or is driven
+    astern and goes ahead. Of a ship that can go sideways nothing is said, nor of one that a stream
+    may set."""
     way = e.by_position or e.by_velocity
-    if way is None or way.how != "as it is" or actuators.can_push_sideways(t):
-        return None
-    if abs(way.angle) < ALONG_DEG + way.half or way.half > 15.0 or way.spread < SPREAD:
-        return None
     thrusts = actuators.thrust(t)
-    if not thrusts:
+    if way is None or way.how != "as it is" or way.drift or not thrusts:
         return None
-    ahead = np.nan_to_num(sum(part[0] for part in thrusts.values()))
-    speed = np.abs(t.velocity)
-    sails = speed > 0.5 * float(np.quantile(speed, 0.9))
-    most = float(np.quantile(np.abs(ahead), 0.95))
-    share = float(np.mean(ahead[sails] > DRIVES * most)) if most > 0 and sails.any() else 0.0
-    steered = [one for one in found if one.direction == "yaw rate" and one.along]
+    if way.half > 15.0 or actuators.can_push_sideways(t):
+        return None
+    share = _driven_share(t, [part[0] for part in thrusts.values()])
+    if way.ahead and share < -MOSTLY:
+        return _driven_astern(t, way)
     if share < MOSTLY:
         return None
-    return _turned_bow(t, way, bool(steered))
+    if abs(way.angle) > 180.0 - ALONG_DEG:
+        return _reversed(t, way, found)
+    if BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1] and way.spread > SPREAD:
+        return _abeam(t, way)
+    return None
 
 
-def _turned_bow(t: Track, way: Way, steered: bool) -> Finding | None:
-    reverse = abs(way.angle) > 180.0 - ALONG_DEG
-    beam = BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1]
-    if not (reverse or beam):
-        return None
-    p = t.profile
-    shown = 180.0 if reverse else -way.angle
-    line = offset_line(p, "heading", round(shown)) if p.sensors.kind("heading") == "angle" else (
-        "the frame and the `kind` of [sensors.heading]"
-    )  # fmt: skip
-    propellers = [a.name for a in p.actuators if a.kind in ("propeller", "thruster")]
-    signs = " and ".join(f'"{name}"' for name in propellers)
-    if reverse:
-        or_else = f", or the sign of {signs}"
-        what = "goes astern"
-    else:
-        or_else, what = "", "goes sideways"
-    if t.body:
-        line = f"{line}, with {sign_line(p, 'velocity')}" if reverse else line
+def _driven_share(t: Track, forces: list[np.ndarray]) -> float:
+    """Of the time under way, how much the ship is driven ahead; negative for astern."""
+    force = np.nan_to_num(sum(forces))
+    speed = np.abs(t.velocity)
+    sails = speed > 0.5 * float(np.quantile(speed, 0.9))
+    most = float(np.quantile(np.abs(force), 0.95))
+    if most <= 0.0 or not sails.any():
+        return 0.0
+    ahead = float(np.mean(force[sails] > DRIVES * most))
+    astern = float(np.mean(force[sails] < -DRIVES * most))
+    return ahead if ahead > astern else -astern
+
+
+def _propellers(t: Track) -> list[Actuator]:
+    return [a for a in t.profile.actuators if a.kind in ("propeller", "thruster")]
+
+
+def _heading_line(t: Track, zero: float) -> str:
+    if t.profile.sensors.kind("heading") != "angle":
+        return "the frame and the `kind` of [sensors.heading]"
+    return offset_line(t.profile, "heading", round(zero))
+
+
+def _driven_astern(t: Track, way: Way) -> Finding:
+    one = _propellers(t)[0]
     sentence = (
-        f"The ship is driven ahead and {what} by its heading, {abs(way.angle):.0f} deg off the bow "
-        f"(within {way.half:.0f}) on all courses. Change: {line}{or_else}."
+        f"The ship is driven astern by {_names(t)} and goes ahead, within {way.half:.0f} deg of "
+        f"the bow, nearly all the time. Change: {_sign_line(one)}, or the heading by 180 deg."
+    )
+    return of_voyage(t, one.name, (-1.0, None, None), "1", "sign", sentence)
+
+
+def _names(t: Track) -> str:
+    return " and ".join(one.name for one in _propellers(t))
+
+
+def _reversed(t: Track, way: Way, found: Sequence[Driven]) -> Finding:
+    """Ahead by the propeller and astern by the heading: a rudder that steers as it does ahead says
+    that it is the heading."""
+    steered = any(one.direction == ASTERN and one.along for one in found)
+    lines = _heading_line(t, 180.0)
+    if t.body:
+        lines += f" with {sign_line(t.profile, 'velocity')}"
+    who = (
+        "It is the heading: the rudder steers as it does on a ship that goes ahead. Change: "
+        if steered else f"It is the heading, or the sign of {_names(t)}. Change: "
+    )  # fmt: skip
+    if not steered:
+        lines += f" or {_sign_line(_propellers(t)[0])}"
+    sentence = (
+        f"The ship is driven ahead by {_names(t)} and goes astern by its heading, "
+        f"{abs(way.angle):.0f} deg off the bow (within {way.half:.0f}), nearly all the time. "
+        f"{who}{lines}."
+    )
+    interval = 180.0, 180.0 - way.half, 180.0 + way.half
+    return of_voyage(t, "heading", interval, "deg", "sign", sentence)
+
+
+def _abeam(t: Track, way: Way) -> Finding:
+    shown = -way.angle
+    sentence = (
+        f"The ship is driven ahead by {_names(t)} and goes sideways by its heading, "
+        f"{abs(way.angle):.0f} deg off the bow (within {way.half:.0f}) on all courses. It is the "
+        f"heading, counted from another axis. Change: {_heading_line(t, shown)}."
     )
     interval = shown, shown - way.half, shown + way.half
-    reason = "sign" if reverse else "frame"
-    return of_voyage(t, "heading", interval, "deg", reason, sentence)
+    return of_voyage(t, "heading", interval, "deg", "frame", sentence)
+
+
+def _sign_line(actuator: Actuator) -> str:
+    sign = actuator.sign if isinstance(actuator.sign, float) else actuator.sign[0]
+    text = f"{-sign:.1f}" if abs(sign) == 1.0 else f"{-sign:g}"
+    return f'sign = {text} on the actuator "{actuator.name}"'

@@ -13,11 +13,13 @@ from shiplog.voyages.contradictions_track import STEP_S, Track, degrees
 from shiplog.voyages.contradictions_words import offset_line, sign_line, words
 
 JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more, and they do not
-BETTER, CLEARLY = 3.0, 0.05  # another formula leaves so many times less, and so much less
+BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
+LEAST_MIRRORED = 0.1  # share that the heading as it is leaves, and less: it is not another one
 ALONG_DEG = 45.0  # from the bow: the ship goes ahead
 NEAR_DEG = 8.0  # of 90 or 180 deg
 SURE_DEG = 12.0  # half interval of an angle that says anything
+FASTEST_CURRENT = 3.0  # m/s: what a stream may do, and a log through the water not see
 SPREAD = 0.15  # of the directions sailed: no straight line
 BENT = (0.4, 2.5)  # the way's turning over the heading's: they turn together
 NONE_OF_TWO = "no third channel tells which of the two"
@@ -32,6 +34,7 @@ class Way:
     how     "as it is", "mirrored", or "in radians": the formula that joins them
     angle   deg, of the way from the heading so read, to starboard; half: of its 90 % interval
     sense   whether to which side the heading turns is known: the mirrored one fits worse
+    drift   whether a current explains the way as well, with the heading as it is
     """
 
     how: str
@@ -41,6 +44,7 @@ class Way:
     spread: float
     left: float
     windows: int
+    drift: bool
 
     @property
     def ahead(self) -> bool:
@@ -159,17 +163,20 @@ def gather(t: Track) -> Evidence:
 
 def _way(j: Joined | None) -> Way | None:
     """None where no formula joins heading and way, or several do: on one straight course."""
-    if j is None or "as it is" not in j.fits:
+    if j is None or "as it is" not in j.fits or "current" not in j.extra:
         return None
     left = j.left
     best = min(left, key=lambda name: left[name])
     if left["as it is"] < BETTER * left[best]:
         best = "as it is"
-    if left[best] > JOINED or (best != "as it is" and left["as it is"] < 2.0 * CLEARLY):
+    if left[best] > JOINED or (best != "as it is" and left["as it is"] < LEAST_MIRRORED):
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
     _, angle, _, half = j.fits[best].polar()
-    return Way(best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows)
+    drift = j.extra["current"] < FASTEST_CURRENT and (
+        j.extra["drifting"] < left[best] * (BETTER if best != "as it is" else 1.0 / BETTER)
+    )
+    return Way(best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift)
 
 
 def angle_heading(profile: Profile) -> bool:

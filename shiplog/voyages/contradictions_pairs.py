@@ -42,6 +42,8 @@ BIAS_RADPS, BIAS_SHARE = 0.3 * DEGREE, 0.1  # prior of a gyro's bias: rad/s, and
 RAD = 1.0 / DEGREE  # 57.3
 TOGETHER = 0.7  # correlation from which the way is said to turn with the yaw rate
 MOST_LAG_S = 120  # longest delay that is looked for
+FIT_LAG_S = 5.0  # shorter ones are for the fit
+ALIKE, LESS_ALIKE = 0.85, 4.0  # at a delay, and how many times less they are alike at none
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,11 @@ def heading_and_way(t: Track, position: bool) -> Joined | None:
         fit = complex_fit(t, w, way, speed * axis, False, 0.0)
         if fit is not None:
             fits[name] = fit
-    return Joined(fits, len(way), w.seconds, _spread(way))
+    extra = {}
+    drifting = complex_fit(t, w, way, speed * t.ahead, True, 0.0)
+    if drifting is not None:
+        extra = {"drifting": drifting.left, "current": float(np.hypot(*drifting.theta[-2:]))}
+    return Joined(fits, len(way), w.seconds, _spread(way), extra=extra)
 
 
 def bend(t: Track, turned_by: np.ndarray) -> tuple[float, float, float] | None:
@@ -225,6 +231,11 @@ def heading_and_yaw_rate(t: Track) -> Joined | None:
         fits, len(y), w.seconds,
         extra={"correlation": joint, "by heading": both[0], "by rate": both[1]},
     )  # fmt: skip
+
+
+def is_late(late: float, then: float, now: float) -> bool:
+    """Whether `lag` found a delay, and one that no fit looks for."""
+    return abs(late) > FIT_LAG_S and then > ALIKE and 1.0 - now > LESS_ALIKE * (1.0 - then)
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> float:

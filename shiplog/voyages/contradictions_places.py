@@ -15,6 +15,7 @@ from shiplog.voyages.contradictions_evidence import (
     APART,
     BETTER,
     CLEARLY,
+    FASTEST_CURRENT,
     GUARD,
     JOINED,
     NEAR_DEG,
@@ -42,9 +43,9 @@ KNOWN_RATIO, KNOWN_HALF = math.log(1.1), 0.02  # of two known units, where the r
 ANGLE_DEG = 3.0  # between two that are both over ground
 BODY_ANGLE_DEG = 20.0  # between position and velocity in body axes: less is a heading offset
 MAGNETIC_DEG = 30.0  # variations at sea are smaller, nearly everywhere
-FASTEST_CURRENT = 3.0  # m/s: what a log through the water may be wrong by
 STANDS = 0.02  # of the other's speed: it does not move
-LATE, PUNCTUAL = 0.85, 0.6  # how alike they are at the delay that suits best, and at none
+FOLLOWS = 0.15  # unexplained share, and more: a delay is looked for
+NOTHING = 1e-4  # |z|, and less: the position does not move at all
 TWO = ("velocity", "position")
 HEADINGS = ("heading mirrored", "heading in radians")  # formulas that a faulty heading excuses
 
@@ -78,6 +79,8 @@ def position_and_velocity(e: Evidence) -> Iterator[Finding]:
         yield _other_formula(e, j, best)
         if best != "swapped":
             yield from _ratio(e, j.fits[best])
+    elif as_is.left > FOLLOWS and (late := _late(e)) is not None:
+        yield late
     elif as_is.left < JOINED:
         yield from _ratio(e, as_is)
         yield from _angle(e, as_is)
@@ -88,10 +91,13 @@ def position_and_velocity(e: Evidence) -> Iterator[Finding]:
 def _stands(e: Evidence, j: Joined, slow: float) -> Finding | None:
     """One moves and the other not at all, or too little to say by how much."""
     as_is = j.fits.get("as it is")
-    if as_is is not None and as_is.left < JOINED and as_is.polar()[2] < 0.3:
-        return None
+    if as_is is not None and as_is.left < JOINED:
+        size, _, half, _ = as_is.polar()
+        if half < 0.3 and NOTHING < size < 1.0 / NOTHING:
+            return None
     of_position, of_velocity = j.speeds
-    least = FASTEST_CURRENT if e.t.body else 2.0 * slow
+    constant = _constant(e.t.velocity) or _constant(e.t.place)  # no instrument is so quiet
+    least = FASTEST_CURRENT if e.t.body and not constant else 2.0 * slow
     if of_position > least and of_velocity < STANDS * of_position:
         still, moves, ratio = "velocity", "position", of_position / max(of_velocity, 1e-3)
     elif of_velocity > least and of_position < STANDS * of_velocity:
@@ -107,8 +113,15 @@ def _stands(e: Evidence, j: Joined, slow: float) -> Finding | None:
     return e.finding(still, (bound, bound, None), "1", "none known", sentence)
 
 
+def _constant(values: np.ndarray) -> bool:
+    """To a micrometre, or a micrometre a second."""
+    return float(np.max(np.abs(values - values[0]))) < 1e-6
+
+
 def _ratio(e: Evidence, fit: Regression) -> Iterator[Finding]:
     size, _, half, _ = fit.polar()
+    if not NOTHING < size < 1.0 / NOTHING:
+        return
     log, p = -math.log(size), e.profile  # velocity over position
     ratio, low, high = (math.exp(one) for one in (log, log - half, log + half))
     of_velocity = other_unit(p, "velocity", ratio, low, high)
@@ -298,8 +311,6 @@ def _components(e: Evidence, turned: float) -> Finding:
 
 
 def _nothing_in_common(e: Evidence, j: Joined) -> Finding:
-    if (late := _late(e)) is not None:
-        return late
     culprit, why = e.position_or_velocity(mirrored=True)
     p, lines = e.profile, []
     course = p.sensors.kind("velocity") == "sog_cog"
@@ -321,7 +332,7 @@ def _nothing_in_common(e: Evidence, j: Joined) -> Finding:
 
 def _late(e: Evidence) -> Finding | None:
     late, then, now = pairs.lag(np.diff(e.t.place), np.diff(e.t.sailed), e.t.usable)
-    if then < LATE or now > PUNCTUAL:
+    if not pairs.is_late(late, then, now):
         return None
     e.faulty |= set(TWO)
     when = "after" if late > 0 else "before"

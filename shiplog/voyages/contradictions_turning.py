@@ -9,11 +9,11 @@ import numpy as np
 
 from shiplog.logs.health_report import Finding
 from shiplog.voyages import contradictions_pairs as pairs
+from shiplog.voyages.contradictions_actuators import can_push_sideways
 from shiplog.voyages.contradictions_evidence import (
     GUARD,
     JOINED,
     NEAR_DEG,
-    SPREAD,
     Evidence,
     angle_heading,
     ending,
@@ -33,7 +33,6 @@ from shiplog.voyages.contradictions_words import (
 RATE_RATIO = math.log(1.4)  # of yaw rate and heading; nearer ratios are for the fit
 TURNING, UNRELATED = 0.6, 0.3  # correlation of yaw rate and heading: together, and not at all
 STANDS = 0.3  # slope of one that stands still over the other, at most
-LATE, PUNCTUAL = 0.85, 0.6  # correlation at the delay that suits best, and at none
 DRIFTS_RAD = math.radians(30.0)  # a gyro that drifts may add up to less in a voyage
 TWO = ("yaw_rate", "heading")
 STILL_S, STILL_WAY_DEG = 60.0, 25.0  # a heading that never changes for so long, while the way does
@@ -50,7 +49,9 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
     by_heading, by_rate = j.extra["by heading"], j.extra["by rate"]
     together = j.extra["correlation"]
     few, enough = pairs.FEWEST / 3, 0.7 * pairs.FEWEST
-    if abs(together) >= TURNING:
+    if (late := _late(e)) is not None:
+        yield late
+    elif abs(together) >= TURNING:
         value, low, high = _hull(rate, back)
         if low <= 0 <= high:
             return
@@ -67,12 +68,8 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
         most = max(abs(one) for one in rate.interval(0)[1:])
         if most < STANDS:
             yield _stands(e, "yaw_rate", "heading", 1.0 / max(most, 1e-3))
-    elif min(by_heading, by_rate) >= enough:
-        late = _late(e)
-        if late is not None:
-            yield late
-        elif abs(together) < UNRELATED:
-            yield _unrelated(e, together)
+    elif min(by_heading, by_rate) >= enough and abs(together) < UNRELATED:
+        yield _unrelated(e, together)
 
 
 def _hull(rate: Regression, back: Regression) -> tuple[float, float, float]:
@@ -147,7 +144,7 @@ def _stands(e: Evidence, still: str, moves: str, more: float) -> Finding:
 
 def _late(e: Evidence) -> Finding | None:
     late, then, now = pairs.lag(np.diff(e.t.turned), np.diff(e.t.turned_by_rate), e.t.usable)
-    if then < LATE or now > PUNCTUAL:
+    if not pairs.is_late(late, then, now):
         return None
     e.faulty |= set(TWO)
     when = "after" if late > 0 else "before"
@@ -185,7 +182,9 @@ def heading_and_way(e: Evidence) -> Iterator[Finding]:
     if len(wrong) < needed or len(wrong) < len(e.ways):
         return
     way = max(wrong, key=lambda one: one.left)
-    if way.windows < MIRRORED_WINDOWS or way.left > MIRRORED_LEFT or way.spread < SPREAD:
+    if way.windows < MIRRORED_WINDOWS or way.left > MIRRORED_LEFT or way.drift:
+        return
+    if can_push_sideways(e.t):
         return
     if e.t.body and _mirrored_position(e):
         return

@@ -103,8 +103,8 @@ def offset_line(profile: Profile, name: str, degrees: float, index: int | None =
 
 
 def times(value: float) -> str:
-    """A ratio in three digits."""
-    return f"{value:.3g}" if 0.01 <= value < 1000 else f"{value:.2g}"
+    """A ratio in four digits."""
+    return f"{value:.4g}" if value < 1000 else f"{value:.0f}"
 
 
 def words(name: str) -> str:
