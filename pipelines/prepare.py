@@ -12,7 +12,7 @@ from shiplog import profile_file as profiles
 from shiplog.exceptions import ShiplogError
 from shiplog.logs import reading_limits
 from shiplog.logs.check import expected_s, health_of
-from shiplog.logs.health_report import Finding, VoyageReport
+from shiplog.logs.health_report import Finding, NotCompared, VoyageReport
 from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
@@ -122,12 +122,14 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
         why = error
     reading = read(path, profile.wanted() if profile else {}, others=True)
     report = health_of(reading)
-    consistency: list[Finding] = []
+    findings: tuple[Finding, ...] = ()
+    not_compared: tuple[NotCompared, ...] = ()
     try:
         if profile is not None:
-            consistency = consistency_of(reading, profile)
+            compared = consistency_of(reading, profile)
+            findings, not_compared = compared.findings, compared.not_compared
     except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
     if why is not None:
         log.info("%s: sensors not held against each other: %s", path.stem, why.message)
-    return replace(report, findings=(*report.findings, *consistency))
+    return replace(report, findings=(*report.findings, *findings), not_compared=not_compared)

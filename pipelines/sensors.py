@@ -7,6 +7,7 @@ from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 
+from shiplog.exceptions import listed
 from shiplog.logs.health_report import CONTRACT
 from shiplog.profile import Profile
 from shiplog.report import tables
@@ -48,10 +49,25 @@ def sensors_command(store_path: Path, voyages: Sequence[str]) -> Answer:
             for e in one.estimates
         ]  # fmt: skip
         head = ("kind", "channel", "value (90 % interval)", "unit", "reported", "deviating voyages")
-        text += [tables.table(head, rows), ""]
+        for name, contradicting in one.contradicting.items():
+            text += [f"- contradiction in {name}: {f.sentence}" for f in contradicting]
+        text += [""] if one.contradicting else []
+        text += [tables.table(head, rows), ""] if rows else ["no two sensors can be fitted", ""]
         text += [f"- {finding.sentence}" for finding in one.findings(profile)] + [""]
+        text += _not_compared(one)
         content.append(_json(one, profile))
     return Answer("\n".join(text).rstrip(), {"contract": CONTRACT, "campaigns": content})
+
+
+def _not_compared(one: SensorCampaign) -> list[str]:
+    """A line for each comparison that could not be made, and of which voyages, if not of all."""
+    lines = []
+    for left, names in one.incomparable.items():
+        where = "" if len(names) == len(one.voyages) else f" ({listed(names)})"
+        lines.append(
+            f"- not compared: {left.what}{where}: {left.reason}. It would take: {left.would_show}."
+        )
+    return [*lines, ""] if lines else []
 
 
 def _cell(e: Estimate) -> str:
@@ -67,6 +83,13 @@ def _json(one: SensorCampaign, profile: Profile) -> dict:
             for e in one.estimates
         ],
         "findings": [asdict(finding) for finding in one.findings(profile)],
+        "contradictions": [
+            {"voyage": name, **asdict(finding)}
+            for name, found in one.contradicting.items() for finding in found
+        ],
+        "not_compared": [
+            {"voyages": list(names), **asdict(left)} for left, names in one.incomparable.items()
+        ],
         "deviating": [
             {"kind": kind, "channel": channel, "voyage": d.voyage, "value": d.estimate.value,
              "low": d.estimate.low, "high": d.estimate.high}

@@ -56,6 +56,15 @@ FINDING_KINDS = (
 
 
 @dataclass(frozen=True, slots=True)
+class NotCompared:
+    """What two channels cannot say of each other in this voyage, or in no voyage at all."""
+
+    what: str  # such as "the yaw rate with the heading"
+    reason: str
+    would_show: str  # what would have to be recorded or sailed
+
+
+@dataclass(frozen=True, slots=True)
 class Instrument:
     """How often and how finely one channel was recorded."""
 
@@ -83,6 +92,7 @@ class VoyageReport:
     usable_s: int | None = None
     windows: int | None = None
     instruments: tuple[Instrument, ...] = field(default=())
+    not_compared: tuple[NotCompared, ...] = field(default=())
 
     @property
     def contradictions(self) -> tuple[Finding, ...]:
@@ -108,6 +118,7 @@ class VoyageReport:
             tuple(Finding(**finding) for finding in content["findings"]),
             content.get("usable_s"), content.get("windows"),
             tuple(Instrument(**one) for one in content.get("instruments", ())),
+            tuple(NotCompared(**one) for one in content.get("not_compared", ())),
         )  # fmt: skip
 
     def as_json(self) -> dict:
@@ -120,4 +131,5 @@ class VoyageReport:
             "windows": self.windows,
             "instruments": [asdict(one) for one in self.instruments],
             "findings": [asdict(finding) for finding in self.findings],
+            "not_compared": [asdict(one) for one in self.not_compared],
         }

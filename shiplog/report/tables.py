@@ -9,7 +9,13 @@ import polars as pl
 
 from shiplog.channels import WINDOW
 from shiplog.exceptions import listed
-from shiplog.logs.health_report import CONTRACT, Finding, Instrument, VoyageReport
+from shiplog.logs.health_report import (
+    CONTRACT,
+    Finding,
+    Instrument,
+    NotCompared,
+    VoyageReport,
+)
 from shiplog.numbers import counted, percent
 from shiplog.profile import Profile
 from shiplog.report.judgement import FEWEST_WINDOWS
@@ -29,12 +35,28 @@ def voyage_lines(report: VoyageReport) -> list[str]:
     lost = "unknown" if report.messages_lost is None else str(report.messages_lost)
     head = f"{report.name}: {counted(report.messages_read, 'message')} read, {lost} lost; "
     if report.usable_s is None or report.windows is None:
-        return [f"{head}{report.seconds:.1f} s", *_findings(report.findings)]
+        return [
+            f"{head}{report.seconds:.1f} s",
+            *_findings(report.findings),
+            *_not_compared(report.not_compared),
+        ]
     head += (
         f"{report.seconds:.1f} s, of which {report.usable_s} s can be used; "
         f"{counted(report.windows, 'window')} of {WINDOW} s"
     )
-    return [head, *_instruments(report.instruments), *_findings(report.findings)]
+    return [
+        head,
+        *_instruments(report.instruments),
+        *_findings(report.findings),
+        *_not_compared(report.not_compared),
+    ]
+
+
+def _not_compared(left: Sequence[NotCompared]) -> list[str]:
+    """One line; reasons and what would show it stand in the JSON and in `voyages --sensors`."""
+    if not left:
+        return []
+    return [f"  could not be compared: {'; '.join(one.what for one in left)}."]
 
 
 def _instruments(instruments: Sequence[Instrument]) -> list[str]:
@@ -61,7 +83,7 @@ def _instruments(instruments: Sequence[Instrument]) -> list[str]:
 def _findings(findings: Sequence[Finding]) -> list[str]:
     """Each by itself where they are few of a kind and channel, else their number and largest."""
     groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in findings:
+    for finding in sorted(findings, key=lambda one: one.kind != "contradiction"):
         groups.setdefault((finding.kind, finding.channel), []).append(finding)
     lines = []
     for (kind, channel), group in groups.items():

@@ -28,10 +28,10 @@ from shiplog.voyages import (
     required_topics,
     resampling,
     sampling_findings,
-    sensor_consistency,
     time_line,
 )
 from shiplog.voyages import one_hertz as tables
+from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
@@ -75,9 +75,7 @@ def build(reading: Reading, profile: Profile) -> Voyage:
     """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
     aligned = _aligned(reading, profile)
     table, grid = aligned.table, aligned.grid
-    estimates = tuple(sensor_consistency.estimates(table, profile))
-    consistency = sensor_consistency.findings(estimates, table.height, profile)
-    consistency += plausible_measures.of_log(table, profile, consistency)
+    compared = _compared(aligned, profile)
     usable_s, windows = usable(table, profile)
     report = VoyageReport(
         name=reading.contents.path.stem,
@@ -85,14 +83,17 @@ def build(reading: Reading, profile: Profile) -> Voyage:
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *consistency),
+        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *compared.findings),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(
             _instrument(*one) for one in aligned.samples if len(one[1].time) > 1 and not one[1].hold
         ),
+        not_compared=compared.not_compared,
     )
-    return Voyage(report.name, profile, reading.contents, table, report, aligned.datum, estimates)
+    return Voyage(
+        report.name, profile, reading.contents, table, report, aligned.datum, compared.estimates
+    )
 
 
 def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
@@ -104,12 +105,19 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
     return min(seconds, (table.height - 1) * resampling.STEP_NS // 1_000_000_000), windows
 
 
-def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
+def consistency_of(reading: Reading, profile: Profile) -> Comparison:
     """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
     aligned = _aligned(reading, profile)
+    compared = _compared(aligned, profile)
     clocks_apart = [one for one in aligned.left_out if one.kind == "contradiction"]
-    found = sensor_consistency.estimates(aligned.table, profile)
-    return [*clocks_apart, *sensor_consistency.findings(found, aligned.table.height, profile)]
+    return replace(compared, findings=(*clocks_apart, *compared.findings))
+
+
+def _compared(aligned: _Aligned, profile: Profile) -> Comparison:
+    """Sensors against each other, and then against what ships and winds can do."""
+    compared = compare(aligned.table, profile)
+    implausible = plausible_measures.of_log(aligned.table, profile, compared.findings)
+    return replace(compared, findings=(*compared.findings, *implausible))
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ import polars as pl
 from shiplog.channels import UNUSABLE
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Actuator, Profile
-from shiplog.voyages import wind_convention
 from shiplog.voyages.plausibility import LEAST_BLOCK, SHIP, Asked, findings
 from shiplog.voyages.resampling import RATE_HZ
+from shiplog.voyages.wind_contradictions import wind_findings
 
 GRAVITY = 9.80665  # m/s²
 SALT, FRESH, LONG_M = 1025.0, 998.0, 20.0  # kg/m³; a longer ship is taken as at sea
@@ -43,7 +43,7 @@ def of_log(table: pl.DataFrame, profile: Profile, found: Sequence[Finding] = ())
     asked = [*of_profile(profile), *of_voyage(table, profile)]
     mine = findings(one for one in asked if not known & {one.channel, *one.of})
     if not known & {"heading", "wind"} and not any(f.channel == "wind" for f in mine):
-        mine += wind_convention.findings(table, profile)
+        mine += wind_findings(table, profile)
     return mine
 
 

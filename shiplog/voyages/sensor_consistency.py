@@ -26,7 +26,7 @@ import polars as pl
 
 from shiplog import channels, frames
 from shiplog.channels import DEGREE, Quality
-from shiplog.logs.health_report import Finding
+from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
 from shiplog.voyages.fault_detection import stretches
 from shiplog.voyages.resampling import RATE_HZ
@@ -38,6 +38,8 @@ ROUGH_ROWS = 6_000
 CHUNK_ROWS = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
 POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, or neither
+MOST_SCALE = 0.9  # of a scale beyond 1: the search's limit
+DELAY_SHARE = 0.8  # of the largest delay: what ends beyond it was not found
 MARGINS_S = (1.5, 6.0)  # largest delay looked for; the second where the first does not suffice
 SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be from zero, to be reported
 CERTAIN = 4.0  # the same, to be corrected with --correct
@@ -45,6 +47,14 @@ CERTAIN = 4.0  # the same, to be corrected with --correct
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
 ANTENNA_M, ANTENNA_LENGTHS = 0.03, 0.01
+
+# An estimate that ends so near a limit of the search, as a share of it, was not found there.
+AT_LIMIT = 0.95
+CANCEL, TOGETHER = 0.3, 0.9  # a delay and an antenna that undo each other: share left, correlation
+# Ratios of two units: what contains one is a question of the profile, and no fault of a sensor.
+UNIT_RATIOS = (1852.0 / 3600.0, 3600.0 / 1852.0, 3.6, 1.0 / 3.6, 60.0, 1.0 / 60.0, 1.0 / DEGREE,
+               DEGREE, 0.44704, 1.0 / 0.44704, 0.3048, 1.0 / 0.3048, 1.15078, 1.0 / 1.15078,
+               1.0 / 1.852, 1.852, 1.60934, 1.0 / 1.60934)  # fmt: skip
 
 TAU_R, RATE_SCALE, RATE_BIAS = range(3)
 TAU_P, TAU_V, OFFSET, SPEED_SCALE, AHEAD, STARBOARD, DRIFT_X, DRIFT_Y = range(8)
@@ -71,8 +81,23 @@ class Estimate:
 
     @property
     def certain(self) -> bool:
-        """Beyond doubt, and no doubt about which instrument it is."""
-        return self.notable and self._off > CERTAIN * self._half and not self.rival
+        """Beyond doubt, and no doubt about which instrument it is, nor about a unit."""
+        return (
+            self.notable
+            and self._off > CERTAIN * self._half
+            and not self.rival
+            and not self.question
+        )
+
+    @property
+    def question(self) -> bool:
+        """Whether the interval reaches the search's limit, or holds the ratio of two units."""
+        if self.kind == "clock_offset":
+            return max(abs(self.low), abs(self.high)) > DELAY_SHARE * MARGINS_S[-1]
+        if self.none != 1.0:
+            return False
+        limit = max(abs(self.low - 1.0), abs(self.high - 1.0)) > AT_LIMIT * MOST_SCALE
+        return limit or any(self.low <= ratio <= self.high for ratio in UNIT_RATIOS)
 
     @property
     def _off(self) -> float:
@@ -110,14 +135,47 @@ def findings(found: Sequence[Estimate], rows: int, profile: Profile) -> list[Fin
     ]  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Compared:
+    """estimates: all that the manoeuvres let be estimated, notable or not; not_compared: what the
+    fits did not find, and why."""
+
+    estimates: tuple[Estimate, ...]
+    not_compared: tuple[NotCompared, ...] = ()
+
+
+def compared(
+    table: pl.DataFrame, profile: Profile, of_yaw_rate: bool = True, of_velocity: bool = True
+) -> Compared:
+    """One voyage at 10 Hz. What contradicts itself grossly is not to be fitted: a wrong sign is
+    not also a clock that is late."""
+    return of_motion(measured(table, profile), profile, of_yaw_rate, of_velocity)
+
+
 def estimates(table: pl.DataFrame, profile: Profile) -> list[Estimate]:
-    """All that the voyage's manoeuvres let be estimated, notable or not: one voyage at 10 Hz."""
-    return of_motion(measured(table, profile), profile)
+    """The estimates alone."""
+    return list(compared(table, profile).estimates)
 
 
-def of_motion(motion: Motion, profile: Profile) -> list[Estimate]:
+def of_motion(
+    motion: Motion, profile: Profile, of_yaw_rate: bool = True, of_velocity: bool = True
+) -> Compared:
     """The same of rows that are chosen already, such as those of a campaign."""
-    return [*_of_yaw_rate(motion, profile), *_of_velocity(motion, profile)]
+    found: list[Estimate | NotCompared] = []
+    if of_yaw_rate:
+        found += _of_yaw_rate(motion, profile)
+    if of_velocity:
+        found += _of_velocity(motion, profile)
+    return Compared(
+        tuple(one for one in found if isinstance(one, Estimate)),
+        tuple(one for one in found if isinstance(one, NotCompared)),
+    )
+
+
+def _unfound(names: str, why: str) -> NotCompared:
+    return NotCompared(
+        f"small errors of {names}", why, "turns to both sides and changes of speed, for minutes"
+    )
 
 
 def measured(table: pl.DataFrame, profile: Profile) -> Motion:
@@ -186,7 +244,7 @@ def _turned(heading: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return np.stack(frames.in_earth_axes(vector[..., 0], vector[..., 1], c, s), axis=-1)
 
 
-def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
+def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCompared]:
     """The yaw rate against the heading's own."""
     if profile.sensors.yaw_rate is None:
         return
@@ -209,11 +267,12 @@ def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
         return Problem(
             model, grid, steps=np.array([STEP_S, 1e-3, 1e-4]),
             prior=np.array([2.0, 0.3, 2.0 * DEGREE]),
-            limit=np.array([margin, 0.9, 10.0]), other_side=other_side,
+            limit=np.array([margin, MOST_SCALE, 10.0]), other_side=other_side,
         )  # fmt: skip
 
-    found = _solved(motion, problem, (TAU_R,))
-    if found is None:
+    found = _solved(motion, problem, (TAU_R,), RATE_SCALE)
+    if isinstance(found, str):
+        yield _unfound("yaw rate and heading", found)
         return
     yield _clock("yaw_rate", *found.interval(TAU_R))
     yield _scale("yaw_rate_scale", "yaw_rate", found.interval(RATE_SCALE))
@@ -221,7 +280,7 @@ def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate]:
     yield Estimate("yaw_rate_bias", "yaw_rate", value, low, high, 0.0, BIAS_DEGPS, "deg/s")
 
 
-def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
+def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCompared]:
     """The position's change against the velocity, turned by the heading where it is body-fixed."""
     body = _in_body_axes(profile)
     of_position, of_velocity = _arms(profile)
@@ -258,22 +317,59 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate]:
             model, grid,
             steps=np.array([STEP_S, STEP_S, 1e-3, 1e-3, 1e-2, 1e-2, 1e-3, 1e-3]),
             prior=np.array([alone, 2.0, skew, 0.3, 0.5 * length, 0.5 * length, 1.0, 1.0]),
-            limit=np.array([margin, margin, math.pi, 0.9, *[10.0 * length] * 2, 10.0, 10.0]),
+            limit=np.array(
+                [margin, margin, math.pi, MOST_SCALE, *[10.0 * length] * 2, 10.0, 10.0]
+            ),
             other_side=other_side,
         )  # fmt: skip
 
-    found = _solved(motion, problem, (TAU_P, TAU_V))
-    if found is None:
+    found = _solved(motion, problem, (TAU_P, TAU_V), SPEED_SCALE)
+    if isinstance(found, str):
+        yield _unfound("position and velocity", found)
         return
-    yield from _gnss_clocks(found, profile)
+    cancelling = body and _cancel(found, motion, profile)
+    if cancelling:
+        yield _unfound(
+            "the position's clock and the antenna's place",
+            "a position that is late and an antenna that is further ahead undo each other at "
+            "a steady speed",
+        )
+    else:
+        yield from _gnss_clocks(found, profile)
     if body:
         value, low, high = (v / DEGREE for v in found.interval(OFFSET))
         yield Estimate("heading_offset", "heading", value, low, high, 0.0, HEADING_DEG, "deg")
     yield _scale("velocity_scale", "velocity", found.interval(SPEED_SCALE))
+    if one_receiver(profile) or cancelling:
+        return
     least = max(ANTENNA_M, ANTENNA_LENGTHS * length)
     for index, channel in ((AHEAD, "position ahead"), (STARBOARD, "position starboard")):
         value, low, high = found.interval(index)
         yield Estimate("antenna_offset", channel, value, low, high, 0.0, least, "m")
+
+
+def one_receiver(profile: Profile) -> bool:
+    """Whether position and velocity over ground are of one place: they then move alike wherever it
+    is, and say nothing of a lever arm."""
+    of_position, of_velocity = _arms(profile)
+    return not _in_body_axes(profile) and of_position == of_velocity
+
+
+def _cancel(found: RobustFit, motion: Motion, profile: Profile) -> bool:
+    """Whether the delay between position and velocity and the antenna's place ahead are both
+    notable, hardly known but together, and undo each other: a = u τ at the speed u."""
+    late = float(found.value[TAU_P] - found.value[TAU_V])
+    ahead = float(found.value[AHEAD])
+    delay, place = np.zeros(len(found.value)), np.zeros(len(found.value))
+    delay[[TAU_P, TAU_V]], place[AHEAD] = (1.0, -1.0), 1.0
+    of_delay, of_place = (float(one @ found.cov @ one) for one in (delay, place))
+    both = float(delay @ found.cov @ place)
+    if min(of_delay, of_place) <= 0.0 or abs(both) < TOGETHER * math.sqrt(of_delay * of_place):
+        return False
+    length = profile.ship.length_m
+    small = abs(late) < CLOCK_S or abs(ahead) < max(ANTENNA_M, ANTENNA_LENGTHS * length)
+    speed = float(np.median(motion.velocity[:, 0]))
+    return not small and abs(ahead - speed * late) < CANCEL * abs(ahead)
 
 
 def _gnss_clocks(found: RobustFit, profile: Profile) -> Iterator[Estimate]:
@@ -327,29 +423,35 @@ def _clock(channel: str, value: float, low: float, high: float, rival: str = "")
 
 
 def _solved(
-    motion: Motion, problem: Callable[[Motion, float], Problem], clocks: tuple[int, ...]
-) -> RobustFit | None:
+    motion: Motion, problem: Callable[[Motion, float], Problem], clocks: tuple[int, ...], scale: int
+) -> RobustFit | str:
     """Fit with delays up to the small margin, and again with the large one if that binds.
 
     It starts from what the first ten minutes say, tried from several delays. What ends at a
-    limit was not found.
+    limit was not found: the answer is then why.
     """
     beginning = motion.beginning(ROUGH_ROWS)
+    late = 0.0
     for margin in MARGINS_S:
         coarse = problem(beginning, margin)
         starts = [np.zeros(len(coarse.prior))]
         for clock in set(clocks) & set(coarse.free):
-            for late in (-0.5 * margin, 0.5 * margin):
-                starts.append(np.where(np.arange(len(coarse.prior)) == clock, late, 0.0))
+            for delay in (-0.5 * margin, 0.5 * margin):
+                starts.append(np.where(np.arange(len(coarse.prior)) == clock, delay, 0.0))
         try:
             found = fit(problem(motion, margin), rough(coarse, starts))
         except np.linalg.LinAlgError:  # a ship at rest, or a log that never turns
-            return None
+            found = None
         if found is None:
-            return None
-        if (np.abs(found.value[list(clocks)]) < 0.8 * margin).all():
+            return "the manoeuvres are too few, or show one error only together with another"
+        if abs(found.value[scale]) > AT_LIMIT * MOST_SCALE:
+            return (
+                f"the search ends at its limit: they differ by more than {100 * MOST_SCALE:.0f} %"
+            )
+        late = float(np.max(np.abs(found.value[list(clocks)])))
+        if late < DELAY_SHARE * margin:
             return found
-    return None
+    return f"the search ends at its limit: a delay of more than {DELAY_SHARE * margin:.1f} s"
 
 
 def _sentence(e: Estimate, profile: Profile) -> str:

@@ -6,7 +6,7 @@ measured (a late clock, at the end of a stretch or before a gap) becomes a gap.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import fault_detection
 from shiplog.voyages import instrument_faults as faults
+from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.ingest import Voyage, usable
 from shiplog.voyages.recording import Record
 from shiplog.voyages.sensor_consistency import Estimate
@@ -28,7 +29,10 @@ SENSOR_COLUMNS = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in
 HEADING_COLUMN = 4
 DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # of a channel that the mark does not name
 
+LESS = 0.5  # of a fault may be left once it is corrected
+
 Remedy = Callable[[Record, float], Record]
+Key = tuple[str, str]  # kind and channel of an estimate
 
 
 def _antenna(ahead: float, starboard: float) -> Remedy:
@@ -62,17 +66,64 @@ REMEDIES: dict[tuple[str, str], Remedy] = {  # in the order of the consistency e
 
 
 def corrected(voyage: Voyage) -> Voyage:
-    """The voyage with what is certain put right; its findings say so. Rows and times stay."""
-    done = tuple(e for e in voyage.estimates if e.certain)
-    sure = {(e.kind, e.channel) for e in done}
-    table, gaps = put_right(voyage.table, voyage.profile, done)
-    applied = [
-        replace(f, sentence=f"{f.sentence} Corrected.") if (f.kind, f.channel) in sure else f
-        for f in voyage.report.findings
-    ]
+    """The voyage with what is certain put right; its findings say so. Rows and times stay.
+
+    The comparison is run again on the corrected rows. A correction after which it is no better, or
+    after which two channels contradict each other that did not, is undone, and that is said.
+    """
+    sure = [e for e in voyage.estimates if e.certain]
+    undone: dict[tuple[str, str], str] = {}
+    table, gaps, kept = voyage.table, [], sure
+    while kept:
+        table, gaps = put_right(voyage.table, voyage.profile, kept)
+        worse = _worse(compare(table, voyage.profile), kept, voyage)
+        if not worse:
+            break
+        undone |= worse
+        kept = [e for e in kept if (e.kind, e.channel) not in worse]
+    if not kept:
+        table, gaps = voyage.table, []
+    done = {(e.kind, e.channel) for e in kept}
+    asked = {(e.kind, e.channel) for e in voyage.estimates if e.notable and e.question}
+    applied = [replace(f, sentence=f.sentence + _said(f, done, undone, asked))
+               for f in voyage.report.findings]  # fmt: skip
     usable_s, windows = usable(table, voyage.profile)
     report = replace(voyage.report, findings=(*applied, *gaps), usable_s=usable_s, windows=windows)
-    return replace(voyage, table=table, report=report, corrected=done)
+    return replace(voyage, table=table, report=report, corrected=tuple(kept))
+
+
+def _said(
+    finding: Finding, done: Set[Key], undone: Mapping[Key, str], asked: Set[Key]
+) -> str:  # fmt: skip
+    key = finding.kind, finding.channel
+    if key in done:
+        return " Corrected."
+    if key in undone:
+        return f" Not corrected: {undone[key]}."
+    if key in asked:
+        return (
+            " Not corrected: that may be a unit in the profile, or lies at the limit of the search."
+        )
+    return ""
+
+
+def _worse(after: Comparison, tried: Sequence[Estimate], voyage: Voyage) -> dict[Key, str]:
+    """Of corrections, those to take back, each with the reason. Where two channels exclude each
+    other now, all are."""
+    before = {f.channel for f in voyage.report.contradictions}
+    new = [f for f in after.contradictions.findings if f.channel not in before]
+    if new:
+        why = f"afterwards two channels contradict each other ({new[0].channel})"
+        return {(e.kind, e.channel): why for e in tried}
+    left = {(e.kind, e.channel): e for e in after.estimates}
+    worse = {}
+    for e in tried:
+        now = left.get((e.kind, e.channel))
+        if now is not None and now.notable and abs(now.value - now.none) > LESS * abs(
+            e.value - e.none
+        ):  # fmt: skip
+            worse[e.kind, e.channel] = "the comparison is no better afterwards"
+    return worse
 
 
 def put_right(

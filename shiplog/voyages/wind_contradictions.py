@@ -13,13 +13,16 @@ is tried, and its spread compared with that of the record as it is:
     e_h = mean |W_h - W̄_h - Ẇ_h t|² / |W̄_h|²
 
 A convention is reported where e is less than a quarter of that of the record, in enough parts of
-the voyage that chance is excluded. Nothing is said of a voyage that hardly turns, or in a calm.
+the voyage that chance is excluded. The ship's own speed gives the unit: with R(ψ) a = W + β V, β
+is 1, or what the hull does to the flow; -1 where the vane says where the wind blows to, 1.944 of
+knots.
+Nothing is said of a voyage that hardly turns.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +41,7 @@ LEAST_TURNING = (
 )
 RATIO = 4.0  # times the spread must fall: gusts of a third of the wind do not make that
 ALIKE = 1.5  # times the least spread, and still as good
-VOTES_T = 3.5  # Student's t of the parts' votes: chance of 1 in 400 with 12 of them, of 60 tries
+VOTES_T = 3.5  # Student's t of the parts' votes: chance of 1 in 400 with 12 of them
 GUSTS = 0.15  # of the wind: what turbulence at sea is in any case; less spread says no more
 # Measured over free speed at a mast: a fifth more above a bridge, and less in its lee (Moat,
 # Yelland and Molland, 2004). Whatever lies within is no other unit.
@@ -78,11 +81,11 @@ CONVENTIONS = (
         f"{_SIGN}, and `offset = [0.0, 180.0]`", "frame",
     ),
     Convention(
-        "radians, read as degrees", _from_body(lambda angle: angle * 180.0 / math.pi),
+        "in radians, read as degrees", _from_body(lambda angle: angle * 180.0 / math.pi),
         'set the unit of the angle to "rad" on [sensors.wind]', "unit",
     ),
     Convention(
-        "apparent, counted from north",
+        "counted from north",
         lambda s, g, psi, v: s * np.exp(1j * g) - v * np.exp(1j * psi), _NO_KIND, "frame",
     ),
     Convention(
@@ -94,10 +97,19 @@ CONVENTIONS = (
         "frame",
     ),
 )  # fmt: skip
-FACTORS = {  # what the recorded speed is multiplied by, and the unit that it then was
-    1.0: "", 1852 / 3600: "kn", 3600 / 1852: "m/s, where kn is said", 1 / 3.6: "km/h",
-    3.6: "m/s, where km/h is said", 0.44704: "mph",
-}  # fmt: skip
+SLOPES = {  # β of each reading of the speed, and what to write
+    -1.0: ("where it blows to", _TOWARDS, "frame"),
+    3600 / 1852: ("in knots", 'set the unit of the speed to "kn" on [sensors.wind]', "unit"),
+    3.6: ("in km/h", 'set the unit of the speed to "km/h" on [sensors.wind]', "unit"),
+    1852 / 3600: ("in m/s, and not in knots", "correct the unit of the speed", "unit"),
+    1 / 3.6: ("in m/s, and not in km/h", "correct the unit of the speed", "unit"),
+}
+SLOPE_BLOCK_S = 100  # s over which the wind's slow change is taken out of β
+SLOPE_BLOCKS = 5  # fewer give β no standard error
+HALF_90 = 1.645  # standard errors of a 90 % interval
+LEAST_GAIN = 2.0  # times by which another unit lessens what varies of the wind
+NEAR_SLOPE = 0.15  # share by which β may be off a known one: the hull's flow, and gusts
+SURE_ERRORS = 4.0  # standard errors between β and any flow past a hull
 
 
 def wind_findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
@@ -112,47 +124,88 @@ def wind_findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
     turning = 1.0 - abs(np.exp(1j * heading).mean())
     if count < LEAST_S or turning < LEAST_TURNING:
         return []
-    readings = {
-        (convention, factor): _least_spread(convention, factor * speed, angle, heading, velocity)
-        for convention in CONVENTIONS
-        for factor in FACTORS
-    }
-    as_it_is = readings[CONVENTIONS[0], 1.0]
-    if as_it_is is None:
-        return []
-    nothing = CONVENTIONS[0], 1.0
-    one = [(c, 1.0) for c in CONVENTIONS] + [(CONVENTIONS[0], f) for f in FACTORS]
-    chosen = _unless_better(readings, nothing, _best(readings, one))
-    both = [(chosen[0], f) for f in FACTORS] + [(c, chosen[1]) for c in CONVENTIONS]
-    chosen = _unless_better(readings, chosen, _best(readings, both))
-    spread = readings[chosen]
-    if chosen == nothing or spread is None or spread.mean() > MOST_SPREAD:
-        return []
-    times = math.sqrt(as_it_is.mean() / max(float(spread.mean()), 1e-12))
-    return [_finding(*chosen, times, table)]
+    spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
+    beta, error = _slope(speed, angle, heading, velocity)
+    known = _known_slope(beta, error)
+    air = speed * np.exp(1j * angle)
+    of_speed = _left(air - (known or 1.0) * velocity, heading)
+    if known and _left(air - velocity, heading) < LEAST_GAIN * of_speed:
+        known = None  # something else turns with the ship
+    as_it_is, best = spreads[CONVENTIONS[0]], _best(spreads)
+    after = spreads[best] if best else None
+    turned = after is not None and as_it_is is not None and _better(as_it_is, after)
+    if known and turned and best:  # the one that leaves less, in m/s, of what turns with the ship
+        of_angle = _left(best.true_wind(speed, angle, heading, velocity))
+        turned = of_angle * ALIKE < of_speed
+    if turned and best and after is not None and as_it_is is not None:
+        times = math.sqrt(as_it_is.mean() / max(float(after.mean()), 1e-12))
+        return [_of_angle(best, times, table)]
+    return [_of_slope(known, beta, error, table)] if known else []
 
 
-Reading = tuple[Convention, float]
-Readings = dict[Reading, np.ndarray | None]
+def _left(wind: np.ndarray, heading: np.ndarray | float = 0.0) -> float:
+    """Variance [m²/s²] of a true wind, in earth axes once it is turned by the heading."""
+    return float(np.var(wind * np.exp(1j * heading)))
 
 
-def _best(readings: Readings, asked: Iterable[Reading]) -> Reading:
-    """The reading whose true wind turns least, or the first that is as good but for `ALIKE`."""
-    known = {one: float(spread.mean()) for one in asked if (spread := readings[one]) is not None}
+def _best(spreads: dict[Convention, np.ndarray | None]) -> Convention | None:
+    """The convention whose true wind turns least, or the first that is as good but for `ALIKE`;
+    None where none can be right."""
+    known = {c: float(spread.mean()) for c, spread in spreads.items() if spread is not None}
+    if not known or min(known.values()) > MOST_SPREAD:
+        return None
     least = ALIKE * max(min(known.values()), GUSTS**2)
-    return next(reading for reading, spread in known.items() if spread <= least)
+    return next(convention for convention, spread in known.items() if spread <= least)
 
 
-def _unless_better(readings: Readings, one: Reading, other: Reading) -> Reading:
-    """`other` where its spread is less than 1/RATIO of that of `one` in most of the voyage."""
-    before, after = readings[one], readings[other]
-    if before is None or after is None:
-        return one
+def _better(before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether the spread falls to less than 1/RATIO, in most of the voyage."""
     if before.mean() < RATIO * max(float(after.mean()), GUSTS**2):
-        return one
+        return False
     votes = np.array([part.mean() for part in np.array_split(before / RATIO - after, BLOCKS)])
-    t = votes.mean() / max(float(votes.std(ddof=1)) / math.sqrt(BLOCKS), 1e-12)
-    return other if t > VOTES_T else one
+    return bool(votes.mean() > VOTES_T * votes.std(ddof=1) / math.sqrt(BLOCKS))
+
+
+def _slope(speed, angle, heading, velocity) -> tuple[float, float]:
+    """β of R(ψ) a = W + β V by least squares, W free in each block; its standard error between
+    the blocks (Liang and Zeger, 1986); infinite where too little is known."""
+    air = speed * np.exp(1j * (angle + heading))
+    moved = velocity * np.exp(1j * heading)
+    products, squares = [], []
+    for begin in range(0, len(air) - SLOPE_BLOCK_S + 1, SLOPE_BLOCK_S):
+        rows = slice(begin, begin + SLOPE_BLOCK_S)
+        along = moved[rows] - moved[rows].mean()
+        products.append(float((air[rows] * along.conj()).real.sum()))
+        squares.append(float((np.abs(along) ** 2).sum()))
+    if len(squares) < SLOPE_BLOCKS or sum(squares) == 0.0:
+        return 1.0, math.inf
+    product, square = np.array(products), np.array(squares)
+    beta = float(product.sum() / square.sum())
+    error = math.sqrt(float(((product - beta * square) ** 2).sum())) / square.sum()
+    return beta, error * math.sqrt(len(square) / (len(square) - 1))
+
+
+def _known_slope(beta: float, error: float) -> float | None:
+    """The reading of the speed that β is near to, where it is far from all that a hull does."""
+    low, high = min(FLOW) - SURE_ERRORS * error, max(FLOW) + SURE_ERRORS * error
+    if not math.isfinite(error) or low < beta < high:
+        return None
+    known = min(SLOPES, key=lambda slope: abs(beta / slope - 1.0))
+    return known if abs(beta / known - 1.0) <= NEAR_SLOPE else None
+
+
+def _of_slope(known: float, beta: float, error: float, table: pl.DataFrame) -> Finding:
+    words, key, reason = SLOPES[known]
+    low, high = beta - HALF_90 * error, beta + HALF_90 * error
+    sentence = (
+        f"wind contradicts the ship's own motion: the apparent wind grows by {beta:.2f} m/s for "
+        f"each m/s of the ship's velocity ({low:.2f} to {high:.2f}), and not by 1, as if it were "
+        f"{words}. Look at the anemometer; if so, {key}."
+    )
+    return Finding(
+        "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(beta, 3),
+        low=round(float(low), 3), high=round(float(high), 3), unit="1", reason=reason,
+    )  # fmt: skip
 
 
 def _seconds(table: pl.DataFrame) -> tuple[np.ndarray, ...] | None:
@@ -199,19 +252,17 @@ def _spread(true_wind: np.ndarray) -> np.ndarray | None:
     return np.abs(true_wind - mean - trend * t) ** 2 / abs(mean) ** 2
 
 
-def _finding(convention: Convention, factor: float, times: float, table: pl.DataFrame) -> Finding:
-    unit = FACTORS[factor]
-    what = [] if convention.name == "as it is" else [f"its angle is {convention.name}"]
-    what += [f"its speed is in {unit}"] if unit else []
-    keys = [convention.key] if convention.key else []
-    keys += [f"correct the unit of the speed ({unit}) on [sensors.wind]"] if unit else []
+def _of_angle(convention: Convention, times: float, table: pl.DataFrame) -> Finding:
     sentence = (
         f"wind contradicts the ship's own motion: the true wind turns with the ship, {times:.1f} "
-        f"times as much as it would if {' and '.join(what)}. Look at the anemometer; if so, "
-        f"{'; '.join(keys)}."
+        f"times as much as it would if the recorded angle is {convention.name}. Look at the "
+        f"anemometer; if so, {convention.key}."
     )
-    reason = "unit" if convention.name == "as it is" else convention.reason
     return Finding(
-        "contradiction", "wind", sentence, start_s=0.0, end_s=round((table.height - 1) * 0.1, 3),
-        value=round(times, 3), unit="1", reason=reason,
+        "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(times, 3),
+        unit="1", reason=convention.reason,
     )  # fmt: skip
+
+
+def _end(table: pl.DataFrame) -> float:
+    return round((table.height - 1) / RATE_HZ, 3)

@@ -7,8 +7,9 @@ import pytest
 import sailing
 
 from pipelines import sensors
-from shiplog.voyages import campaign_consistency, sensor_consistency
+from shiplog.voyages import campaign_consistency, contradictions, sensor_consistency
 from shiplog.voyages.campaign_consistency import campaign, deviates, seasons, together
+from shiplog.voyages.contradictions import Contradictions
 from shiplog.voyages.ingest import ingest
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.store import Store
@@ -44,6 +45,7 @@ def of(monkeypatch):
 
     def made(motions):
         monkeypatch.setattr(sensor_consistency, "measured", lambda table, profile: table)
+        monkeypatch.setattr(contradictions, "find", lambda table, profile: Contradictions((), ()))
         return campaign(motions, sailing.profile())
 
     return made
@@ -58,7 +60,10 @@ def test_several_short_voyages_know_a_clock_better_than_each(of):
     late = 0.15
     motions = {f"v{i}": motion(100 + i, 60.0, late) for i in range(6)}
     found = clock(of(motions).estimates)
-    alone = [clock(sensor_consistency.of_motion(m, sailing.profile())) for m in motions.values()]
+    alone = [
+        clock(sensor_consistency.of_motion(m, sailing.profile()).estimates)
+        for m in motions.values()
+    ]
     assert found.low < late < found.high
     widths = [np.inf if e is None else e.high - e.low for e in alone]
     assert found.high - found.low < 0.6 * np.median(widths)

@@ -10,7 +10,8 @@ import pytest
 import sailing
 
 from shiplog import profile_file as profiles
-from shiplog.voyages import plausible_measures, wind_convention
+from shiplog.logs.health_report import Finding
+from shiplog.voyages import plausible_measures, wind_contradictions
 from shiplog.voyages.plausibility import TABLE, Asked, findings
 
 SHIPPED = ("esso-vectwin", "esso-osaka", "blueboat", "milliampere", "kvlcc2", "kvlcc2-full-scale")
@@ -249,7 +250,7 @@ def wind_of(psi, speed, wind_speed, wind_angle):
         "wind_speed": wind_speed, "wind_angle": wind_angle,
     }  # fmt: skip
     table = pl.DataFrame({n: columns[n] for n in profile.columns} | {"quality": zero.astype(int)})
-    return wind_convention.findings(table, profile)
+    return wind_contradictions.wind_findings(table, profile)
 
 
 def test_a_wind_that_keeps_its_direction_is_not_said():
@@ -261,8 +262,8 @@ def test_a_mirrored_vane_turns_the_wind_with_the_ship():
     _, psi, speed, of, angle = blown()
     (found,) = wind_of(psi, speed, of, -angle)
     assert (found.kind, found.channel, found.reason) == ("contradiction", "wind", "sign")
-    assert "mirrored, port for starboard" in found.sentence
-    assert "sensors.wind.sign = [1.0, -1.0]" in found.sentence
+    assert "positive to port" in found.sentence
+    assert "sign = [1.0, -1.0]` on [sensors.wind]" in found.sentence
 
 
 def test_a_direction_from_north_is_named_as_such():
@@ -274,7 +275,7 @@ def test_a_direction_from_north_is_named_as_such():
 def test_a_direction_towards_is_seen_by_a_ship_as_fast_as_the_gusts():
     _, psi, _, of, angle = blown(turns=12, wind=(0.5, 0.3), speed=2.0, seconds=1200.0)
     (found,) = wind_of(psi, 2.0, of, angle + math.pi)
-    assert "the direction that it blows towards" in found.sentence
+    assert "where it blows to" in found.sentence
     assert wind_of(psi, 2.0, of, angle) == []
 
 
@@ -283,7 +284,7 @@ def test_a_ship_on_one_heading_says_nothing_of_the_vane():
     assert wind_of(psi, speed, of, -angle) == []
 
 
-def test_a_heading_that_the_course_contradicts_says_nothing_of_the_vane():
+def test_a_heading_that_is_contradicted_says_nothing_of_the_vane():
     """Anticlockwise, it would make a sound vane look mirrored."""
     _, psi, speed, of, angle = blown()
     profile = sailing.profile()
@@ -294,7 +295,10 @@ def test_a_heading_that_the_course_contradicts_says_nothing_of_the_vane():
         "yaw_rate": zero, "rudder": zero, "propeller": zero, "wind_speed": of, "wind_angle": angle,
     }  # fmt: skip
     table = pl.DataFrame({n: columns[n] for n in profile.columns} | {"quality": zero.astype(int)})
-    assert wind_convention.findings(table, profile) == []
+    known = [Finding("contradiction", "heading", "It counts anticlockwise.")]
+    asked = {f.channel for f in plausible_measures.of_log(table, profile, known)}
+    assert "wind" not in asked
+    assert "wind" in {f.channel for f in plausible_measures.of_log(table, profile)}
 
 
 def test_the_page_has_every_row_with_its_limits():

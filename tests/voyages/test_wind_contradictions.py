@@ -65,7 +65,7 @@ def test_another_reading_of_the_wind_is_named(case):
     table, changed, words, reason = WRONG[case]
     (finding,) = wind_findings(recorded(table, **changed), PROFILE)
     assert (finding.kind, finding.channel, finding.reason) == ("contradiction", "wind", reason)
-    assert words in finding.sentence and finding.value > 2.0
+    assert words in finding.sentence
 
 
 SOUND = {

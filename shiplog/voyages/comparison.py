@@ -1,0 +1,45 @@
+"""One voyage's sensors against each other: what contradicts grossly first, small errors after.
+
+Two channels that contradict each other are not fitted to each other: the fit would explain a sign
+by a delay, and a unit by a scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import polars as pl
+
+from shiplog.logs.health_report import Finding, NotCompared
+from shiplog.profile import Profile
+from shiplog.voyages import contradictions, sensor_consistency
+from shiplog.voyages.contradictions import Contradictions
+from shiplog.voyages.sensor_consistency import Estimate
+
+AFTER = "the same comparison once the profile is corrected"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """findings: contradictions, then what is notable of the small errors."""
+
+    contradictions: Contradictions
+    estimates: tuple[Estimate, ...]
+    findings: tuple[Finding, ...]
+    not_compared: tuple[NotCompared, ...]
+
+
+def compare(table: pl.DataFrame, profile: Profile) -> Comparison:
+    """Of one voyage at 10 Hz, as ingest makes it."""
+    gross = contradictions.find(table, profile)
+    fine = sensor_consistency.compared(table, profile, gross.of_yaw_rate, gross.of_velocity)
+    small = sensor_consistency.findings(fine.estimates, table.height, profile)
+    left = [*gross.not_compared, *fine.not_compared]
+    for holds, names in (
+        (gross.of_yaw_rate, "yaw rate and heading"), (gross.of_velocity, "position and velocity"),
+    ):  # fmt: skip
+        if not holds:
+            left.append(
+                NotCompared(f"small errors of {names}", "they contradict each other", AFTER)
+            )
+    return Comparison(gross, fine.estimates, (*gross.findings, *small), tuple(left))

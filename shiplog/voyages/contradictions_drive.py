@@ -1,0 +1,201 @@
+"""Actuators that drive the other way than the profile says, and which way the bow is.
+
+The sense of the yaw rate and of the surge has to be confirmed first: else one fault is said twice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from shiplog.logs.health_report import Finding
+from shiplog.profile import Actuator
+from shiplog.voyages import contradictions_actuators as actuators
+from shiplog.voyages.contradictions_actuators import ASTERN, Driven
+from shiplog.voyages.contradictions_evidence import ALONG_DEG, SPREAD, Evidence, Way, of_voyage
+from shiplog.voyages.contradictions_track import Track
+from shiplog.voyages.contradictions_words import offset_line, sign_line
+
+DRIVES = 0.2  # of the largest thrust: the ship is driven
+MOSTLY = 0.8  # of the time under way
+BEAM_DEG = (60.0, 120.0)
+
+
+def driven(t: Track, e: Evidence) -> list[Driven]:
+    """What the actuators do; nothing where the motion itself is in doubt."""
+    if "heading" in e.faulty or "velocity" in e.faulty:
+        return []
+    yaw_rate = t.yaw_rate
+    if "yaw_rate" in e.faulty:
+        yaw_rate = np.gradient(np.unwrap(t.heading), 0.1)
+    return actuators.driven(t, yaw_rate)
+
+
+def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding]:
+    """One a fault: of an actuator's sign, of two exchanged, or of the heading's zero."""
+    if e.faulty & {"heading", "velocity", "position"}:
+        return
+    astern = _bow(t, e, found)
+    if astern is not None:
+        yield astern
+        return
+    by_name: dict[str, list[Driven]] = {}
+    for one in found:
+        by_name.setdefault(one.name, []).append(one)
+    exchanged = _exchanged(t, by_name)
+    if exchanged is not None:
+        yield exchanged
+        return
+    for actuator in t.profile.actuators:
+        ways = by_name.get(actuator.name, [])
+        against = [one for one in ways if one.against and one.direction != ASTERN]
+        if not against or any(one.along for one in ways):
+            continue
+        yield _sign(t, e, actuator, against)
+
+
+def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> Finding:
+    line = _sign_line(actuator)
+    if actuator.kind == "rudder":
+        what = f"The bow turns to port where the rudder {actuator.name} is positive"
+        sure = _sense(t, e)
+        also = "" if sure else "; or heading and yaw rate are counted to port"
+    else:
+        ways = " and ".join(one.direction for one in against)
+        what = (
+            f"The {actuator.kind} {actuator.name} drives the other way than the profile has it "
+            f"({ways})"
+        )
+        also = ""
+    best = max(against, key=lambda one: one.explained)
+    sentence = (
+        f"{what}: {100.0 * best.explained:.0f} % of the change follow it with the sign turned "
+        f"round, in {best.windows} windows{also}. Change: {line}."
+    )
+    return of_voyage(t, actuator.name, (-1.0, None, None), "1", "sign", sentence)
+
+
+def _sense(t: Track, e: Evidence) -> bool:
+    """Whether the way over ground confirms to which side the heading turns."""
+    ways = (e.by_position, e.by_velocity)
+    return any(w is not None and w.how == "as it is" and w.sense for w in ways)
+
+
+def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
+    """Two thrusters on either side that drive ahead but turn the other way: they are each other."""
+    pair = []
+    for actuator in t.profile.actuators:
+        ways = {one.direction: one for one in by_name.get(actuator.name, [])}
+        surge, yaw = ways.get("surge"), ways.get("yaw rate")
+        if yaw is not None and yaw.against and (surge is None or not surge.against):
+            if surge is None or not surge.along or actuator.kind == "rudder":
+                continue
+            pair.append(actuator)
+    sides = {math.copysign(1.0, one.position_m[1]) for one in pair if one.position_m[1] != 0.0}
+    if len(sides) < 2:
+        return None
+    names = " and ".join(one.name for one in pair)
+    sentence = (
+        f"{names} drive ahead, but turn the ship to the other side than their places say: port and "
+        "starboard are exchanged. Change: `position_m` or `topic` of the two."
+    )
+    return of_voyage(t, pair[0].name, (-1.0, None, None), "1", "swapped", sentence)
+
+
+def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
+    """A ship that is driven ahead and goes astern or abeam for the whole voyage, or is driven
+    astern and goes ahead. Of a ship that can go sideways nothing is said, nor of one that a stream
+    may set."""
+    way = e.by_position or e.by_velocity
+    thrusts = actuators.thrust(t)
+    if way is None or way.how != "as it is" or way.drift or not thrusts:
+        return None
+    if way.half > 15.0 or actuators.can_push_sideways(t):
+        return None
+    share = _driven_share(t, [part[0] for part in thrusts.values()])
+    if way.ahead and share < -MOSTLY:
+        return _driven_astern(t, way)
+    if share < MOSTLY:
+        return None
+    if abs(way.angle) > 180.0 - ALONG_DEG:
+        return _reversed(t, way, found)
+    if BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1] and way.spread > SPREAD:
+        return _abeam(t, way)
+    return None
+
+
+def _driven_share(t: Track, forces: list[np.ndarray]) -> float:
+    """Of the time under way, how much the ship is driven ahead; negative for astern."""
+    force = np.nan_to_num(sum(forces))
+    speed = np.abs(t.velocity)
+    sails = speed > 0.5 * float(np.quantile(speed, 0.9))
+    most = float(np.quantile(np.abs(force), 0.95))
+    if most <= 0.0 or not sails.any():
+        return 0.0
+    ahead = float(np.mean(force[sails] > DRIVES * most))
+    astern = float(np.mean(force[sails] < -DRIVES * most))
+    return ahead if ahead > astern else -astern
+
+
+def _propellers(t: Track) -> list[Actuator]:
+    return [a for a in t.profile.actuators if a.kind in ("propeller", "thruster")]
+
+
+def _heading_line(t: Track, zero: float) -> str:
+    if t.profile.sensors.kind("heading") != "angle":
+        return "the frame and the `kind` of [sensors.heading]"
+    return offset_line(t.profile, "heading", round(zero))
+
+
+def _driven_astern(t: Track, way: Way) -> Finding:
+    one = _propellers(t)[0]
+    sentence = (
+        f"The ship is driven astern by {_names(t)} and goes ahead, within {way.half:.0f} deg of "
+        f"the bow, nearly all the time. Change: {_sign_line(one)}, or the heading by 180 deg."
+    )
+    return of_voyage(t, one.name, (-1.0, None, None), "1", "sign", sentence)
+
+
+def _names(t: Track) -> str:
+    return " and ".join(one.name for one in _propellers(t))
+
+
+def _reversed(t: Track, way: Way, found: Sequence[Driven]) -> Finding:
+    """Ahead by the propeller and astern by the heading: a rudder that steers as it does ahead says
+    that it is the heading."""
+    steered = any(one.direction == ASTERN and one.along for one in found)
+    lines = _heading_line(t, 180.0)
+    if t.body:
+        lines += f" with {sign_line(t.profile, 'velocity')}"
+    who = (
+        "It is the heading: the rudder steers as it does on a ship that goes ahead. Change: "
+        if steered else f"It is the heading, or the sign of {_names(t)}. Change: "
+    )  # fmt: skip
+    if not steered:
+        lines += f" or {_sign_line(_propellers(t)[0])}"
+    sentence = (
+        f"The ship is driven ahead by {_names(t)} and goes astern by its heading, "
+        f"{abs(way.angle):.0f} deg off the bow (within {way.half:.0f}), nearly all the time. "
+        f"{who}{lines}."
+    )
+    interval = 180.0, 180.0 - way.half, 180.0 + way.half
+    return of_voyage(t, "heading", interval, "deg", "sign", sentence)
+
+
+def _abeam(t: Track, way: Way) -> Finding:
+    shown = -way.angle
+    sentence = (
+        f"The ship is driven ahead by {_names(t)} and goes sideways by its heading, "
+        f"{abs(way.angle):.0f} deg off the bow (within {way.half:.0f}) on all courses. It is the "
+        f"heading, counted from another axis. Change: {_heading_line(t, shown)}."
+    )
+    interval = shown, shown - way.half, shown + way.half
+    return of_voyage(t, "heading", interval, "deg", "frame", sentence)
+
+
+def _sign_line(actuator: Actuator) -> str:
+    sign = actuator.sign if isinstance(actuator.sign, float) else actuator.sign[0]
+    text = f"{-sign:.1f}" if abs(sign) == 1.0 else f"{-sign:g}"
+    return f'sign = {text} on the actuator "{actuator.name}"'
