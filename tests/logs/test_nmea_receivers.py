@@ -294,3 +294,28 @@ def test_the_days_of_one_receiver_go_on(tmp_path):
     assert {one.topic: len(one.time) for one in found.series} == {
         "/gnss/fix": 240, "/gnss/velocity": 240,
     }  # fmt: skip
+
+
+def test_damage_costs_what_it_hits_and_moves_no_heading(tmp_path):
+    """A serial line that loses, cuts and garbles bytes: a heading is a heading of its second."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        raw = bytearray(
+            "\n".join(b for t in range(40) for b in (gga(t), rmc(t), hdt(t), rsa(t))).encode()
+        )
+        for _ in range(8):
+            at = int(rng.integers(len(raw)))
+            if rng.random() < 0.5:
+                del raw[at : at + int(rng.integers(1, 40))]
+            else:
+                raw[at] = int(rng.integers(256))
+        topics, found = read(tmp_path, raw.decode("latin-1").split("\n"))
+        assert late(topics["/gyro"], heading, "heading_deg") < 2 * np.pi * 1.01
+        assert len(topics["/gyro"].time) > 25 and found.damaged > 0
+
+
+def test_a_receive_stamp_with_a_damaged_digit_moves_no_heading(tmp_path):
+    lines = [f"{iso(t)} {hdt(t)}" for t in SECONDS]
+    lines[50] = lines[50].replace("T10:00:5", "T10:07:5")
+    topics, _ = read(tmp_path, lines)
+    assert late(topics["/gyro"], heading, "heading_deg") < 1e-3

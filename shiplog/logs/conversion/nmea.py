@@ -168,8 +168,8 @@ class _Reader:
             self.times.day.append(day)
             self.times.trusted.append(not (facts and facts[0].why_not))
             self.times.sender.append(sender)
-            self.gathered.form.append(form * 1000 + len(sentence.fields[TIME_AT[kind]]) * 50
-                                      + len(sentence.fields[2]))  # fmt: skip
+            digits = sum(len(field) for field in sentence.fields[:3])
+            self.gathered.form.append(form * 1000 + digits)
 
     def _of_day(self, sentence: Sentence) -> int:
         """The UTC in a sentence [ns of its day], -1 without. Raises ValueError."""

@@ -35,6 +35,7 @@ BITS_PER_S, BITS_A_CHARACTER = (
 QUANTA_NS = (SECOND_NS, SECOND_NS // 10)  # steps in which coarse stamps count
 RIDES = 0.8  # share of the bursts with a UTC that hold a sentence which belongs to that epoch
 SHARED = 0.2  # share of an instrument's sentences that bear another one's stamp, of a buffer
+STRAY_NS = 5 * SECOND_NS  # a stamp further from both lines around it
 LONGEST = 1.5  # times the usual span of a burst: what is longer is a pause
 
 
@@ -181,8 +182,14 @@ def _fresh(at: np.ndarray, utc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _filled(received: np.ndarray) -> np.ndarray:
-    """Stamps [n] with those between that could not be read, where most lines have one."""
+    """Stamps [n] with those between that could not be read, where most lines have one.
+
+    A single one far from both neighbours, which are near each other, has a damaged digit."""
     stamped = received >= 0
+    if stamped.all() and len(received) > 2:
+        step = np.abs(np.diff(received))
+        near = np.abs(received[2:] - received[:-2]) < STRAY_NS
+        stamped[1:-1] = ~((step[:-1] > STRAY_NS) & (step[1:] > STRAY_NS) & near)
     if stamped.all() or stamped.sum() < max(2, 0.5 * len(received)):
         return received
     at = np.flatnonzero(stamped)

@@ -47,7 +47,7 @@ def label(epochs: Epochs) -> np.ndarray | None:
     clocks = _classes(epochs.track, 3)
     if clocks is not None and _alternate(clocks):
         return _by_size(clocks)
-    known = np.isfinite(epochs.where).all(axis=1)
+    known = np.asarray(np.isfinite(epochs.where).all(axis=1), bool)
     if known.sum() < LEAST:
         return None
     metres = epochs.where[known] * METRES_A_DEGREE

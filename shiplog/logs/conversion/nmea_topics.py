@@ -254,7 +254,9 @@ def _apart(time: np.ndarray, own: np.ndarray, values: np.ndarray) -> tuple[np.nd
         return keep, time
     equal = np.zeros(len(time), bool)
     equal[1:] = (np.diff(np.nan_to_num(values, nan=-1e9), axis=0) == 0).all(axis=1)
-    if same.mean() > COARSE and equal[same].mean() > SAME and equal[1:][~same[1:]].mean() < 0.5:
+    others = equal[1:][~same[1:]]
+    again = same.mean() > COARSE and equal[same].mean() > SAME
+    if again and len(others) and others.mean() < 0.5:
         return ~(same & equal), time
     first = np.flatnonzero(~same)
     many = np.diff(first, append=len(time))

@@ -53,7 +53,7 @@ class _Deltas:
         """One line. `received` ns, -1 without."""
         try:
             delta = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             self.damaged += 1
             return
         if not isinstance(delta, dict):

@@ -16,6 +16,7 @@ from shiplog.logs.write import Series
 from shiplog.units import SECOND_NS
 
 DEG = 180.0 / math.pi
+LARGEST = 1e12  # beyond is no value of a ship
 BESIDE_NS = SECOND_NS  # a course belongs to a speed of the same source within that
 TURN = "turn"  # an angle that counts from 0 to 360 deg
 PAIRS = {  # topic: schema, and fields with their path, factor and whether they turn
@@ -177,11 +178,9 @@ def _times(rows: list[tuple[int, int, object]]) -> tuple[np.ndarray, np.ndarray]
 
 
 def _number(value: object) -> float:
-    return (
-        float(value)
-        if isinstance(value, (int, float)) and not isinstance(value, bool)
-        else math.nan
-    )
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    return float(value) if abs(value) <= LARGEST else math.nan
 
 
 def _scaled(rows: list[tuple[int, int, object]], factor: float, turns: str) -> np.ndarray:
