@@ -31,7 +31,8 @@ BLOCK_S = 200.0  # s over which a wind keeps its direction
 SLOPE_BLOCKS = 4  # of them, fewer of which give no standard error of β
 SPREAD = 0.8  # mean resultant of the headings of a block, above which it tells nothing
 LEAST_WIND = 0.5  # m/s of apparent wind, below which an anemometer stands
-RATIO = 4.0  # times the variance of the best convention, from which it is another one
+RATIO = 8.0  # times the variance of the best convention, from which it is another one: 9 to 24 of
+# a sound vane that is read otherwise, on twelve sample voyages
 ALIKE = 1.5  # ratio of variances of two conventions, up to which the simpler one is said
 SURE, LEAST_SLOPE = 3.0, 0.3  # standard errors, and β itself, by which it is beyond zero
 SCATTER = 0.3  # share of the apparent wind, by which W varies at least under a wrong convention
@@ -84,10 +85,15 @@ def findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
         return []
     key = CONVENTIONS[words][1] if words in CONVENTIONS else "sensors.wind"
     end = round((table.height - 1) / RATE_HZ, 3)
+    if words == NORTH:  # or a vane that is stuck: a question
+        said += ", or the vane is stuck"
+        return [
+            Finding("implausible", "wind", f"{said}. Look at {key}.", 0.0, end, times, unit="1")
+        ]
     return [
         Finding(
             "contradiction", "wind", f"{said}. Look at {key}.", start_s=0.0, end_s=end,
-            value=times, unit="1", reason="frame" if words == NORTH else "sign",
+            value=times, unit="1", reason="sign",
         )
     ]  # fmt: skip
 
