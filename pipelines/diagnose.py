@@ -168,6 +168,8 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     if lost:
         dropped |= {n.cause.label: answer.none_named(lost) for n in decision.named}
         decision, found = decisions.untold(decision), None
+    elif held and decision.verdict in answer.OPEN and held.hint:
+        notes.append(held.hint)
     simulated = (tried, decision)
     if network is not None:
         simulated = network.extended_by(decision)

@@ -155,7 +155,7 @@ class HeldOut(Rollouts):
         own = float(self.losses_before[self.counted].sum(1).mean())
         after = own if found is None else min(own, found.after)
         hold = float(parts(counted.state[:, :1] - counted.state, counted.dt).sum(1).mean())
-        other = sign_conventions.tried(self.before, counted, self.nominal)
+        other = self._other
         if sign_conventions.explains(other, own, after, hold, self._level):
             return sign_conventions.sentence(other, own)
         if own <= thresholds.WORSE_THAN_HOLDING * hold or after <= hold:
@@ -166,6 +166,26 @@ class HeldOut(Rollouts):
         )
 
     @property
+    def hint(self) -> str:
+        """What a convention takes away of the trial's excess where it does not explain the trial:
+        a note on a verdict that is open. Empty where it takes away less than half."""
+        own, level = float(self.losses_before[self.counted].sum(1).mean()), self._level
+        other = self._other
+        if level is None or own <= level or (other.there or 0.0) < 1.0:
+            return ""
+        if other.loss > level + thresholds.MOST * (own - level):
+            return ""
+        return (
+            f"{sign_conventions.sentence(self._other, own)}: these data hardly determine which is "
+            "right."
+        )
+
+    @cached_property
+    def _other(self) -> sign_conventions.Tried:
+        counted = self.cut.pick(np.flatnonzero(self.counted))
+        return sign_conventions.tried(self.before, counted, self.nominal)
+
+    @cached_property
     def _level(self) -> float | None:
         """Mean L of the nominal windows; None without any."""
         if self.nominal is None:

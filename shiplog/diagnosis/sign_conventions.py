@@ -66,11 +66,13 @@ class Tried:
 
     loss   mean L; where the convention makes velocities smaller, by so much greater as it would
            be made less by that alone
+    there  L of the nominal windows under it over L of them as they are; None without any
     """
 
     words: str
     key: str
     loss: float
+    there: float | None = None
 
 
 def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
@@ -95,8 +97,11 @@ def tried(simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = 
     for one in found:
         if not there:
             there = {t.words: t.windows for t in conventions(simulator.profile, nominal)}
-        if one.words not in there or _mean(simulator, there[one.words]) > THERE_TOO * before:
-            return one
+        share = math.inf  # of a convention that the nominal windows cannot be read under
+        if one.words in there:
+            share = _mean(simulator, there[one.words]) / max(before, 1e-12)
+        if share > THERE_TOO:
+            return replace(one, there=share)
     return replace(found[0], loss=RUNAWAY)
 
 

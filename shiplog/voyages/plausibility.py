@@ -157,7 +157,7 @@ TABLE: dict[str, Limit] = {
     ),
     "turning": Limit(
         "turning rate r L/U at working speed", "1", (0.0, 6.0), (0.0, 60.0),
-        ("ship.length_m", "sensors.velocity.units"),
+        ("ship.length_m", "sensors.heading.unit", "sensors.velocity.units"),
         "0.3 to 1 of ships, which turn in 2 to 5 lengths (IMO MSC.137(76), 2002)",
         ((0.1, "a length in dm"), (0.01, "a length in cm"), (0.001, "a length in mm")),
     ),

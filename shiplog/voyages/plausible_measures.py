@@ -23,6 +23,7 @@ GRAVITY = 9.80665  # m/s²
 SALT, FRESH, LONG_M = 1025.0, 998.0, 20.0  # kg/m³; a longer ship is taken as at sea
 QUANTILE = 0.95  # of the moving rows
 MOVING = 0.1  # m/s: a receiver at rest shows less
+WAY = 0.3  # m/s: a slower ship manoeuvres, and may turn on the spot
 WORKING = 0.5  # share of the speed's quantile, from which a ship is under way
 LEAST_ROWS = 300  # 30 s of 10 Hz rows: of fewer nothing is asked
 STEADY_ROWS = 50  # 5 s over which a steady motion changes little
@@ -30,6 +31,7 @@ STEADY = 0.1  # share by which it may change over that time
 TURNING_ROWS = 20  # 2 s over which a rate of turn is taken from the heading
 TURNS = 0.2  # r L/U from which a ship turns hard: a rudder of 5 to 10 deg
 K_T = 0.3  # thrust coefficient of a propeller at rest: 0.2 to 0.5 (Carlton, 2018)
+TURN = ("heading", "yaw_rate", "velocity")  # what a turning rate r L/U is made of
 APART = ("place", "rudder ahead")  # asked of each unit, said of the worst
 
 
@@ -211,7 +213,7 @@ def _angles(rows: _Rows, profile: Profile) -> Iterator[Asked]:
         yield Asked("rudder at all", math.degrees(np.quantile(angle, QUANTILE)), one.name, one.name)
         if alone and turns.sum() >= LEAST_ROWS and angle.max() > 0.0:
             most = math.degrees(angle.max())
-            yield Asked("rudder hard over", most, one.name, one.name, ("heading", "velocity"))
+            yield Asked("rudder hard over", most, one.name, one.name, TURN)
 
 
 def _commands(rows: _Rows, profile: Profile) -> Iterator[Asked]:
@@ -226,11 +228,14 @@ def _commands(rows: _Rows, profile: Profile) -> Iterator[Asked]:
 
 
 def _turning(rows: _Rows, profile: Profile) -> Iterator[Asked]:
-    """r L/U of a ship under way, with the rate of turn of its heading."""
+    """r L/U of a ship under way, with the rate of turn of its heading. One that turns on the spot
+    says nothing of its length."""
+    if rows.speed_quantile < WAY:
+        return
     kept = rows.under_way & np.isfinite(rows.rate)
     if kept.sum() >= LEAST_ROWS:
         rate = rows.rate[kept] * profile.ship.length_m / rows.speed[kept]
-        yield Asked("turning", float(np.quantile(rate, QUANTILE)), SHIP, of=("heading", "velocity"))
+        yield Asked("turning", float(np.quantile(rate, QUANTILE)), SHIP, of=TURN)
 
 
 def _propellers(rows: _Rows, profile: Profile) -> Iterator[Asked]:

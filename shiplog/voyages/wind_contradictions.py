@@ -258,9 +258,11 @@ def _of_angle(convention: Convention, times: float, table: pl.DataFrame) -> Find
         f"times as much as it would if the recorded angle is {convention.name}. Look at the "
         f"anemometer; if so, {convention.key}."
     )
+    # A vane that is stuck looks like one that counts from north: then it is a question.
+    kind = "implausible" if convention.key == _NO_KIND else "contradiction"
     return Finding(
-        "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(times, 3),
-        unit="1", reason=convention.reason,
+        kind, "wind", sentence, start_s=0.0, end_s=_end(table), value=round(times, 3), unit="1",
+        reason=convention.reason,
     )  # fmt: skip
 
 

@@ -269,7 +269,7 @@ def test_a_mirrored_vane_turns_the_wind_with_the_ship():
 def test_a_direction_from_north_is_named_as_such():
     _, psi, speed, of, angle = blown()
     (found,) = wind_of(psi, speed, of, angle + psi)
-    assert found.reason == "frame" and "counted from north" in found.sentence
+    assert found.kind == "implausible" and "counted from north" in found.sentence
 
 
 def test_a_direction_towards_is_seen_by_a_ship_as_fast_as_the_gusts():
