@@ -117,12 +117,12 @@ class _Column:
         if self.number is not None and self._has(ONLY_DECIMAL["."], SAMPLE):
             self.own = "."
             return
-        if self.number is None and not self._has(r"[.,]"):
-            return
-        if self.number is None and not self._mostly_numbers():
+        there = [s for s in OTHER if self.texts.str.contains(s, literal=True).any()]
+        if not there or (self.number is None and not self._mostly_numbers()):
             return
         says = {
-            sign: self._has(ONLY_DECIMAL[sign]) or self._has(ONLY_GROUPS[OTHER[sign]])
+            sign: (sign in there and self._has_first(ONLY_DECIMAL[sign]))
+            or (OTHER[sign] in there and self._has_first(ONLY_GROUPS[OTHER[sign]]))
             for sign in OTHER
         }
         if says[","] != says["."]:
@@ -146,11 +146,14 @@ class _Column:
         texts = self.texts if most is None else self.texts.head(most)
         return bool(texts.str.contains(pattern).any())
 
+    def _has_first(self, pattern: str) -> bool:
+        return self._has(pattern, SAMPLE) or self._has(pattern)
+
     def _first(self, pattern: str) -> str:
         return str(self.texts.filter(self.texts.str.contains(pattern))[0])
 
     def _mostly_numbers(self) -> bool:
-        filled = self.texts.filter(self.texts != "")
+        filled = self.texts.filter(self.texts != "").head(SAMPLE)
         return bool(len(filled)) and filled.str.contains(NUMBER).mean() >= MOSTLY
 
     def read(self, sign: str | None, as_numbers: bool) -> pl.Series:
