@@ -106,10 +106,13 @@ def _certain(
     others = values[other]
     if channel == "cog" and mark.value == 360.0:
         return _no_north(values, at, other)
+    if mark.unit == "deg/min" and (at.sum() < LEAST_RUN or not len(others)):
+        return False  # a gyro may show such a rate, too
     if not len(others):
-        return mark.value not in (-128.0, 127.0, -127.0)  # deg/min, which a gyro may show
-    if mark.value == -1.0:
-        return bool(others.min() >= 0.0)
+        return True
+    if mark.value == -1.0:  # a speed astern in whole knots is a speed
+        fine = channel != "sog" or bool((others % 1.0 != 0.0).any())
+        return fine and bool(others.min() >= 0.0)
     outside = mark.value > others.max() or mark.value < others.min()
     return bool(outside) and bool(np.abs(others - mark.value).min() > APART * abs(mark.value))
 

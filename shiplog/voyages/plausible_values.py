@@ -192,21 +192,22 @@ class Screen:
         """Positions without a fix, on no place of the Earth, or where the ship cannot have gone."""
         geodetic = self.profile.sensors.kind("position") == "geodetic"
         place = si / DEGREE if geodetic else si
-        known = np.isfinite(place).all(axis=1)
+        known: np.ndarray = np.all(np.isfinite(place), axis=1)
         if not known.any():
             return
-        unfixed = nowhere = np.zeros(len(place), bool)
+        nowhere = np.zeros(len(place), np.bool_)
         if geodetic:
-            nowhere = known & (np.abs(np.nan_to_num(place)) > EARTH_DEG).any(axis=1)
+            sizes = np.abs(np.nan_to_num(place))
+            nowhere[:] = known & (sizes > EARTH_DEG).any(axis=1)
             if 2 * nowhere.sum() > known.sum():
                 return  # these are something else: ingest says so
-            on_earth = known & ~nowhere
-            middle = np.median(place[on_earth], axis=0)
-            if np.abs(middle).max() > FAR_DEG:
-                unfixed = on_earth & (np.abs(np.nan_to_num(place)) < NO_FIX_DEG).all(axis=1)
-            known = on_earth & ~unfixed
+            zero: np.ndarray = known & np.all(sizes < NO_FIX_DEG, axis=1)
+            others = known & ~nowhere & ~zero
+            if others.any() and np.abs(np.median(place[others], axis=0)).max() > FAR_DEG:
+                self._say_no_fix(times, si, zero)
+                known = others
+            known = known & ~nowhere
             place = _metres(place, known)
-        self._say_no_fix(times, si, unfixed)
         if not known.any():
             return
         reach = NEAR_M + self._fastest() * np.ptp(times[known]) * 1e-9

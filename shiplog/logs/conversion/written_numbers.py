@@ -154,7 +154,7 @@ class _Column:
 
     def _mostly_numbers(self) -> bool:
         filled = self.texts.filter(self.texts != "").head(SAMPLE)
-        return bool(len(filled)) and filled.str.contains(NUMBER).mean() >= MOSTLY
+        return len(filled) > 0 and filled.str.contains(NUMBER).sum() >= MOSTLY * len(filled)
 
     def read(self, sign: str | None, as_numbers: bool) -> pl.Series:
         """The column with plain decimal dots, where `sign` says what is one."""
