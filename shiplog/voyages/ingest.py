@@ -20,14 +20,9 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import (
-    clocks,
-    fault_detection,
-    plausible_values,
-    resampling,
-    sensor_consistency,
-)
+from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
 from shiplog.voyages import one_hertz as tables
+from shiplog.voyages import plausible_values as plausible
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
@@ -117,8 +112,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
-    screen = plausible_values.Screen(profile)
-    sampled = {name: _samples(reading, screen, name) for name, _ in profile.sensors.items()}
+    reading, screen = plausible.screened(reading, profile)
+    sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
@@ -127,7 +122,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
             hint="check topic, field and `clock` of the heading in the profile; `shiplog profile "
             "LOG` drafts one from the topics of the log.",
         )
-    driven = {a.name: _actuator_samples(reading, screen, a) for a in profile.actuators}
+    driven = {actuator.name: _actuator_samples(reading, actuator) for actuator in profile.actuators}
     every = {**sampled, **driven}
     start, end = _span(base, list(every.values()))
     moved += clocks.no_common_time(every, start, end)
@@ -234,16 +229,14 @@ def _numbers(column: pl.Series) -> np.ndarray:
     return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
-def _samples(reading: Reading, screen: plausible_values.Screen, name: str) -> resampling.Samples:
+def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
     """A sensor's samples in a form that can be interpolated, spikes marked.
 
     Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
     components, since halfway between 359° and 1° is 0°.
     """
-    profile = screen.profile
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
     times, value = _raw(reading, sensor)
-    value = screen.clear(name, sensor, times, value)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
@@ -368,12 +361,9 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(
-    reading: Reading, screen: plausible_values.Screen, actuator: Actuator
-) -> resampling.Samples:
+def _actuator_samples(reading: Reading, actuator: Actuator) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
-    value = screen.clear(actuator.name, actuator, times, value)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
     return resampling.ordered(times, value, actuator.tolerance_s)

@@ -75,13 +75,21 @@ def marked(
     factor   from these to SI, but for an offset
     """
     taken = np.zeros(len(raw), bool)
+    known = raw[np.isfinite(raw)]
+    if not len(known):
+        return
+    least, most = float(known.min()), float(known.max())
     for mark in MARKS:
         if mark.channels and channel not in mark.channels:
             continue
         if unit == "pwm" and not mark.unit:
             continue  # see `no_pulse`
-        values = raw * (abs(factor) / units.factor(mark.unit)) if mark.unit else raw
-        at = np.isclose(values, mark.value, rtol=EXACT, atol=0.0) & ~taken
+        scale = abs(factor) / units.factor(mark.unit) if mark.unit else 1.0
+        near = EXACT * abs(mark.value)
+        if not least * scale - near <= mark.value <= most * scale + near:
+            continue
+        values = raw * scale
+        at = (np.abs(values - mark.value) <= near) & ~taken
         if at.any() and _certain(channel, mark, values, at, np.isfinite(raw) & ~at & ~taken):
             taken |= at
             yield mark, at

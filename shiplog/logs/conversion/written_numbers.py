@@ -8,6 +8,7 @@ as its own values say, else as the other columns of the file do, else it is aske
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -77,13 +78,21 @@ def read_columns(
     """
     columns = [_Column(series, stated.get(series.name)) for series in texts.get_columns()]
     file = _of_file(columns)
+    commas = any(column.open_sign == "," and column.own is None for column in columns)
     made, undecided = [], {}
     for column in columns:
         sign = column.stated or column.own or (file if column.open_sign else None)
-        if sign is None and column.open_sign is not None and not column.plain_dots:
+        plain = column.plain_dots and not commas  # a dot is a decimal one where no comma is
+        if sign is None and column.open_sign is not None and not plain:
             undecided[column.texts.name] = column.example
         made.append(column.read(sign, as_numbers))
     return ReadColumns(pl.DataFrame(made), undecided, file == ",")
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number in any way of writing one."""
+    plain = re.sub(rf"^[{_DASHES}]\s?", "-", text.strip())
+    return bool(re.match(NUMBER, re.sub(rf"(?<=\d)[{_GROUPS}](?=\d{{3}})", "", plain)))
 
 
 def _of_file(columns: list[_Column]) -> str | None:
