@@ -24,13 +24,13 @@ from shiplog.voyages import (
     empty_course,
     fault_detection,
     plausible_measures,
-    plausible_values,
     required_topics,
     resampling,
     sampling_findings,
     time_line,
 )
 from shiplog.voyages import one_hertz as tables
+from shiplog.voyages import plausible_values as plausible
 from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -135,9 +135,9 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     required_topics.require(reading, profile)
     timed = time_line.one(reading, profile)
     reading, moved = timed.reading, list(timed.findings)
+    reading, screen = plausible.screened(reading, profile)
     moved += empty_course.findings_of(reading, profile, _raw)
-    screen = plausible_values.Screen(profile)
-    sampled = {name: _samples(reading, screen, name) for name, _ in profile.sensors.items()}
+    sampled = {name: _samples(reading, profile, name) for name, _ in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
         raise LogUnreadable(
@@ -149,7 +149,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     longest = resampling.longest_s(profile.ship.length_m)
     driven = {
         actuator.name: sampling_findings.order_of(
-            _actuator_samples(reading, screen, actuator, longest), actuator, base
+            _actuator_samples(reading, actuator, longest), actuator, base
         )
         for actuator in profile.actuators
     }
@@ -229,16 +229,14 @@ def _numbers(column: pl.Series) -> np.ndarray:
     return np.where(np.abs(raw) <= LARGEST, raw, np.nan)
 
 
-def _samples(reading: Reading, screen: plausible_values.Screen, name: str) -> resampling.Samples:
+def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Samples:
     """A sensor's samples in a form that can be interpolated, spikes marked.
 
     Position stays geodetic [deg] where it is so; angles are unwrapped; speed and direction become
     components, since halfway between 359° and 1° is 0°.
     """
-    profile = screen.profile
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
     times, value = _raw(reading, sensor)
-    value = screen.clear(name, sensor, times, value)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
@@ -367,12 +365,9 @@ def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None
     grid.columns["wind_angle"] = np.arctan2(moved[:, 1], moved[:, 0])
 
 
-def _actuator_samples(
-    reading: Reading, screen: plausible_values.Screen, actuator: Actuator, longest: float
-) -> resampling.Samples:
+def _actuator_samples(reading: Reading, actuator: Actuator, longest: float) -> resampling.Samples:
     """An actuator's samples; an azimuth as (cos, sin), so that it can be interpolated."""
     times, value = _raw(reading, actuator)
-    value = screen.clear(actuator.name, actuator, times, value)
     if actuator.circular:
         value = np.concatenate((np.cos(value), np.sin(value)), axis=1)
     hold = actuator.between == "hold"

@@ -75,13 +75,21 @@ def marked(
     factor   from these to SI, but for an offset
     """
     taken = np.zeros(len(raw), bool)
+    known = raw[np.isfinite(raw)]
+    if not len(known):
+        return
+    least, most = float(known.min()), float(known.max())
     for mark in MARKS:
         if mark.channels and channel not in mark.channels:
             continue
         if unit == "pwm" and not mark.unit:
             continue  # see `no_pulse`
-        values = raw * (abs(factor) / units.factor(mark.unit)) if mark.unit else raw
-        at = np.isclose(values, mark.value, rtol=EXACT, atol=0.0) & ~taken
+        scale = abs(factor) / units.factor(mark.unit) if mark.unit else 1.0
+        near = EXACT * abs(mark.value)
+        if not least * scale - near <= mark.value <= most * scale + near:
+            continue
+        values = raw * scale
+        at = (np.abs(values - mark.value) <= near) & ~taken
         if at.any() and _certain(channel, mark, values, at, np.isfinite(raw) & ~at & ~taken):
             taken |= at
             yield mark, at
@@ -106,10 +114,13 @@ def _certain(
     others = values[other]
     if channel == "cog" and mark.value == 360.0:
         return _no_north(values, at, other)
+    if mark.unit == "deg/min" and (at.sum() < LEAST_RUN or not len(others)):
+        return False  # a gyro may show such a rate, too
     if not len(others):
-        return mark.value not in (-128.0, 127.0, -127.0)  # deg/min, which a gyro may show
-    if mark.value == -1.0:
-        return bool(others.min() >= 0.0)
+        return True
+    if mark.value == -1.0:  # a speed astern in whole knots is a speed
+        fine = channel != "sog" or bool((others % 1.0 != 0.0).any())
+        return fine and bool(others.min() >= 0.0)
     outside = mark.value > others.max() or mark.value < others.min()
     return bool(outside) and bool(np.abs(others - mark.value).min() > APART * abs(mark.value))
 

@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import polars as pl
 
 from shiplog import units
 from shiplog.channels import DEGREE
 from shiplog.logs.health_report import Finding
+from shiplog.logs.read import Reading
 from shiplog.profile import Actuator, Profile, Source
 from shiplog.profile_channels import TABLE_CHANNELS
-from shiplog.voyages import not_available
+from shiplog.voyages import clocks, not_available
 
 # Kinds of ship by their length [m], the first that is long enough; the last one's are the rest.
 SMALL, BOAT = 3.0, 30.0
@@ -41,6 +43,7 @@ NO_FIX_DEG = 1e-4  # of 0 N 0 E, what receivers without a fix write
 FAR_DEG = 1.0  # from the other positions: 0 N 0 E is no place where the ship is
 EARTH_DEG = (90.0, 360.0)  # latitude and longitude, whichever way the latter is counted
 METRE_PER_DEG = 111_195.0  # of a great circle
+LARGEST = 1e12  # as the profile has it: what is beyond, as the largest float of all, is no value
 WORDS = {"sog": "speed", "cog": "course"}  # of a channel in a sentence
 SPEEDS = ("sog", "surge", "sway", "velocity_north", "velocity_east")
 
@@ -78,6 +81,36 @@ class LeftOut:
         )  # fmt: skip
 
 
+def screened(reading: Reading, profile: Profile) -> tuple[Reading, Screen]:
+    """The log with blanks in place of values that cannot be or stand for none, and what they are.
+
+    A field that two sources of the profile read is blank for both where it is for one.
+    """
+    screen, frames = Screen(profile), dict(reading.frames)
+    sources: list[tuple[str, Source]] = [*profile.sensors.items()]
+    sources += [(actuator.name, actuator) for actuator in profile.actuators]
+    for name, source in sources:
+        frame = frames.get(source.topic)
+        if frame is None or frame.height == 0:
+            continue
+        times = frame[clocks.of(frame, source)[0]]
+        raw = np.stack([_sent(frame[path]) for path in source.paths], axis=1)
+        raw[times.is_null().to_numpy()] = np.nan
+        clear = screen.clear(name, source, times.fill_null(0).to_numpy(), raw)
+        for path, before, after in zip(source.paths, raw.T, clear.T, strict=True):
+            gone = np.isfinite(before) & ~np.isfinite(after)
+            if gone.any():
+                frame = frame.with_columns(frame[path].set(pl.Series(gone), None))
+        frames[source.topic] = frame
+    return replace(reading, frames=frames), screen
+
+
+def _sent(column: pl.Series) -> np.ndarray:
+    """A field's values [n] as they were sent, NaN where there is none."""
+    values = column.cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+
 @dataclass
 class Screen:
     """What was left out of a log's values, source by source."""
@@ -85,33 +118,29 @@ class Screen:
     profile: Profile
     left_out: list[LeftOut] = field(default_factory=list)
 
-    def clear(
-        self, name: str, source: Source, times: np.ndarray, si: np.ndarray
-    ) -> np.ndarray:  # fmt: skip
-        """A source's values [n, k] in SI without what is none of them; times [n] ns."""
-        if not len(si):
-            return si
-        si = si.copy()
-        scale = source.scale()
-        raw = np.stack([si[:, i] / f + o for i, (o, f) in enumerate(scale)], axis=1)
+    def clear(self, name: str, source: Source, times: np.ndarray, raw: np.ndarray) -> np.ndarray:
+        """A source's values [n, k] as they were sent, NaN for what is none of them; times [n]
+        ns."""
+        offsets, factors = (np.array(part) for part in zip(*source.scale(), strict=True))
+        si = (raw - offsets) * factors
         si[_missing(raw, source.missing)] = np.nan
         if isinstance(source, Actuator):
             names: tuple[str, ...] = (source.kind,)
         else:
             names = TABLE_CHANNELS[name, self.profile.sensors.kind(name)]
-        for i, channel in enumerate(names):
-            unit, factor = _unit(source, i), scale[i][1]
+        for i, channel in enumerate(names[: len(source.paths)]):
+            unit, factor = _unit(source, i), float(factors[i])
             sent = np.where(np.isfinite(si[:, i]), raw[:, i], np.nan)
             for mark, at in not_available.marked(channel, sent, factor, unit):
                 self._mark(name, channel, mark, times, si, i, at, raw[:, i], unit)
             if unit == "pwm":
-                self._pulses(name, times, si, raw[:, i], scale[i][0], i)
+                self._pulses(name, times, si, raw[:, i], float(offsets[i]), i)
             limits = limits_of(self.profile, name, channel, source, i)
             if limits is not None:
                 self._beyond(name, source, times, si, i, raw[:, i], limits)
         if name == "position":
-            self._places(source, times, si, raw)
-        return si
+            self._places(times, si, raw)
+        return np.where(np.isfinite(si), raw, np.nan)
 
     def findings(self, start: int) -> list[Finding]:
         """One a channel and kind, of a voyage whose first row is at `start` [ns]."""
@@ -132,9 +161,7 @@ class Screen:
         shown = f"{mark.value if mark.unit else raw[at][0]:.10g} {mark.unit or unit}".strip()
         what = WORDS.get(channel, channel.replace("_", " "))
         if channel == "cog":  # nothing is unknown of a velocity of zero
-            still = at & (si[:, 1 - i] == 0.0)
-            si[still, i] = 0.0
-            at = at & ~still
+            at = at & (si[:, 1 - i] != 0.0)
         if not at.any():
             return
         si[at, i if channel in ("sog", "cog") else slice(None)] = np.nan
@@ -188,25 +215,26 @@ class Screen:
             extreme, unit, float(low), float(high),
         ))  # fmt: skip
 
-    def _places(self, source: Source, times: np.ndarray, si: np.ndarray, raw: np.ndarray) -> None:
+    def _places(self, times: np.ndarray, si: np.ndarray, raw: np.ndarray) -> None:
         """Positions without a fix, on no place of the Earth, or where the ship cannot have gone."""
         geodetic = self.profile.sensors.kind("position") == "geodetic"
         place = si / DEGREE if geodetic else si
-        known = np.isfinite(place).all(axis=1)
+        known: np.ndarray = np.all(np.isfinite(place), axis=1)
         if not known.any():
             return
-        unfixed = nowhere = np.zeros(len(place), bool)
+        nowhere = np.zeros(len(place), np.bool_)
         if geodetic:
-            nowhere = known & (np.abs(np.nan_to_num(place)) > EARTH_DEG).any(axis=1)
+            sizes = np.abs(np.nan_to_num(place))
+            nowhere[:] = known & (sizes > EARTH_DEG).any(axis=1)
             if 2 * nowhere.sum() > known.sum():
                 return  # these are something else: ingest says so
-            on_earth = known & ~nowhere
-            middle = np.median(place[on_earth], axis=0)
-            if np.abs(middle).max() > FAR_DEG:
-                unfixed = on_earth & (np.abs(np.nan_to_num(place)) < NO_FIX_DEG).all(axis=1)
-            known = on_earth & ~unfixed
+            zero: np.ndarray = known & np.all(sizes < NO_FIX_DEG, axis=1)
+            others = known & ~nowhere & ~zero
+            if others.any() and np.abs(np.median(place[others], axis=0)).max() > FAR_DEG:
+                self._say_no_fix(times, si, zero)
+                known = others
+            known = known & ~nowhere
             place = _metres(place, known)
-        self._say_no_fix(times, si, unfixed)
         if not known.any():
             return
         reach = NEAR_M + self._fastest() * np.ptp(times[known]) * 1e-9

@@ -129,3 +129,14 @@ def test_half_of_a_column_lost_is_a_loss(tmp_path):
     done = convert([tmp_path / "t.csv"], profiles.parse(PROFILE, "mine"), tmp_path / "out")
     (lost,) = done.lost.values()
     assert "20 of 30 values of 'psi' are no numbers, such as '5 deg'" in lost
+
+
+@pytest.mark.parametrize("first", ["1 000;\u20130.5", "1'000;-0.5", "1\u202f000;0.25"])
+def test_a_first_row_of_grouped_numbers_is_no_row_of_units(tmp_path, first):
+    read = table(tmp_path, f"a;b\n{first}\n999;0.5\n998;0.75\n")
+    assert read.frame["a"].to_list() == [1000, 999, 998] and not read.units
+
+
+def test_dots_next_to_commas_that_are_asked_for_are_asked_for_too(tmp_path):
+    found = table(tmp_path, 'a,b\n"1.000","2,742"\n"1.001","3,008"\n')
+    assert found.undecided == {"a": "1.000", "b": "2,742"}

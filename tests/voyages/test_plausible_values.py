@@ -305,3 +305,26 @@ def test_a_draft_s_length_narrows_nothing(tmp_path):
     parts = sailing.series(60.0)
     parts["/gyro"].columns["rate_degpmin"][ROWS] = 60 * 90.0
     assert not found(ingest(sailing.write(tmp_path / "a.mcap", parts), profile))
+
+
+def test_a_receiver_without_a_fix_for_most_of_the_log(tmp_path):
+    parts = sailing.series(60.0)
+    position = parts.pop("/position")
+    lat = 54.0 + position.columns["x_m"] / 111_320.0
+    lon = 10.0 + position.columns["y_m"] / 65_000.0
+    lat[:400], lon[:400] = 0.0, 0.0
+    parts["/fix"] = sailing.Series("/fix", "t.Fix", position.time, {"lat": lat, "lon": lon})
+    one = ingest(sailing.write(tmp_path / "a.mcap", parts), sailing.profile(GEODETIC))
+    (finding,) = found(one)
+    assert finding.kind == "not_available" and "400 of 600" in finding.sentence
+    assert usable(one)["x0"].abs().max() < 50.0
+
+
+def test_a_speed_astern_in_whole_knots_is_a_speed(tmp_path):
+    assert not found(
+        voyage(tmp_path, "/velocity", "sog_kn", lambda v: np.where(np.arange(len(v)) < 300, 1, -1))
+    )
+
+
+def test_one_turn_at_a_rate_that_ais_uses_as_a_mark_is_a_turn(tmp_path):
+    assert not found(voyage(tmp_path, "/gyro", "rate_degpmin", put(-128.0, [100, 300])))

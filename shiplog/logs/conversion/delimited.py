@@ -15,7 +15,7 @@ import polars as pl
 
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.sound_rows import sound_rows
-from shiplog.logs.conversion.written_numbers import read_columns
+from shiplog.logs.conversion.written_numbers import is_number, read_columns
 from shiplog.profile import Column
 
 log = logging.getLogger(__name__)
@@ -252,8 +252,8 @@ def _headed(cut: list[list[str]], count: int, separator: str, known: Collection[
     names = [re.sub(r"^#\s*", "", name.strip()) for name in cut[header]]
     after = cut[header + 1] if header + 1 < len(cut) else []
     later = cut[header + 2] if header + 2 < len(cut) else []
-    numbers = [i for i, field_ in enumerate(later) if _number(field_)]
-    words = [i for i in numbers if i < len(after) and not _number(after[i])]
+    numbers = [i for i, field_ in enumerate(later) if is_number(field_)]
+    words = [i for i in numbers if i < len(after) and not is_number(after[i])]
     stated = bool(numbers) and len(words) == len(numbers) and not any(map(_value, after))
     unit_row = [re.sub(r"^[\[(]|[\])]$", "", u.strip()) for u in after] if stated else []
     return Form(separator, header, unlike(names), unit_row, header + 1 + stated)
@@ -292,12 +292,8 @@ def _cut(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator), [])
 
 
-def _number(text: str) -> bool:
-    return bool(re.fullmatch(r"\s*[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\s*", text))
-
-
 def _value(text: str) -> bool:
-    return _number(text) or bool(re.match(TIME, text))
+    return is_number(text) or bool(re.match(TIME, text))
 
 
 def unlike(names: list[str]) -> list[str]:

@@ -138,11 +138,12 @@ def _of_chunk(begin: int, chunk: np.ndarray, separator: int) -> tuple[np.ndarray
     odd = np.zeros(len(start), bool)
     quote = chunk == QUOTE
     if quote.any():
-        marks = np.cumsum(quote)
-        before = np.concatenate(([0], marks[start[1:] - 1])) if len(start) > 1 else np.zeros(1, int)
-        odd = (np.append(before[1:], marks[-1]) - before) % 2 == 1
-        inside = (marks - np.repeat(before, np.diff(np.append(start, len(chunk))))) % 2 == 1
-        between &= ~inside
+        odd = np.add.reduceat(quote.view(np.uint8), start, dtype=np.int32) % 2 == 1
+        within = np.cumsum(quote, dtype=np.uint8)  # its last bit: whether inside of two marks
+        if odd.any():  # each line by itself: what one leaves open, the next one does not close
+            before = np.concatenate(([0], within[start[1:] - 1])).astype(np.uint8)
+            within -= np.repeat(before, np.diff(np.append(start, len(chunk))))
+        between &= within % 2 == 0
     values = np.add.reduceat(between.view(np.uint8), start, dtype=np.int32) + 1
     nul = chunk == NUL
     nuls = (

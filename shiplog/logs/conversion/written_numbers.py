@@ -8,6 +8,7 @@ as its own values say, else as the other columns of the file do, else it is aske
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -77,13 +78,21 @@ def read_columns(
     """
     columns = [_Column(series, stated.get(series.name)) for series in texts.get_columns()]
     file = _of_file(columns)
+    commas = any(column.open_sign == "," and column.own is None for column in columns)
     made, undecided = [], {}
     for column in columns:
         sign = column.stated or column.own or (file if column.open_sign else None)
-        if sign is None and column.open_sign is not None and not column.plain_dots:
+        plain = column.plain_dots and not commas  # a dot is a decimal one where no comma is
+        if sign is None and column.open_sign is not None and not plain:
             undecided[column.texts.name] = column.example
         made.append(column.read(sign, as_numbers))
     return ReadColumns(pl.DataFrame(made), undecided, file == ",")
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number in any way of writing one."""
+    plain = re.sub(rf"^[{_DASHES}]\s?", "-", text.strip())
+    return bool(re.match(NUMBER, re.sub(rf"(?<=\d)[{_GROUPS}](?=\d{{3}})", "", plain)))
 
 
 def _of_file(columns: list[_Column]) -> str | None:
@@ -117,12 +126,12 @@ class _Column:
         if self.number is not None and self._has(ONLY_DECIMAL["."], SAMPLE):
             self.own = "."
             return
-        if self.number is None and not self._has(r"[.,]"):
-            return
-        if self.number is None and not self._mostly_numbers():
+        there = [s for s in OTHER if self.texts.str.contains(s, literal=True).any()]
+        if not there or (self.number is None and not self._mostly_numbers()):
             return
         says = {
-            sign: self._has(ONLY_DECIMAL[sign]) or self._has(ONLY_GROUPS[OTHER[sign]])
+            sign: (sign in there and self._has_first(ONLY_DECIMAL[sign]))
+            or (OTHER[sign] in there and self._has_first(ONLY_GROUPS[OTHER[sign]]))
             for sign in OTHER
         }
         if says[","] != says["."]:
@@ -146,12 +155,15 @@ class _Column:
         texts = self.texts if most is None else self.texts.head(most)
         return bool(texts.str.contains(pattern).any())
 
+    def _has_first(self, pattern: str) -> bool:
+        return self._has(pattern, SAMPLE) or self._has(pattern)
+
     def _first(self, pattern: str) -> str:
         return str(self.texts.filter(self.texts.str.contains(pattern))[0])
 
     def _mostly_numbers(self) -> bool:
-        filled = self.texts.filter(self.texts != "")
-        return bool(len(filled)) and filled.str.contains(NUMBER).mean() >= MOSTLY
+        filled = self.texts.filter(self.texts != "").head(SAMPLE)
+        return len(filled) > 0 and filled.str.contains(NUMBER).sum() >= MOSTLY * len(filled)
 
     def read(self, sign: str | None, as_numbers: bool) -> pl.Series:
         """The column with plain decimal dots, where `sign` says what is one."""
