@@ -37,6 +37,9 @@ class Samples:
     blank   [m]     ns, times at which a message came without a usable value
 
     resolution  the step in which the instrument counts, SI (position in m); 0 where none shows
+    noise       standard deviation of one sample, its resolution included, SI (position in m)
+    elsewhere   how far off the farthest reading was of a stretch that was set aside as blank,
+                since the sensor stood still where it cannot have been; 0 where there is none
     """
 
     time: np.ndarray
@@ -47,6 +50,8 @@ class Samples:
     period_s: float
     tolerance_s: float
     resolution: float = 0.0
+    noise: float = 0.0
+    elsewhere: float = 0.0
 
     def nearest_rows(self, times: np.ndarray) -> np.ndarray:
         """Grid rows [m] bool that are the nearest to a sample; times [m] ns."""

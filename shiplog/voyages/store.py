@@ -44,7 +44,7 @@ if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a secon
     from shiplog.voyages.ingest import Voyage
 
 CORRECTED = ("kind", "channel", "value", "low", "high", "unit")
-INGEST_VERSION = 11  # raised when the same log would become another table or report
+INGEST_VERSION = 12  # raised when the same log would become another table or report
 SILENT_WAIT_S = 2.0  # how long one waits for another process without a word
 
 log = logging.getLogger(__name__)

@@ -1,0 +1,126 @@
+"""Values that repeat although the ship moves, told from rest and from a coarse instrument.
+
+A repeated value is a fault only where another sensor shows that it should have changed. A position
+is compared with the velocity's integral, a heading with the yaw rate's, or, where none is
+measured, with the course; a velocity or a yaw rate that repeats is compared with the change of the
+position or the heading. What an instrument counts in steps stands still until the ship has gone a
+step. A rate may be biased by as much as it scatters, or by DOUBT of what it measures.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shiplog.profile import Profile
+from shiplog.voyages import fault_detection
+from shiplog.voyages.resampling import STEP_NS, Samples
+
+if TYPE_CHECKING:
+    from shiplog.voyages.voyage_grid import VoyageGrid
+
+STEP_S = STEP_NS * 1e-9
+DOUBT = 0.02  # of the 95 % quantile of a rate: bias and scale of one that a filter has smoothed
+COURSE_S = 10.0  # s: a course is taken of the way in so many seconds
+COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little, 4 deg and more
+COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
+UNDER_WAY = 0.3  # of the 90 % quantile of the way: at a berth the wind and a current turn a course
+ALONG = 0.7  # sine of the angle between course and keel, in the middle: a ship that makes way
+SWING = math.radians(30.0)  # of the course beyond which a heading turns, too: drift of a hard turn
+
+
+def held(
+    name: str,
+    samples: Samples,
+    sampled: dict[str, Samples],
+    grid: VoyageGrid,
+    over_ground: np.ndarray,
+    profile: Profile,
+) -> list[tuple[int, int]]:
+    """Rows (first, last) in which a sensor repeats a value that cannot have stood still.
+
+    over_ground [m, 2]: velocity along x0 and y0, m/s, NaN where it is not known.
+    """
+    runs = fault_detection.repeats(samples.value)
+    least = 3.0 * samples.noise + samples.resolution
+
+    def kept(travel: np.ndarray | None, least: float, drift: float = 0.0) -> list[tuple[int, int]]:
+        return fault_detection.held_on_grid(grid.times, samples.time, runs, travel, least, drift)
+
+    speed, turning = np.nan_to_num(over_ground), np.nan_to_num(grid.columns["yaw_rate"])[:, None]
+    gone = np.cumsum(speed, axis=0) * STEP_S
+    turned = np.cumsum(turning, axis=0) * STEP_S
+    if name == "position":
+        return kept(gone, least, _bias(sampled["velocity"], speed))
+    if name == "heading":
+        if profile.sensors.yaw_rate is not None:
+            return kept(turned, least, _bias(sampled["yaw_rate"], turning))
+        course = _course(grid, sampled["position"].noise, profile.ship.length_m)
+        return [] if course is None else kept(course[:, None], least + SWING)
+    runs = fault_detection.improbable(runs, len(samples.time))
+    if samples.resolution == 0.0:
+        still = (samples.value == 0.0).all(axis=1)
+        fine = [run for run in runs if not still[run[0]]]
+        if name == "wind":
+            runs = fine
+            return kept(None, 0.0)
+        sure, runs = fine, [run for run in runs if still[run[0]]]
+    elif name == "wind":
+        still = (np.abs(samples.value) < samples.resolution).all(axis=1)
+        runs = [run for run in runs if not still[run[0]]]
+        return kept(None, 0.0)
+    else:
+        sure = []
+    if name == "velocity":
+        position = np.stack([_filled(grid.columns[c]) for c in ("x0", "y0")], axis=1)
+        other, off, bias = sampled["position"], position - gone, _bias(samples, speed)
+    else:
+        other, off = sampled["heading"], _unwrapped(grid.columns["heading"])[:, None] - turned
+        bias = _bias(samples, turning)
+    found = kept(off, 3.0 * other.noise + other.resolution, bias)
+    runs = sure
+    return sorted(found + kept(None, 0.0))
+
+
+def _bias(samples: Samples, rate: np.ndarray) -> float:
+    """How fast a rate that is 0 may be said to move, in its unit."""
+    return max(samples.noise, DOUBT * float(np.quantile(np.linalg.norm(rate, axis=1), 0.95)))
+
+
+def _course(grid: VoyageGrid, noise: float, length: float) -> np.ndarray | None:
+    """Unwrapped course [m], rad, of the way over COURSE_S, as it was last where the ship hardly
+    moves; None of a ship that does not mostly go along its keel, ahead or astern."""
+    half = max(round(0.5 * COURSE_S / STEP_S), 1)
+    count = len(grid.times)
+    if count <= 2 * half:
+        return None
+    position = np.stack([_filled(grid.columns[c]) for c in ("x0", "y0")], axis=1)
+    way = position[2 * half :] - position[: -2 * half]
+    far = np.linalg.norm(way, axis=1)
+    least = max(COURSE_NOISES * noise, COURSE_LENGTHS * length)
+    known = far > max(least, UNDER_WAY * float(np.quantile(far, 0.9)))
+    heading = grid.columns["heading"][half:-half]
+    course = np.arctan2(way[:, 1], way[:, 0])
+    across = np.abs(np.sin(course - heading))[known & np.isfinite(heading)]
+    if len(across) < 2 or float(np.median(across)) > ALONG:
+        return None
+    at = np.flatnonzero(known)
+    last = np.searchsorted(at + half, np.arange(count), side="right") - 1
+    return np.unwrap(course[at])[last.clip(0)]
+
+
+def _filled(column: np.ndarray) -> np.ndarray:
+    """A column [m] without its NaN, on straight lines across them."""
+    known = np.flatnonzero(np.isfinite(column))
+    if len(known) == 0:
+        return np.zeros(len(column))
+    return np.interp(np.arange(len(column)), known, column[known])
+
+
+def _unwrapped(heading: np.ndarray) -> np.ndarray:
+    known = np.isfinite(heading)
+    whole = heading.copy()
+    whole[known] = np.unwrap(heading[known])
+    return _filled(whole)
