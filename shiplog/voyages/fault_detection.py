@@ -218,21 +218,24 @@ def steps(value: np.ndarray, noise: float, period: float) -> list[tuple[int, flo
     """Samples at which a channel steps to stay there, and by how much: what is left to look at
     where no rate is known. value [n], unwrapped; period: what a full turn is.
 
-    The median of three samples on either side, so that neither a spike nor noise is a step; it has
-    to stand out of the steps around it, as a spike has.
+    The medians of three samples on either side differ, so that neither a spike nor noise is a step;
+    the step itself, beyond those before and after it, is half of that, and stands out of the steps
+    around it as a spike does.
     """
     if len(value) < 6:
         return []
+    single = np.diff(value)
+    single -= period * np.round(single / period)
     before = np.median(np.stack([value[i : len(value) - 5 + i] for i in range(3)]), axis=0)
     after = np.median(np.stack([value[i : len(value) - 5 + i] for i in range(3, 6)]), axis=0)
-    beyond = after - before
-    size = np.abs(beyond - period * np.round(beyond / period))
-    single = np.diff(value)
-    single = np.abs(single - period * np.round(single / period))
-    limit = max(12.0 * 1.4826 * float(np.median(single)), 8.0 * noise)
-    found = np.flatnonzero((size > limit) & (single[2:-2] > 0.5 * size)) + 3
-    found = found[single[found - 1] > LOUDER * _usual_steps(single, found)]
-    return [(int(i), float(size[i - 3])) for i in found]
+    apart = after - before
+    apart = np.abs(apart - period * np.round(apart / period))
+    usual = np.median(np.stack([single[i : len(single) - 4 + i] for i in (0, 1, 3, 4)]), axis=0)
+    size = np.abs(single[2:-2] - usual)
+    limit = max(12.0 * 1.4826 * float(np.median(np.abs(single))), 8.0 * noise)
+    found = np.flatnonzero((size > limit) & (2.0 * apart > size) & (2.0 * size > apart))
+    found = found[size[found] > LOUDER * _usual_steps(np.abs(single), found + 3)]
+    return [(int(i) + 3, float(size[i])) for i in found]
 
 
 def jumps(

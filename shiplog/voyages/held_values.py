@@ -10,16 +10,13 @@ step. A rate may be biased by as much as it scatters, or by DOUBT of what it mea
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from shiplog.profile import Profile
 from shiplog.voyages import fault_detection
 from shiplog.voyages.resampling import STEP_NS, Samples
-
-if TYPE_CHECKING:
-    from shiplog.voyages.voyage_grid import VoyageGrid
 
 STEP_S = STEP_NS * 1e-9
 DOUBT = 0.02  # of the 95 % quantile of a rate: bias and scale of one that a filter has smoothed
@@ -35,53 +32,53 @@ def held(
     name: str,
     samples: Samples,
     sampled: dict[str, Samples],
-    grid: VoyageGrid,
+    times: np.ndarray,
+    columns: Mapping[str, np.ndarray],
     over_ground: np.ndarray,
     profile: Profile,
 ) -> list[tuple[int, int]]:
     """Rows (first, last) in which a sensor repeats a value that cannot have stood still.
 
-    over_ground [m, 2]: velocity along x0 and y0, m/s, NaN where it is not known.
+    times [m] ns and columns [m] of the grid; over_ground [m, 2]: velocity along x0 and y0, m/s,
+    NaN where it is not known.
     """
     runs = fault_detection.repeats(samples.value)
     least = 3.0 * samples.noise + samples.resolution
 
-    def kept(travel: np.ndarray | None, least: float, drift: float = 0.0) -> list[tuple[int, int]]:
-        return fault_detection.held_on_grid(grid.times, samples.time, runs, travel, least, drift)
+    def kept(
+        runs: list[tuple[int, int]], travel: np.ndarray | None, least: float, drift: float = 0.0
+    ) -> list[tuple[int, int]]:
+        return fault_detection.held_on_grid(times, samples.time, runs, travel, least, drift)
 
-    speed, turning = np.nan_to_num(over_ground), np.nan_to_num(grid.columns["yaw_rate"])[:, None]
+    speed, turning = np.nan_to_num(over_ground), np.nan_to_num(columns["yaw_rate"])[:, None]
     gone = np.cumsum(speed, axis=0) * STEP_S
     turned = np.cumsum(turning, axis=0) * STEP_S
     if name == "position":
-        return kept(gone, least, _bias(sampled["velocity"], speed))
+        return kept(runs, gone, least, _bias(sampled["velocity"], speed))
+    if name == "heading" and profile.sensors.yaw_rate is not None:
+        return kept(runs, turned, least, _bias(sampled["yaw_rate"], turning))
+    position = np.stack([_filled(columns[c]) for c in ("x0", "y0")], axis=1)
     if name == "heading":
-        if profile.sensors.yaw_rate is not None:
-            return kept(turned, least, _bias(sampled["yaw_rate"], turning))
-        course = _course(grid, sampled["position"].noise, profile.ship.length_m)
-        return [] if course is None else kept(course[:, None], least + SWING)
+        noise = sampled["position"].noise
+        keel = columns["heading"].copy()
+        for first, last in kept(runs, None, 0.0):  # what may be frozen is not compared
+            keel[first : last + 1] = np.nan
+        course = _course(position, keel, noise, profile.ship.length_m)
+        return [] if course is None else kept(runs, course[:, None], least + SWING)
     runs = fault_detection.improbable(runs, len(samples.time))
-    if samples.resolution == 0.0:
-        still = (samples.value == 0.0).all(axis=1)
-        fine = [run for run in runs if not still[run[0]]]
-        if name == "wind":
-            runs = fine
-            return kept(None, 0.0)
-        sure, runs = fine, [run for run in runs if still[run[0]]]
-    elif name == "wind":
-        still = (np.abs(samples.value) < samples.resolution).all(axis=1)
-        runs = [run for run in runs if not still[run[0]]]
-        return kept(None, 0.0)
-    else:
-        sure = []
+    rest = (np.abs(samples.value) <= samples.resolution).all(axis=1)
+    moving = [run for run in runs if not rest[run[0]]]
+    if name == "wind":  # nothing to compare it with; a calm is none
+        return kept(moving, None, 0.0)
     if name == "velocity":
-        position = np.stack([_filled(grid.columns[c]) for c in ("x0", "y0")], axis=1)
         other, off, bias = sampled["position"], position - gone, _bias(samples, speed)
     else:
-        other, off = sampled["heading"], _unwrapped(grid.columns["heading"])[:, None] - turned
+        other, off = sampled["heading"], _unwrapped(columns["heading"])[:, None] - turned
         bias = _bias(samples, turning)
-    found = kept(off, 3.0 * other.noise + other.resolution, bias)
-    runs = sure
-    return sorted(found + kept(None, 0.0))
+    sure = moving if samples.resolution == 0.0 else []  # no value of so many digits comes twice
+    unsure = [run for run in runs if run not in sure]
+    shown = kept(unsure, off, 3.0 * other.noise + other.resolution, bias)
+    return sorted(kept(sure, None, 0.0) + shown)
 
 
 def _bias(samples: Samples, rate: np.ndarray) -> float:
@@ -89,24 +86,24 @@ def _bias(samples: Samples, rate: np.ndarray) -> float:
     return max(samples.noise, DOUBT * float(np.quantile(np.linalg.norm(rate, axis=1), 0.95)))
 
 
-def _course(grid: VoyageGrid, noise: float, length: float) -> np.ndarray | None:
+def _course(
+    position: np.ndarray, heading: np.ndarray, noise: float, length: float
+) -> np.ndarray | None:
     """Unwrapped course [m], rad, of the way over COURSE_S, as it was last where the ship hardly
     moves; None of a ship that does not mostly go along its keel, ahead or astern."""
     half = max(round(0.5 * COURSE_S / STEP_S), 1)
-    count = len(grid.times)
+    count = len(position)
     if count <= 2 * half:
         return None
-    position = np.stack([_filled(grid.columns[c]) for c in ("x0", "y0")], axis=1)
     way = position[2 * half :] - position[: -2 * half]
     far = np.linalg.norm(way, axis=1)
     least = max(COURSE_NOISES * noise, COURSE_LENGTHS * length)
     known = far > max(least, UNDER_WAY * float(np.quantile(far, 0.9)))
-    heading = grid.columns["heading"][half:-half]
-    course = np.arctan2(way[:, 1], way[:, 0])
-    across = np.abs(np.sin(course - heading))[known & np.isfinite(heading)]
-    if len(across) < 2 or float(np.median(across)) > ALONG:
-        return None
+    course, keel = np.arctan2(way[:, 1], way[:, 0]), heading[half:-half]
+    across = np.abs(np.sin(course - keel))[known & np.isfinite(keel)]
     at = np.flatnonzero(known)
+    if len(at) < 2 or (len(across) and float(np.median(across)) > ALONG):
+        return None
     last = np.searchsorted(at + half, np.arange(count), side="right") - 1
     return np.unwrap(course[at])[last.clip(0)]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from shiplog.profile import Sensors
 from shiplog.voyages import fault_detection, noise_estimate
-from shiplog.voyages.resampling import Samples
+from shiplog.voyages.resampling import STEP_NS, Samples
 
 RATES = ("velocity", "yaw_rate", "wind")  # sensors of a rate: see `noise_estimate`
 POLAR = ("sog_cog", "from_bow")  # kinds that count in a speed and in an angle
@@ -37,7 +37,9 @@ def judged(
     noise = math.hypot(noise, resolution / math.sqrt(12.0), aside / math.sqrt(12.0))
     samples = replace(samples, resolution=resolution, noise=noise)
     spike = fault_detection.spikes(metric, noise)
-    lost = _lost(samples.time, metric, spike, name)
+    lost = _lost(samples.time, metric, spike)
+    if name == "position" and len(metric) > 1:
+        lost += [one for one in _elsewhere(samples.time, metric) if one not in lost]
     return _without(replace(samples, spike=spike), metric, lost)
 
 
@@ -59,62 +61,68 @@ def _resolution(
     return speed, turned * float(np.quantile(np.abs(known[:, 0]), FAST_SHARE))
 
 
-def _lost(
-    time: np.ndarray, metric: np.ndarray, spike: np.ndarray, name: str
-) -> list[tuple[int, int]]:
-    """Stretches (first, last) in which a sensor stood still where it cannot have been.
+def _lost(time: np.ndarray, metric: np.ndarray, spike: np.ndarray) -> list[tuple[int, int]]:
+    """Stretches (first, last) in which a sensor stood still where it cannot have been, for no
+    longer than FROZEN_S. What stood still for longer is compared with the other sensors, and is
+    taken out of `spike`, in place.
 
     A receiver that has lost its fix repeats one position, often 0 N 0 E; a compass that starts
-    again one heading. Such a stretch stands out like a spike. That of a position that is nowhere
-    near the others is none of the voyage at the record's ends, either.
+    again one heading. Such a stretch stands out like a spike.
     """
-    same = np.concatenate(([False], (np.diff(metric, axis=0) == 0).all(axis=1)))[: len(metric)]
+    same = _same(metric)
     usual = len(same) / max(int((~same).sum()), 1)  # rows in which a value is written
-    found = [
-        (first, last)
-        for first, last in fault_detection.stretches(spike & (same | np.append(same[1:], False)))
-        if last - first + 1 > LONGER * usual
-    ]
-    if name == "velocity":  # what stands still for longer is compared with the position
-        limit = fault_detection.FROZEN_S * 1e9
-        found = [(a, b) for a, b in found if time[b] - time[a] <= limit]
-    if name == "position" and len(metric) > 1:
-        found += [one for one in _elsewhere(time, metric, same) if one not in found]
+    found = []
+    for first, last in fault_detection.stretches(spike & (same | np.append(same[1:], False))):
+        if last - first + 1 <= LONGER * usual:
+            continue
+        if time[last] - time[first] <= fault_detection.FROZEN_S * 1e9:
+            found.append((first, last))
+        else:
+            spike[first : last + 1] = False
     return found
 
 
-def _elsewhere(time: np.ndarray, metric: np.ndarray, same: np.ndarray) -> list[tuple[int, int]]:
-    """Stretches of one repeated position between steps that no ship can make."""
-    step = np.linalg.norm(np.diff(metric, axis=0), axis=1)
+def _same(metric: np.ndarray) -> np.ndarray:
+    """Samples [n] bool that repeat the one before them."""
+    return np.concatenate(([False], (np.diff(metric, axis=0) == 0).all(axis=1)))[: len(metric)]
+
+
+def _elsewhere(time: np.ndarray, metric: np.ndarray) -> list[tuple[int, int]]:
+    """Stretches of one repeated position between steps that no ship can make, also at the ends of
+    a record: a receiver before its first fix."""
+    same, step = _same(metric), np.linalg.norm(np.diff(metric, axis=0), axis=1)
     torn = step > FASTEST * np.maximum(np.diff(time) * 1e-9, 1.0)
     if not torn.any():
         return []
     edges = [0, *(np.flatnonzero(torn) + 1).tolist(), len(metric)]
-    parts = list(zip(edges[:-1], edges[1:], strict=True))
+    parts = list(pairwise(edges))
     longest = max(b - a for a, b in parts)
     return [(a, b - 1) for a, b in parts if 1 < b - a < longest and same[a + 1 : b].all()]
 
 
 def _without(samples: Samples, metric: np.ndarray, lost: list[tuple[int, int]]) -> Samples:
-    """Without those stretches, whose times become blank."""
-    if not lost:
-        return samples
+    """Without those stretches, whose times become blank from the sample before to the one after."""
     away = np.zeros(len(samples.time), bool)
     for first, last in lost:
         away[first : last + 1] = True
     keep = ~away
-    if keep.sum() < 2:
+    if not lost or keep.sum() < 2:
         return samples
     usual = np.stack([np.interp(np.flatnonzero(away), np.flatnonzero(keep), column[keep])
                       for column in metric.T], axis=1)  # fmt: skip
     farthest = float(np.linalg.norm(metric[away] - usual, axis=1).max())
+    period = round(samples.period_s * 1e9)
+    blank = [
+        np.arange(samples.time[first] - period + 1, samples.time[last] + period, STEP_NS)
+        for first, last in lost
+    ]
     return replace(
         samples,
         time=samples.time[keep],
         value=samples.value[keep],
         spike=samples.spike[keep],
         whole=_broken(samples.whole, away)[keep],
-        blank=np.union1d(samples.blank, samples.time[away]),
+        blank=np.union1d(samples.blank, np.concatenate(blank)),
         elsewhere=farthest,
     )
 

@@ -45,10 +45,9 @@ class VoyageGrid:
     def place(self, name: str, samples: resampling.Samples) -> np.ndarray:
         """A source's values on the grid [m, k]; its gaps, blanks and spikes noted."""
         placed = resampling.onto(self.times, samples)
-        far = samples.elsewhere * (1.0 if name in ("position", "velocity") else 180.0 / math.pi)
-        unit = {"position": "m", "velocity": "m/s"}.get(name, "deg")
-        stood = f", having stood still {far:.3g} {unit} away," if far else ""
-        self.note(placed.blank, Quality.BLANK, "blank", name, f"is blank{stood}")
+        stood = f", having stood still {_far(name, samples.elsewhere)} away,"
+        why = stood if samples.elsewhere else ""
+        self.note(placed.blank, Quality.BLANK, "blank", name, f"is blank{why}")
         self.note(placed.spike, Quality.SPIKE, "spike", name, "spikes")
         self.note(placed.gap, Quality.GAP, "gap", name, "has no sample")
         return placed.value
@@ -75,7 +74,9 @@ def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     """Values that repeat although the ship moves; frozen ones, too long to be data."""
     over_ground = _over_ground(grid)
     for name, samples in sampled.items():
-        rows = held_values.held(name, samples, sampled, grid, over_ground, profile)
+        rows = held_values.held(
+            name, samples, sampled, grid.times, grid.columns, over_ground, profile
+        )
         fault_detection.mark(grid.marks, rows, Quality.HELD)
         intervals = [fault_detection.seconds(i) for i in rows]
         lasted = [end - start for start, end in intervals]
@@ -159,6 +160,15 @@ def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, flo
     found = fault_detection.steps(samples.value[sound, 0], samples.noise, 2.0 * math.pi)
     rows = [(int(np.searchsorted(grid.times, time[at])), step) for at, step in found]
     return [(row, step) for row, step in rows if 0 < row < len(grid.times)]
+
+
+def _far(name: str, size: float) -> str:
+    """How far off a reading was, in words."""
+    if name == "position":
+        return f"{size / 1000.0:.0f} km" if size > 10_000.0 else f"{size:.3g} m"
+    if name in ("velocity", "wind"):
+        return f"{size:.3g} m/s"
+    return f"{math.degrees(size):.3g} deg" + ("/s" if name == "yaw_rate" else "")
 
 
 def _worth(step: float, rate: np.ndarray | float) -> float:
