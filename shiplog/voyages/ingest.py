@@ -154,9 +154,10 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
     channel = RESOLVED.get(name)
-    finest = samples.resolution * channel.to_display if channel else 0.0
+    factor = channel.to_display if channel else 0.0
     unit = channel.display_unit if channel else ""
-    return Instrument(name, round(1.0 / samples.period_s, 3), float(f"{finest:.3g}"), unit)
+    finest, sigma = (float(f"{v * factor:.3g}") for v in (samples.resolution, samples.noise))
+    return Instrument(name, round(1.0 / samples.period_s, 3), finest, unit, sigma)
 
 
 def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int]:

@@ -25,7 +25,15 @@ from __future__ import annotations
 
 import math
 
+from collections.abc import Iterable
+
 import numpy as np
+from scipy.special import ndtri
+
+from shiplog import units
+from shiplog.logs.health_report import Instrument
+from shiplog.profile import FINEST as SMALLEST
+from shiplog.profile import Profile
 
 ORDERS = (2, 3, 4, 5)  # of the differences; beyond five the samples are no neighbours any more
 FEWEST = 20  # differences of which a median is taken
@@ -46,7 +54,8 @@ def sigma(
     Of less than FEWEST differences it is that of the resolution alone, 0 where that is unknown.
     """
     own = own_samples(value)
-    noise = max((_white(time[own], column, rate) for column in value[own].T), default=0.0)
+    columns = value[own].T
+    noise = max((_white(time[own], one, resolution, rate) for one in columns), default=0.0)
     return max(noise, resolution / math.sqrt(12.0))
 
 
@@ -72,7 +81,7 @@ def own_samples(value: np.ndarray) -> np.ndarray:
     return np.flatnonzero(since % period == 0)
 
 
-def _white(time: np.ndarray, value: np.ndarray, rate: bool) -> float:
+def _white(time: np.ndarray, value: np.ndarray, resolution: float, rate: bool) -> float:
     """σ of the white noise about a smooth motion, [n]; 0 where there is too little to tell."""
     steps = np.diff(time)
     if len(steps) < FEWEST:
@@ -87,9 +96,40 @@ def _white(time: np.ndarray, value: np.ndarray, rate: bool) -> float:
         differences = np.abs(np.diff(value, n=order))[whole & alive]
         if len(differences) >= FEWEST:
             scale = math.sqrt(math.comb(2 * order, order))
-            found.append(TO_SIGMA * float(np.median(differences)) / scale)
+            found.append(_deviation(differences, resolution) / scale)
     finest = FINEST * float(np.quantile(np.abs(value), 0.95)) if rate else 0.0
     return max(min(found, default=0.0), finest)
+
+
+def _deviation(size: np.ndarray, resolution: float) -> float:
+    """Standard deviation of normal numbers of these sizes [n], by their median.
+
+    The median of what is counted in steps of q is a whole number of steps. There it is the share F
+    of the sizes up to the half step above the median, (m + ½) q, that says it: (m + ½) q =
+    σ Φ⁻¹(½ + ½ F).
+    """
+    median = float(np.median(size))
+    if resolution == 0.0:
+        return TO_SIGMA * median
+    edge = (round(median / resolution) + 0.5) * resolution
+    share = min(float(np.mean(size < edge)), 1.0 - 0.5 / len(size))
+    return edge / float(ndtri(0.5 + 0.5 * share))
+
+
+def completed(profile: Profile, instruments: Iterable[Instrument]) -> Profile:
+    """A profile with the accuracies that `ingest` estimated where it states none: of several
+    voyages the median."""
+    found: dict[str, list[float]] = {}
+    for one in instruments:
+        if one.sigma > 0.0 and one.unit in units.TO_SI:
+            found.setdefault(one.channel, []).append(one.sigma * units.factor(one.unit))
+    known = {}
+    for name, sensor in profile.sensors.items():
+        if sensor.sigma is None and name in found:
+            scale = 1.0 if name == "position" else abs(sensor.scale()[0][1])
+            sigma = max(rounded(float(np.median(found[name])) / scale), SMALLEST)
+            known[name] = sensor.model_copy(update={"sigma": sigma})
+    return profile.model_copy(update={"sensors": profile.sensors.model_copy(update=known)})
 
 
 def rounded(value: float) -> float:
