@@ -12,6 +12,7 @@ from shiplog.training.options import TrainOptions
 from shiplog.voyages.split import choose_physical_split, choose_split, say
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
+from shiplog.voyages.unchecked import refuse_unchecked
 
 if TYPE_CHECKING:
     from shiplog.training.provenance import Answer
@@ -25,6 +26,9 @@ def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     store = Store(store_path)
     split = choose(store, options.voyages, options.validation, options.data, options.window)
     say(split)
+    physical = MODELS[options.model].family is PHYSICS
+    profiles = [store.profile([name]) for name in (*split.training, *split.validation)]
+    refuse_unchecked(profiles, physical, options.unchecked)
     return train(store, out, options, split)
 
 

@@ -66,6 +66,9 @@ Folds = Annotated[
         "2 none is, and the fit is not tested on other voyages.",
     ),
 ]
+Unchecked = Annotated[
+    bool, typer.Option("--unchecked", help="Although lines of the profile still say CHECK.")
+]
 Again = Annotated[
     Path | None,
     typer.Option(help="Repeat this run from its folder alone; every setting is that run's."),
@@ -93,6 +96,7 @@ def train(
     without: Without = None,
     free: Free = None,
     folds: Folds = None,
+    unchecked: Unchecked = False,
     again: Again = None,
     store: StoreOption = STORE,
     json_to: JsonOption = None,
@@ -114,7 +118,7 @@ def train(
         model=model, data=data, voyages=tuple(voyages or ()), validation=tuple(validation or ()),
         seeds=seeds, window=window, recipe=recipe, width=width, wind_input=wind_input,
         epochs=epochs, device=device, fit=fit, parameters=parameters, without=tuple(without or ()),
-        free=tuple(free or ()), folds=folds,
+        free=tuple(free or ()), folds=folds, unchecked=unchecked,
     )  # fmt: skip
     options.check()
     refuse_run(out)

@@ -27,6 +27,7 @@ class TrainOptions:
     validation   those to validate on
     seeds        how many; they are numbered from 0
     window       length of a window [s]: samples at 1 Hz
+    unchecked    although lines of the profile still say CHECK
 
     Of networks:
     recipe       fast, or paper: the published one, which takes hours
@@ -49,6 +50,7 @@ class TrainOptions:
     validation: tuple[str, ...] = ()
     seeds: int = 1
     window: int = 100
+    unchecked: bool = False
     recipe: str = "fast"
     width: int = 256
     wind_input: str | None = None
