@@ -24,7 +24,6 @@ measures a rate is not taken to be finer than FINEST of what it measures, whatev
 from __future__ import annotations
 
 import math
-
 from collections.abc import Iterable
 
 import numpy as np

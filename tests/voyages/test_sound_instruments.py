@@ -100,9 +100,11 @@ def record(kind: Instruments, seconds=400.0, seed=1, **how):
     }
     still = np.abs(ship["surge"]) < 0.05
     sog = np.where(still, 0.0, np.abs(with_noise(ship["surge"], kind.sog)))
-    cog = with_noise(ship["heading"] + np.where(ship["surge"] < 0.0, 180.0, 0.0), kind.cog) % 360.0
-    parts = {"/fix": fix, "/velocity": {"sog": sog, "cog": cog},
-             "/compass": {"heading": with_noise(ship["heading"], kind.compass) % 360.0}}  # fmt: skip
+    cog = with_noise(ship["heading"], kind.cog) % 360.0
+    parts = {
+        "/fix": fix, "/velocity": {"sog": sog, "cog": cog},
+        "/compass": {"heading": with_noise(ship["heading"], kind.compass) % 360.0},
+    }  # fmt: skip
     text = HEAD.format(length=10.0)
     if kind.gyro is not None:
         parts["/gyro"] = {"rate": with_noise(ship["rate"], kind.gyro)}

@@ -12,6 +12,8 @@ E7 = 1e-7  # deg, what receivers count whole numbers of
 MOST_E7 = POLE / E7
 MOST_DDMM = 100.0 * POLE  # 9000.00 is 90 degrees and no minutes
 NOT_AVAILABLE = {"heading": 511.0, "sog": 102.3}  # what AIS has for "not available" [deg, kn]
+FEW = 20  # rows of which it is told whether a value ever changes
+SELDOM = 0.01  # of the rows: a value in fewer of them is no measurement of the voyage
 ASKED = 8  # vessels named where a draft has to ask
 
 
@@ -77,6 +79,15 @@ def holds(channel: str, values: pl.Series) -> bool:
     numbers = values.cast(pl.Float64)
     mark = NOT_AVAILABLE.get(channel)
     return bool((numbers.is_finite() & (numbers != mark if mark else True)).any())
+
+
+def idle(values: pl.Series) -> int:
+    """1 of a column that holds one value throughout, or one in hardly any row; else 0."""
+    if not values.dtype.is_numeric():
+        return 0
+    numbers = values.cast(pl.Float64).fill_nan(None).drop_nulls()
+    seldom = len(values) >= FEW and len(numbers) < SELDOM * len(values)
+    return int(seldom or (len(numbers) >= FEW and numbers.n_unique() == 1))
 
 
 def _largest(values: pl.Series) -> float:
