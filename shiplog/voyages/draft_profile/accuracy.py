@@ -13,6 +13,7 @@ from shiplog.voyages.sample_faults import POLAR, RATES
 METRE = 111_320.0  # m, a degree of latitude, near enough for an accuracy
 HOW = "estimated from the record: how far neighbouring samples scatter"
 STEPS = "estimated from the record: its values are whole multiples of that"
+FELT = 0.5  # of sigma: a finer step is one of the numbers that were written, not of the instrument
 NOT_SHOWN = (
     "# sigma = 0.0  # CHECK: the record does not show it; one standard deviation, of its data sheet"
 )
@@ -47,7 +48,7 @@ def lines(
         angle = max(sigma / max(speed, sigma), aside / math.sqrt(12.0))
         found = f"[{found}, {_number(angle / units.factor(given[-1]))}]"
     written = [f"sigma = {found}  # {HOW}"]
-    if step > 0.0:
+    if step > FELT * sigma:
         written.append(f"resolution = {_number(step / scale, 4)}  # {STEPS}")
     return written
 
