@@ -13,6 +13,7 @@ from shiplog.voyages.sample_faults import POLAR, RATES
 METRE = 111_320.0  # m, a degree of latitude, near enough for an accuracy
 HOW = "estimated from the record: how far neighbouring samples scatter"
 STEPS = "estimated from the record: its values are whole multiples of that"
+LEAST = 1e-7  # in its unit: less is the rounding of a computation
 FELT = 0.5  # of sigma: a finer step is one of the numbers that were written, not of the instrument
 NOT_SHOWN = (
     "# sigma = 0.0  # CHECK: the record does not show it; one standard deviation, of its data sheet"
@@ -40,9 +41,9 @@ def lines(
     else:
         step, speed = fault_detection.resolution(value), 0.0
     sigma = noise_estimate.sigma(time, value, step, name in RATES)
-    if sigma == 0.0:
-        return [NOT_SHOWN]
     scale = 1.0 if name == "position" else units.factor(given[0])
+    if sigma < LEAST * scale:
+        return [NOT_SHOWN]
     found = _number(sigma / scale)
     if name == "wind":
         angle = max(sigma / max(speed, sigma), aside / math.sqrt(12.0))

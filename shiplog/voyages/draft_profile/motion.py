@@ -19,6 +19,7 @@ SPAN_PERIODS = 3.0  # of the position, whichever is longer
 FAST = 0.3  # of the 90 % quantile of the ways: shorter ones say little of a course
 FEWEST = 10  # ways that are compared
 SAME_UNIT = 0.12  # of a ratio: m/s, kn and km/h are a factor of 1.9 apart
+SAME_TURN = 0.35  # likewise of a rate, of which noise takes away: deg/s and rad/s are 57 apart
 SAME_COURSE = 0.85  # mean cosine: an angle of 32 deg, drift and current included
 APART = 0.3  # of two units' mean cosines: one of them agrees
 TURNS = 0.6  # correlation of a rate and a turn: with less, the sign is not shown
@@ -118,6 +119,8 @@ class Motion:
             return None
         ratio = abs(together) / float(mean @ mean)
         unit = min(TURNING, key=lambda u: abs(math.log(ratio / units.factor(u))))
+        if abs(math.log(ratio / units.factor(unit))) > SAME_TURN:
+            return None
         return unit, math.copysign(1.0, together)
 
 
