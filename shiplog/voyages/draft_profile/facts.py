@@ -14,6 +14,7 @@ MOST_DDMM = 100.0 * POLE  # 9000.00 is 90 degrees and no minutes
 NOT_AVAILABLE = {"heading": 511.0, "sog": 102.3}  # what AIS has for "not available" [deg, kn]
 FEW = 20  # rows of which it is told whether a value ever changes
 SELDOM = 0.01  # of the rows: a value in fewer of them is no measurement of the voyage
+BURSTS = 5.0  # times the median step that the mean one is where several rows come at once
 ASKED = 8  # vessels named where a draft has to ask
 
 
@@ -96,11 +97,14 @@ def _largest(values: pl.Series) -> float:
 
 
 def of_times(times: pl.Series) -> str:
-    """Rate and count of messages at `times` [ns]."""
-    step = times.sort().diff().drop_nulls().median()
-    if not isinstance(step, (int, float)) or step <= 0:
+    """Rate and count of messages at `times` [ns]: the median's, of bursts the mean's."""
+    steps = times.sort().diff().drop_nulls()
+    step, mean = steps.median(), steps.mean()
+    if not isinstance(step, (int, float)) or not isinstance(mean, (int, float)) or mean <= 0:
         return f"{len(times)} messages"
-    return f"{1e9 / step:.3g} Hz, {len(times)} messages"
+    if step < mean / BURSTS and len(times) >= FEW and steps.quantile(1.0 - 1.0 / BURSTS) >= mean:
+        return f"{1e9 / mean:.3g} Hz in bursts, {len(times)} messages"
+    return f"{1e9 / step:.3g} Hz, {len(times)} messages" if step > 0 else f"{len(times)} messages"
 
 
 def counted(counts: dict[str, int], what: str) -> str:

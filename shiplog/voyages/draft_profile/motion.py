@@ -21,7 +21,8 @@ FEWEST = 10  # ways that are compared
 SAME_UNIT = 0.12  # of a ratio: m/s, kn and km/h are a factor of 1.9 apart
 SAME_TURN = 0.35  # likewise of a rate, of which noise takes away: deg/s and rad/s are 57 apart
 SAME_COURSE = 0.85  # mean cosine: an angle of 32 deg, drift and current included
-APART = 0.3  # of two units' mean cosines: one of them agrees
+APART = 4.0  # times as much is the other unit's mean cosine less than 1: twice the angle
+LEAST_APART = 0.05  # and so much at least, 18 deg
 TURNS = 0.6  # correlation of a rate and a turn: with less, the sign is not shown
 SPEEDS = ("m/s", "kn", "km/h", "cm/s", "mm/s")
 TURNING = ("deg/s", "rad/s", "deg/min")
@@ -92,8 +93,8 @@ class Motion:
             inner = (north * np.cos(course) + east * np.sin(course))[known] / size
             alike[unit, factor] = float(np.mean(inner))
         best, second = sorted(alike, key=lambda one: -alike[one])[:2]
-        sure = alike[best] > SAME_COURSE and alike[best] - alike[second] > APART
-        return best if sure else None
+        off, other = 1.0 - alike[best], 1.0 - alike[second]
+        return best if off < 1.0 - SAME_COURSE and max(APART * off, LEAST_APART) < other else None
 
     def turning(self, time: np.ndarray, rate: np.ndarray) -> tuple[str, float] | None:
         """(unit, sign) in which a rate [n] is that of the heading's change; None where they have

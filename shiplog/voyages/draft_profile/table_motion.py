@@ -16,6 +16,8 @@ from shiplog.voyages.draft_profile.motion import Motion
 
 METRE = 111_320.0  # m, a degree of latitude
 APART_S = 1e4  # s between two voyages of one table, whose times begin again
+ROWS = 50  # positions that are compared
+TURNS = 3.0  # times as far to the next position as to the one after it: a ship goes on
 Chosen = list[tuple[str, str, list[FoundColumn]]]
 
 
@@ -122,3 +124,25 @@ def _turning(one: FoundColumn, time: np.ndarray, rows: pl.DataFrame, motion: Mot
     if sign > 0.0:
         return one
     return with_doubts(replace(one, sign=-1.0), "it turns against the heading, and is turned round")
+
+
+def taking_turns(
+    chosen: Chosen, labels: list[FoundColumn], rows: pl.DataFrame
+) -> list[FoundColumn]:
+    """The labels, with a question at the time where two sources take turns in the rows: every
+    second position is near the one before the last, and not near the last."""
+    position = next((columns for name, _, columns in chosen if name == "position"), [])
+    place = _place(position, rows)
+    place = place[np.isfinite(place).all(axis=1)]
+    if len(place) < ROWS:
+        return labels
+    next_one, second = (
+        float(np.median(np.linalg.norm(place[by:] - place[:-by], axis=1))) for by in (1, 2)
+    )
+    if next_one <= TURNS * second or next_one == 0.0:
+        return labels
+    doubt = (
+        f"two receivers take turns, {next_one:.3g} m apart: is this one ship's table? Leave the "
+        "rows of one"
+    )
+    return [with_doubts(one, doubt) if one.channel == "time" else one for one in labels]

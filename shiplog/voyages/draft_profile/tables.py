@@ -71,6 +71,7 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     _choose_turning(found, labels, rows)
     chosen, second = _kinds(found, rows)
     chosen = table_motion.by_motion(chosen, labels, rows)
+    labels = table_motion.taking_turns(chosen, labels, rows)
     taken |= {f.column for _, _, columns in chosen for f in columns}
     taken |= {f.column for columns in found.values() for f in columns}
     actuators, idle = found_actuators(rows, table, taken)

@@ -89,6 +89,17 @@ class Log:
         steps = np.diff(np.sort(self.times(choice.topic)))
         return int(fewest < 2 or float(np.median(steps)) * 1e-9 > SLOW_S)
 
+    def liveliest(self, choices: list[Choice]) -> list[Choice]:
+        """Of topics that may hold a channel those first that live, else in the order they have."""
+        counts = {one.topic: len(self.times(one.topic)) for one in choices}
+        most = max(counts.values(), default=0)
+
+        def key(one: Choice) -> int:
+            few = counts[one.topic] < FEW and counts[one.topic] * 10 <= most
+            return max(self.life(one), int(few))
+
+        return sorted(choices, key=key)
+
     def between(self, topic: str, path: str) -> str:
         """A line for a value that is sent when it changes: it holds until the next one."""
         frame, number = self.data.get(topic), self.column(topic, path)
@@ -150,7 +161,7 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
         or [c for c in found[:1] if name not in OPTIONAL]
         for name, found in choices.items()
     }
-    choices = {name: sorted(found, key=log.life) for name, found in choices.items()}
+    choices = {name: log.liveliest(found) for name, found in choices.items()}
     best = [found[0] for found in choices.values() if found]
     driven = _actuators(log, {choice.topic for choice in best})
     parts = [_ship(log.contents)]
