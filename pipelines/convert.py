@@ -24,10 +24,11 @@ from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
-from shiplog.profile import Profile
+from shiplog.profile import Column, Profile
 from shiplog.unexpected import unexpected
 from shiplog.voyages.draft_profile import draft as draft_log
 from shiplog.voyages.draft_profile import draft_table
+from shiplog.voyages.draft_profile.folders import Folder, clock_section, look_into, recognised
 
 log = logging.getLogger(__name__)
 
@@ -69,15 +70,27 @@ def draft(path: Path, vessel: str | None = None) -> str:
             return draft_table(path, vessel)
         if not (is_bag(path) or is_signalk(path) or is_nmea(path) or path.is_dir()):
             return draft_log(path, vessel)
+        found = look_into(path) if path.is_dir() and not is_bag(path) else Folder()
+        if found.trips:
+            log.info(
+                "%s: %d tables of the same columns, a voyage each; drafted from %s. `convert` "
+                "takes the folder with the profile", path.name, len(found.trips),
+                found.trips[0].name,
+            )  # fmt: skip
+            return draft_table(found.trips[0], vessel)
         with files.temporary_folder() as folder:
             done = Converted()
-            (target,) = _each(path, None, folder, done)
-            for what in done.lost.values():
-                log.warning("%s: left out: %s", path.name, what)
-            return draft_log(target, vessel)
+            (target,) = _each(path, None, folder, done, found.clock)
+            text = draft_log(target, vessel)
+        for what in done.lost.values():
+            log.warning("%s: left out: %s", path.name, what)
+        return recognised(text, path, tuple(done.lost.values())) + clock_section(found.clock)
 
 
-def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
+def _each(
+    path: Path, profile: Profile | None, out: Path, done: Converted,
+    clock: tuple[str, Column] | None = None,
+) -> Iterator[Path]:  # fmt: skip
     check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table per topic")
     called = path.stem if path.is_file() else Path(os.path.abspath(path)).name  # of `.`, too
     ship = profile.ship.name if profile else called
@@ -89,8 +102,11 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
             done.lost[str(path)] = "; ".join(lost)
         log.info("%s written", target.name)
         yield target
+    elif path.is_dir() and profile is not None and (trips := look_into(path).trips):
+        for table in trips:
+            yield from _each(table, profile, out, done)
     elif path.is_dir():
-        folder = read_folder(path, profile)
+        folder = read_folder(path, profile, dict([clock] if clock else []))
         lost = [counted(folder.damaged, "damaged sentence") + "."] if folder.damaged else []
         if lost := [*lost, *folder.left_out]:
             done.lost[str(path)] = " ".join(lost)

@@ -14,6 +14,7 @@ from shiplog.voyages import contradicted
 from shiplog.voyages.split import choose_physical_split, choose_split, say
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
+from shiplog.voyages.unchecked import refuse_unchecked
 
 if TYPE_CHECKING:
     from shiplog.training.provenance import Answer
@@ -29,6 +30,9 @@ def train_command(store_path: Path, out: Path, options: TrainOptions) -> Answer:
     say(split)
     found = contradicted.of(store, (*split.training, *split.validation))
     warning = refuse_contradicted(found, options.unchecked)
+    physical = MODELS[options.model].family is PHYSICS
+    profiles = [store.profile([name]) for name in (*split.training, *split.validation)]
+    refuse_unchecked(profiles, physical, options.unchecked)
     answer = train(store, out, options, split)
     return answer.after(warning, contradictions=[one.as_json() for one in found])
 

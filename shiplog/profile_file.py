@@ -16,6 +16,7 @@ from shiplog import profile_units, units
 from shiplog.exceptions import ProfileError, listed, nearest
 from shiplog.profile import Actuator, Column, Profile, Sensor, Sensors, Ship, Site
 from shiplog.profile_channels import NEEDED
+from shiplog.unchecked_lines import refuse_key, unchecked_lines
 
 
 def shipped() -> tuple[str, ...]:
@@ -71,13 +72,15 @@ def parse(text: str, source: str) -> Profile:
             f"{source} is not valid TOML: {error}.",
             hint="mend that line; see the shipped profiles.",
         ) from error
+    refuse_key(content, source)
     table = content.get("table")
     if isinstance(table, dict):  # `"column" = "channel"` is short for SI values
         content["table"] = {
             k: {"channel": v} if isinstance(v, str) else v for k, v in table.items()
         }
     try:
-        profile = Profile.model_validate({**content, "source": source})
+        found = {"source": source, "unchecked": unchecked_lines(text)}
+        profile = Profile.model_validate({**content, **found})
         for item in (*(s for _, s in profile.sensors.items()), *profile.actuators):
             item.scale()  # an unknown unit is reported now, not in the middle of a log
         for column in profile.table.values():
@@ -164,7 +167,7 @@ def _keys_at(location: tuple) -> list[str]:
         "table": Column,
     }
     if not location:
-        return list(Profile.model_fields)
+        return [key for key in Profile.model_fields if key not in ("source", "unchecked")]
     section = sections.get(str(location[0]), Profile)
     if section is Sensors and len(location) > 1:
         section = Sensor

@@ -72,6 +72,7 @@ class Instrument:
     rate_hz: float
     resolution: float  # the step in which it counts, in `unit`; 0 where none shows
     unit: str
+    sigma: float = 0.0  # stated, else estimated from the record, in `unit`; 0 where none is known
 
 
 @dataclass(frozen=True, slots=True)

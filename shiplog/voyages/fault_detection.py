@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
@@ -19,9 +20,16 @@ FROZEN_S = 3.0  # a value held longer than this is stale, not data
 REPORTED_HELD_S = 0.5
 SAME_SPAN = 1e-9  # of the span of a channel: values nearer than that are one value
 FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
+FEWEST_CHANGES = 3  # a value is come to, on the average, where fewer values than that are seen
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
+NEIGHBOURS = 12  # samples on either side of one that say how lively a channel is just then
+QUIETER = 0.8  # of their steps: one spike in ten samples makes two large steps of ten
+LOUDER = 5.0  # times that step: of normal noise one in 1e9 is so far off the median of five
+OFTEN = 1.5  # times for which a value is usually written: a longer run lacks a value
+LATE_S = 0.5  # s: a sensor's clock or filter may be so late against another's
+SAME_TRAVEL = 0.25  # of a step by the rate: how far rates of different sensors may be apart
 
 
 def stretches(mask: np.ndarray) -> Iterator[tuple[int, int]]:
@@ -30,18 +38,49 @@ def stretches(mask: np.ndarray) -> Iterator[tuple[int, int]]:
     yield from zip(edge[::2].tolist(), (edge[1::2] - 1).tolist(), strict=True)
 
 
-def spikes(value: np.ndarray, sigma: float) -> np.ndarray:
+def spikes(value: np.ndarray, noise: float) -> np.ndarray:
     """Samples far off the median of the five around them (Hampel, 1974), [n, k] → [n].
 
-    A step leaves the median of five untouched, so a manoeuvre or a jump is no spike.
+    A step leaves the median of five untouched, so a manoeuvre or a jump is no spike. What repeats
+    counts once: a sample that a faster log wrote several times is one sample, and so is the rest
+    before a manoeuvre. A spike stands out of its neighbourhood, too, and not of the whole record
+    alone, of which a ship may lie still for most, or a wind blow evenly: it is farther off than
+    LOUDER times the step that QUIETER of the steps around it keep below.
+
+    noise: one standard deviation of a sample, its resolution included, in the unit of `value`
     """
+    count = len(value)
+    first = np.concatenate(([True], (np.diff(value, axis=0) != 0).any(axis=1)))[:count]
+    once = np.flatnonzero(first)
+    spike = _alone(value[once], noise)
+    return spike[np.cumsum(first) - 1] if count else spike
+
+
+def _alone(value: np.ndarray, noise: float) -> np.ndarray:
+    """`spikes` of samples no two neighbours of which are the same."""
     if len(value) < 5:
         return np.zeros(len(value), bool)
     off = np.zeros(len(value))
     off[2:-2] = np.linalg.norm(value[2:-2] - _medians_of_five(value), axis=1)
     typical = 1.4826 * float(np.median(off[2:-2]))
-    step = float(np.median(np.linalg.norm(np.diff(value, axis=0), axis=1)))  # of a free-run motion
-    return off > max(10.0 * typical, 10.0 * sigma, 5.0 * step, 1e-9)
+    steps = np.linalg.norm(np.diff(value, axis=0), axis=1)
+    step = float(np.median(steps))  # of a free-run motion
+    spike = off > max(10.0 * typical, 10.0 * noise, 5.0 * step, 1e-9)
+    at = np.flatnonzero(spike)
+    spike[at] = off[at] > LOUDER * _usual_steps(steps, at)
+    return spike
+
+
+def _usual_steps(steps: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The step that QUIETER of those around each sample `at` keep below, without the sample's own.
+
+    steps [n - 1] from each of n samples to the next; the two on either side are left out: a spike
+    of two samples has them all.
+    """
+    around = np.concatenate((np.arange(-NEIGHBOURS, -2), np.arange(2, NEIGHBOURS)))
+    rows = at[:, None] + around
+    near = np.where((rows >= 0) & (rows < len(steps)), steps[rows.clip(0, len(steps) - 1)], np.nan)
+    return np.nan_to_num(np.nanquantile(near, QUIETER, axis=1)) if len(at) else np.zeros(0)
 
 
 def _medians_of_five(value: np.ndarray) -> np.ndarray:
@@ -54,18 +93,26 @@ def _medians_of_five(value: np.ndarray) -> np.ndarray:
 
 
 def repeats(value: np.ndarray) -> list[tuple[int, int]]:
-    """Runs (first, last) of samples that all equal the one before them, [n, k]."""
+    """Runs (first, last) of samples that all equal the one before them, [n, k].
+
+    A log at a higher rate than the instrument's writes every value several times: a run no longer
+    than OFTEN times the usual one is none.
+    """
     if len(value) < 2:
         return []
     same = np.concatenate(([False], (np.diff(value, axis=0) == 0).all(axis=1)))
-    return list(stretches(same))
+    changes = np.flatnonzero(~same)
+    usual = float(np.median(np.diff(changes))) if len(changes) > 1 else 1.0
+    least = 1 if usual < 2.0 else OFTEN * usual - 1.0
+    return [(a, b) for a, b in stretches(same) if b - a + 1 > least or least == 1]
 
 
 def resolution(value: np.ndarray) -> float:
     """The step in which an instrument counts, of values [n, k] the coarsest; 0 where none shows.
 
     An instrument counts in steps of q where nearly all differences between the values that it took
-    are whole multiples of q.
+    are whole multiples of q. Of few different values the changes from one to another have to show
+    that it is no slow motion past them.
     """
     found = 0.0
     for column in value.T:
@@ -75,7 +122,9 @@ def resolution(value: np.ndarray) -> float:
         # what rounding of the arithmetic made is no difference
         apart = apart[apart > SAME_SPAN * span]
         if len(apart) < FEWEST_STEPS:  # it hardly moved
-            continue
+            changes = int((np.abs(np.diff(column)) > SAME_SPAN * span).sum())
+            if len(apart) == 0 or changes < FEWEST_CHANGES * (len(apart) + 1):
+                continue
         step = float(apart.min())
         step = float(np.median(apart[apart < 1.5 * step]))  # rounding averaged away
         off = np.abs(apart / step - np.round(apart / step))
@@ -165,15 +214,47 @@ def held_on_grid(
     return kept
 
 
+def steps(value: np.ndarray, noise: float, period: float) -> list[tuple[int, float]]:
+    """Samples at which a channel steps to stay there, and by how much: what is left to look at
+    where no rate is known. value [n], unwrapped; period: what a full turn is.
+
+    The medians of three samples on either side differ, so that neither a spike nor noise is a step;
+    the step itself, beyond those before and after it, is half of that, and stands out of the steps
+    around it as a spike does.
+    """
+    if len(value) < 6:
+        return []
+    single = np.diff(value)
+    single -= period * np.round(single / period)
+    before = np.median(np.stack([value[i : len(value) - 5 + i] for i in range(3)]), axis=0)
+    after = np.median(np.stack([value[i : len(value) - 5 + i] for i in range(3, 6)]), axis=0)
+    apart = after - before
+    apart = np.abs(apart - period * np.round(apart / period))
+    usual = np.median(np.stack([single[i : len(single) - 4 + i] for i in (0, 1, 3, 4)]), axis=0)
+    size = np.abs(single[2:-2] - usual)
+    limit = max(12.0 * 1.4826 * float(np.median(np.abs(single))), 8.0 * noise)
+    found = np.flatnonzero((size > limit) & (2.0 * apart > size) & (2.0 * size > apart))
+    found = found[size[found] > LOUDER * _usual_steps(np.abs(single), found + 3)]
+    return [(int(i) + 3, float(size[i])) for i in found]
+
+
 def jumps(
-    gone: np.ndarray, rate: np.ndarray, usable: np.ndarray, noise: float, every_rows: int = 1
+    gone: np.ndarray,
+    rate: np.ndarray,
+    usable: np.ndarray,
+    noise: float,
+    every_rows: int = 1,
+    period: float | None = None,
 ) -> list[tuple[int, float]]:
     """Rows whose step since the last usable row is not what the rate says, and by how much.
 
     gone [m, k]: the channel; rate [m, k]: its derivative; usable [m]: rows with a measured value,
-    `every_rows` apart where none is missing. The step is compared over everything since the last
-    usable row, so that a value held for a while and then caught up is no jump; over a gap the rate
-    is interpolated, and half of that travel is allowed as error.
+    `every_rows` apart where none is missing; period: what a full turn is of a channel that turns.
+    The step is compared over everything since the last usable row, so that a value held for a
+    while and then caught up is no jump; over a gap the rate is interpolated, and half of that
+    travel is allowed as error. Elsewhere it is SAME_TRAVEL, and what the rate changes by within
+    LATE_S, by which sensors may differ in time: a ship that lay still for most of the record makes
+    errors typical that are none of its motion.
     """
     step = STEP_NS * 1e-9
     rows = np.flatnonzero(usable)
@@ -183,11 +264,19 @@ def jumps(
     known = np.stack([np.interp(at, rows, column[rows]) for column in rate.T], axis=1)
     expected = np.zeros_like(known)
     np.cumsum(0.5 * (known[1:] + known[:-1]) * step, axis=0, out=expected[1:])
-    error = np.linalg.norm(np.diff(gone[rows] - expected[rows], axis=0), axis=1)
+    beyond = np.diff(gone[rows] - expected[rows], axis=0)
+    if period is not None:
+        beyond -= period * np.round(beyond / period)
+    error = np.linalg.norm(beyond, axis=1)
     travel = np.linalg.norm(np.diff(expected[rows], axis=0), axis=1)
     limit = max(12.0 * 1.4826 * float(np.median(error)), 8.0 * noise)
-    limits = limit + np.where(np.diff(rows) > 1.5 * every_rows, 0.5 * travel, 0.0)
-    return [(int(rows[i + 1]), float(error[i])) for i in np.flatnonzero(error > limits)]
+    share = np.where(np.diff(rows) > 1.5 * every_rows, 0.5, SAME_TRAVEL)
+    late = 2 * round(LATE_S / step) + 1
+    changes = maximum_filter1d(known, late, axis=0) - minimum_filter1d(known, late, axis=0)
+    lag = np.linalg.norm(changes[rows[1:]], axis=1) * np.diff(rows) * step
+    found = np.flatnonzero(error > limit + share * travel + lag)
+    found = found[error[found] > LOUDER * _usual_steps(error, found)]
+    return [(int(rows[i + 1]), float(error[i])) for i in found]
 
 
 def mark(quality: np.ndarray, intervals: list[tuple[int, int]], flag: Quality) -> None:

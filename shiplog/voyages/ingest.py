@@ -22,10 +22,10 @@ from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
     clocks,
     empty_course,
-    fault_detection,
     plausible_measures,
     required_topics,
     resampling,
+    sample_faults,
     sampling_findings,
     time_line,
 )
@@ -191,9 +191,10 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
     channel = RESOLVED.get(name)
-    finest = samples.resolution * channel.to_display if channel else 0.0
+    factor = channel.to_display if channel else 0.0
     unit = channel.display_unit if channel else ""
-    return Instrument(name, round(1.0 / samples.period_s, 3), float(f"{finest:.3g}"), unit)
+    finest, sigma = (float(f"{v * factor:.3g}") for v in (samples.resolution, samples.noise))
+    return Instrument(name, round(1.0 / samples.period_s, 3), finest, unit, sigma)
 
 
 def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int]:
@@ -236,7 +237,8 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     components, since halfway between 359° and 1° is 0°.
     """
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
-    times, value = _raw(reading, sensor)
+    times, raw = _raw(reading, sensor)
+    value = raw
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
         value = _on_earth(reading, sensor, value)
@@ -259,9 +261,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         latitude, longitude = samples.value.T
         longitude = np.unwrap(longitude, period=360.0)
         samples = replace(samples, value=np.stack((latitude, longitude), axis=1))
-    metric = _metric(samples.value, kind)
-    spike = fault_detection.spikes(metric, profile.sensors.noise(name))
-    return replace(samples, spike=spike, resolution=fault_detection.resolution(metric))
+    return sample_faults.judged(samples, _metric(samples.value, kind), raw, profile.sensors, name)
 
 
 def _on_earth(reading: Reading, sensor: Sensor, value: np.ndarray) -> np.ndarray:
@@ -302,7 +302,8 @@ def _motion(
     if sensors.yaw_rate is not None:
         yaw_rate = grid.place("yaw_rate", sampled["yaw_rate"])[:, 0]
     else:
-        yaw_rate = resampling.onto(grid.times, _differentiated(sampled["heading"])).value[:, 0]
+        turning = sample_faults.differentiated(sampled["heading"])
+        yaw_rate = resampling.onto(grid.times, turning).value[:, 0]
     position = grid.place("position", sampled["position"])
     datum = None
     if kind("position") == "geodetic":
@@ -318,12 +319,6 @@ def _motion(
         "surge": velocity[:, 0], "sway": velocity[:, 1], "yaw_rate": yaw_rate,
     }  # fmt: skip
     return datum
-
-
-def _differentiated(heading: resampling.Samples) -> resampling.Samples:
-    """The yaw rate [rad/s] at the heading's own samples; rows between them hold no more."""
-    rate = np.gradient(heading.value[:, 0], heading.time * 1e-9)
-    return replace(heading, value=rate[:, None])
 
 
 def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> tuple[float, float]:

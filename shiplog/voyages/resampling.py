@@ -52,6 +52,9 @@ class Samples:
     dropped     samples that are not used, since another one has their stamp; of them `beside` are
                 another instrument's
     taken_for_order  its samples show that it is sent when it changes
+    noise       standard deviation of one sample, its resolution included, SI (position in m)
+    elsewhere   how far off the farthest reading was of a stretch that was set aside as blank,
+                since the sensor stood still where it cannot have been; 0 where there is none
     """
 
     time: np.ndarray
@@ -62,6 +65,8 @@ class Samples:
     period_s: float
     tolerance_s: float
     resolution: float = 0.0
+    noise: float = 0.0
+    elsewhere: float = 0.0
     hold: bool = False
     longest_s: float = math.inf
     step_s: float = 0.0

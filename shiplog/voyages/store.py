@@ -38,7 +38,7 @@ from shiplog.logs.health_report import CONTRACT, VoyageReport
 from shiplog.profile import Profile
 from shiplog.profile_differences import differences, readings
 from shiplog.profile_file import advice
-from shiplog.voyages import catalogue, one_hertz, parts
+from shiplog.voyages import catalogue, noise_estimate, one_hertz, parts
 from shiplog.voyages.catalogue import NEW, OLD, CatalogueEntry
 
 if TYPE_CHECKING:  # with it come scipy and the readers of logs, in half a second
@@ -179,11 +179,12 @@ class Store:
         """The profile the voyages were read through. Raises StoreError for two ships, and for two
         profiles of one that differ in sizes, places or kinds of sensors."""
         chosen: Profile | None = None
-        first = ""
+        first, instruments = "", []
         for name in names:
             part = self.part_of(name)
             facts = catalogue.facts(self._folder(part.whole if part else name))
             source = facts.get("profile_source", "")
+            instruments += VoyageReport.from_json(facts["report"]).instruments
             try:
                 profile = Profile.model_validate(facts["profile"] | {"source": source})
             except ValidationError as error:
@@ -216,7 +217,7 @@ class Store:
                 )  # fmt: skip
         if chosen is None:
             raise StoreError("No voyage was chosen.", hint="name some with --voyages.")
-        return chosen
+        return noise_estimate.completed(chosen, instruments)
 
     def tables(self, names: Sequence[str]) -> list[pl.LazyFrame]:
         """The 10 Hz rows, a lazy table a voyage: voyage, time, the ship's columns, quality.

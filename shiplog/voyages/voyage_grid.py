@@ -15,7 +15,7 @@ from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
-from shiplog.voyages import fault_detection, plausible_values, resampling
+from shiplog.voyages import fault_detection, held_values, plausible_values, resampling
 
 STEP_S = resampling.STEP_NS * 1e-9
 
@@ -54,7 +54,9 @@ class VoyageGrid:
         left_out = self.explained.get(name, self.times[:0])
         said = plausible_values.rows_explained(self.times, samples.time, left_out)
         self.marks[said & (placed.blank | placed.gap)] |= int(Quality.BLANK)
-        self.note(placed.blank & ~said, Quality.BLANK, "blank", name, "is blank")
+        stood = f", having stood still {_far(name, samples.elsewhere)} away,"
+        why = stood if samples.elsewhere else ""
+        self.note(placed.blank & ~said, Quality.BLANK, "blank", name, f"is blank{why}")
         self.note(placed.spike, Quality.SPIKE, "spike", name, "spikes")
         if samples.sparse:
             self.marks[placed.gap] |= int(Quality.GAP)
@@ -81,24 +83,12 @@ def mark_gaps(grid: VoyageGrid) -> None:
 
 
 def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling.Samples]) -> None:
-    """Values that repeat although the ship moves; frozen ones, too long to be data.
-
-    What an instrument counts in steps stands still until the ship has gone a step. What the rate
-    says may be noise and bias, and a rate's bias is no larger than its noise.
-    """
-    sensors = profile.sensors
-    speed = np.nan_to_num(_over_ground(grid))
-    travel = {"position": (np.cumsum(speed, axis=0) * STEP_S, sensors.noise("velocity"))}
-    if sensors.yaw_rate is not None:  # else it is the heading's own derivative
-        turning = np.nan_to_num(grid.columns["yaw_rate"])[:, None]
-        travel["heading"] = np.cumsum(turning, axis=0) * STEP_S, sensors.noise("yaw_rate")
+    """Values that repeat although the ship moves; frozen ones, too long to be data."""
+    over_ground = _over_ground(grid)
     for name, samples in sampled.items():
-        runs = fault_detection.repeats(samples.value)
-        if name not in travel:
-            runs = fault_detection.improbable(runs, len(samples.time))
-        gone, drift = travel.get(name, (None, 0.0))
-        least = 3.0 * sensors.noise(name) + samples.resolution
-        rows = fault_detection.held_on_grid(grid.times, samples.time, runs, gone, least, drift)
+        rows = held_values.held(
+            name, samples, sampled, grid.times, grid.columns, over_ground, profile
+        )
         fault_detection.mark(grid.marks, rows, Quality.HELD)
         intervals = [fault_detection.seconds(i) for i in rows]
         lasted = [end - start for start, end in intervals]
@@ -113,7 +103,7 @@ def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
             "held", name, long, "repeats the same value while the ship moves,"
         )
         brief = [s for s in lasted if s < fault_detection.REPORTED_HELD_S]
-        if brief:
+        if sum(brief) >= fault_detection.REPORTED_HELD_S:
             often = "once" if len(brief) == 1 else f"{len(brief)} times"
             sentence = f"{name} repeats itself briefly, {often}, {sum(brief):.1f} s in all."
             grid.findings.append(
@@ -134,16 +124,22 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     position = np.stack((columns["x0"], columns["y0"]), 1)
 
     found = []
-    for row, step in _jumps(grid, profile, sampled, "position", position, over_ground):
+    for row, step in _jumps(grid, sampled["position"], position, over_ground):
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
             grid.marks[row] |= int(Quality.JUMP)
         found.append(_jump("position", row, step, "m", lost))
-    for row, step in _jumps(grid, profile, sampled, "heading", heading[:, None], turning[:, None]):
+    if profile.sensors.yaw_rate is None:  # a derivative is not compared with what it is of
+        turns, lasting = _steps(grid, sampled["heading"]), None
+    else:
+        turns = _jumps(grid, sampled["heading"], heading[:, None], turning[:, None], 2.0 * math.pi)
+        lasting = turning
+    for row, step in turns:
         if step > JUMP_RAD:
             grid.marks[row] |= int(Quality.JUMP)
-        lost = _worth(step, turning[row])
-        found.append(_jump("heading", row, math.degrees(step), "deg", lost))
+        lost = math.inf if lasting is None else _worth(step, lasting[row])
+        by = "the samples around it" if lasting is None else "its rate"
+        found.append(_jump("heading", row, math.degrees(step), "deg", lost, by))
     grid.findings += found
 
 
@@ -156,20 +152,35 @@ def _over_ground(grid: VoyageGrid) -> np.ndarray:
 
 def _jumps(
     grid: VoyageGrid,
-    profile: Profile,
-    sampled: dict[str, resampling.Samples],
-    name: str,
+    samples: resampling.Samples,
     gone: np.ndarray,
     rate: np.ndarray,
+    period: float | None = None,
 ) -> list[tuple[int, float]]:
     """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are."""
-    samples = sampled[name]
     usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
     every = max(round(samples.period_s / STEP_S), 1)
     if every > 1:
         usable &= samples.nearest_rows(grid.times)
-    noise = math.hypot(profile.sensors.noise(name), samples.resolution / math.sqrt(12.0))
-    return fault_detection.jumps(gone, rate, usable, noise, every)
+    return fault_detection.jumps(gone, rate, usable, samples.noise, every, period)
+
+
+def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, float]]:
+    """Rows and sizes of the steps of a heading whose rate nobody measured."""
+    sound = ~samples.spike
+    time = samples.time[sound]
+    found = fault_detection.steps(samples.value[sound, 0], samples.noise, 2.0 * math.pi)
+    rows = [(int(np.searchsorted(grid.times, time[at])), step) for at, step in found]
+    return [(row, step) for row, step in rows if 0 < row < len(grid.times)]
+
+
+def _far(name: str, size: float) -> str:
+    """How far off a reading was, in words."""
+    if name == "position":
+        return f"{size / 1000.0:.0f} km" if size > 10_000.0 else f"{size:.3g} m"
+    if name in ("velocity", "wind"):
+        return f"{size:.3g} m/s"
+    return f"{math.degrees(size):.3g} deg" + ("/s" if name == "yaw_rate" else "")
 
 
 def _worth(step: float, rate: np.ndarray | float) -> float:
@@ -178,8 +189,11 @@ def _worth(step: float, rate: np.ndarray | float) -> float:
     return step / speed if speed > 0 else math.inf
 
 
-def _jump(name: str, row: int, size: float, unit: str, lost: float) -> Finding:
+def _jump(
+    name: str, row: int, size: float, unit: str, lost: float, by: str = "its rate"
+) -> Finding:
     at = round(row * STEP_S, 3)
     worth = f", as if {lost:.1f} s were missing" if lost < 60.0 else ""
-    sentence = f"{name} steps {size:.3g} {unit} beyond what its rate says at {at:.1f} s{worth}."
+    verb = "say" if by.startswith("the ") else "says"
+    sentence = f"{name} steps {size:.3g} {unit} beyond what {by} {verb} at {at:.1f} s{worth}."
     return Finding("jump", name, sentence, start_s=at, end_s=at, value=round(size, 6), unit=unit)

@@ -121,8 +121,7 @@ def wind_findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
         return []
     speed, angle, heading, velocity = seconds
     count = len(speed)
-    turning = 1.0 - abs(np.exp(1j * heading).mean())
-    if count < LEAST_S or turning < LEAST_TURNING:
+    if count < LEAST_S or 1.0 - abs(np.exp(1j * heading).mean()) < LEAST_TURNING:
         return []
     spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
     beta, error = _slope(speed, angle, heading, velocity)

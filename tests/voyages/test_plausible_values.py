@@ -35,7 +35,9 @@ def put(value, rows=ROWS):
 
 
 def found(one, *kinds):
-    return [f for f in one.report.findings if f.kind in (kinds or ("implausible", "not_available"))]
+    """Of values; what a whole voyage says of the ship is another test's."""
+    kinds = kinds or ("implausible", "not_available")
+    return [f for f in one.report.findings if f.kind in kinds and f.channel not in ("ship", "wind")]
 
 
 def usable(one):

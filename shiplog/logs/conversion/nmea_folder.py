@@ -6,7 +6,7 @@ has its clock from the others. A text without stamps stands for itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from shiplog.logs.conversion.nmea_receivers import fills
 from shiplog.logs.conversion.topics import folder_to_series
 from shiplog.logs.health_report import Finding
 from shiplog.logs.write import Series
-from shiplog.profile import Profile
+from shiplog.profile import Column, Profile
 
 LOOKED_AT = 50  # lines of a text, that say whether it has stamps
 HEADERS = ("sentence", "nmea")  # a table's column of sentences has stamps of its own
@@ -36,7 +36,9 @@ class FolderLog:
     damaged: int = 0
 
 
-def read_folder(folder: Path, profile: Profile | None) -> FolderLog:
+def read_folder(
+    folder: Path, profile: Profile | None, times: Mapping[str, Column] | None = None
+) -> FolderLog:
     """The topics of a folder's tables and NMEA texts. Raises ChannelMissing where there is none."""
     texts = [path for path in sorted(folder.glob("[!.]*")) if is_nmea(path) and not _table(path)]
     done = FolderLog()
@@ -49,7 +51,7 @@ def read_folder(folder: Path, profile: Profile | None) -> FolderLog:
         except ShiplogError as error:
             done.left_out.append(error.message)
     try:
-        tables, reasons = folder_to_series(folder, profile, without=texts)
+        tables, reasons = folder_to_series(folder, profile, texts, times)
         done.left_out += reasons
         done.series += [replace(one, topic=_free(one.topic, done.series)) for one in tables]
     except ChannelMissing:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection
+import re
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from shiplog.logs.conversion.delimited import is_table, read_table, unlike
 from shiplog.logs.conversion.nmea import lines_to_series
 from shiplog.logs.conversion.steps_back import of_one_recording
 from shiplog.logs.write import THE_MESSAGES_OWN, Series
-from shiplog.profile import Profile
+from shiplog.profile import Column, Profile
 
 log = logging.getLogger(__name__)
 
@@ -38,35 +39,49 @@ UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", 
 
 
 def folder_to_series(
-    folder: Path, profile: Profile | None, without: Collection[Path] = ()
+    folder: Path,
+    profile: Profile | None,
+    without: Collection[Path] = (),
+    times: Mapping[str, Column] | None = None,
 ) -> tuple[list[Series], list[str]]:
     """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
     the reasons of the tables that had to be left out. Hidden files are none.
 
     A column `log_time_ns` (or of the names above) is the recorder's clock, `stamp_ns` the
     message's; other names and units come from the profile's [table], with channel = "time".
-    A column of NMEA sentences becomes their topics. Nothing is aligned: that is ingest's work.
+    `times` are such names where there is no profile yet. Reasons that differ in a table's name or
+    in numbers alone are one. A column of NMEA sentences becomes their topics. Nothing is aligned:
+    that is ingest's work.
     Raises ChannelMissing where no table has a time.
     """
     parts: list[Series] = []
-    reasons: list[str] = []
+    reasons: dict[str, list[str]] = {}
     for path in sorted(p for p in folder.glob("[!.]*") if is_table(p) and p not in without):
         try:
-            found, lost = _one(path, profile)
+            found, lost = _one(path, profile, times or {})
             parts += found
-            reasons += lost
+            for one in lost:
+                reasons.setdefault(one, []).append(one)
         except ShiplogError as error:
-            reasons.append(error.message)
+            kind = re.sub(r"\d+", "", error.message.replace(path.name, ""))
+            reasons.setdefault(kind, []).append(error.message)
+    said = [
+        why[0] + (f" So it is of {len(why) - 1} more." if len(why) > 1 else "")
+        for why in reasons.values()
+    ]
     if not parts:
         raise ChannelMissing(
-            f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
+            f"{folder} holds no table of a topic. {' '.join(said)}".rstrip(),
             hint="give one table per topic, each with a column of times such as log_time_ns, or a "
-            "single table.",
+            "single table; a clock that counts since boot is named in a profile's [table], as "
+            'timestamp = { channel = "time", unit = "us" }.',
         )
-    return named_apart(parts), reasons
+    return named_apart(parts), said
 
 
-def _one(path: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
+def _one(
+    path: Path, profile: Profile | None, times: Mapping[str, Column]
+) -> tuple[list[Series], list[str]]:
     table = read_table(path, profile.table if profile else None)
     frame = table.frame.drop(table.undecided)
     lost = [f"{path.name}: {what}." for what in table.lost] + [
@@ -75,6 +90,7 @@ def _one(path: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
         for name, example in table.undecided.items()
     ]
     named = {n: c for n, c in profile.table.items() if c.channel == "time"} if profile else {}
+    named = named or dict(times)
     if profile:
         refuse_scaled(named, profile)
     by_profile = next((n for n in named if n in frame.columns), None)

@@ -22,17 +22,18 @@ CHANNEL_COLUMNS = {
     "y0": ((r"y0|y_ned|y_east|east(ing)?|pos_?e(ast)?",
             r"y|y_?pos(ition)?(_mid)?|y_position\w*"), "m"),
     "sog": ((r"sog|(gps|gnss)_speed(_over_ground)?|speed_over_ground|ground_?speed|gspeed",
-             r"speed|spd"), "m/s"),
+             r"speed|(gps_|gnss_)?spd"), "m/s"),
     "cog": ((r"cog|(gps|gnss)_course(_over_ground)?|course_over_ground|track_made_good|"
-             r"ground_?course", r"z?course|track"), "deg"),
-    "velocity_north": ((r"v_?n(orth)?|vel_?n(orth)?|north_?vel\w*|velocity_?n(orth)?|vel_n_m_s",),
-                       "m/s"),
-    "velocity_east": ((r"v_?e(ast)?|vel_?e(ast)?|east_?vel\w*|velocity_?e(ast)?|vel_e_m_s",),
-                      "m/s"),
+             r"ground_?course|(gps_|gnss_)?gcrs", r"z?course|track"), "deg"),
+    "velocity_north": ((r"v_?n(orth)?|(.*_)?vel_?n(orth)?|north_?vel\w*|velocity_?n(orth)?",
+                        r"(.*_)?v_?x(_ned)?"), "m/s"),
+    "velocity_east": ((r"v_?e(ast)?|(.*_)?vel_?e(ast)?|east_?vel\w*|velocity_?e(ast)?",
+                       r"(.*_)?v_?y(_ned)?"), "m/s"),
     "surge": ((r"surge(_velo\w*)?|u|u_velo\w*|u_body|vx_body|body_?u",), "m/s"),
     "sway": ((r"sway(_velo\w*)?|vm?|vm?_velo\w*|v_body|vy_body|body_?v",), "m/s"),
     "heading": ((r"(true_)?(heading|hdg|hdt)(_true|_t)?|gyro(_heading)?",
-                 r"psi(_hat)?|yaw|compass|(magnetic_|mag_)(heading|hdg)|(heading|hdg)_mag\w*|hdm"),
+                 r"psi(_hat)?|(att\w*_)?yaw|compass|(magnetic_|mag_)(heading|hdg)|(heading|hdg)_mag\w*|hdm",
+                 r"(.*_)?(hdg|yaw|heading)"),
                 "deg"),
     "yaw_rate": ((r"yaw_?rate|rate_?of_?turn|rot|r|r_angvelo\w*|turn_?rate|gyro_?z|psi_?dot",),
                  "deg/s"),
@@ -44,10 +45,13 @@ CHANNEL_COLUMNS = {
 SENSOR = {"latitude": "position", "longitude": "position", "sog": "velocity", "cog": "velocity",
           "heading": "heading", "yaw_rate": "yaw_rate"}  # fmt: skip
 LOOSE = {  # what a channel's less sure names leave open
+    "velocity_north": ("to the north, or ahead?",),
+    "velocity_east": ("to the east, or to starboard?",),
     "sog": ("over ground?",), "x0": ("to the north?",), "y0": ("to the east?",),
 }  # fmt: skip
 FULL_TURN_RAD = 6.3  # a heading that never passes it may be in radians
 HARD_OVER_RAD = 1.3  # and so may a rudder angle
+NOTHING, IDLE = 2, 1  # no value at all; one that does not change, or in hardly any row
 UNIT_UNSTATED = "unit not stated"
 WIND = ("wind_speed", "wind_angle")
 
@@ -66,11 +70,13 @@ class FoundColumn:
     only: str = ""  # the vessel whose rows are meant
     missing: tuple[int | str, ...] = ()  # values that stand for none; of a status, for no fix
     rank: tuple[int, ...] = ()  # the least is the most trusted
+    why: str = ""  # what the offset is
+    place: str = ""  # what the data say of where an actuator stands
 
     @property
     def empty(self) -> bool:
         """Whether it is known to hold no value."""
-        return bool(self.rank and self.rank[0])
+        return bool(self.rank and self.rank[0] == NOTHING)
 
 
 def candidates(
@@ -96,9 +102,10 @@ def candidates(
             continue
         doubts, sure = _of_name(channel, name, sure)
         *first, instrument = words.trust(SENSOR.get(channel, ""), name)
-        empty = not facts.holds(channel, values)
-        doubts = (*doubts, "no value in it") if empty else doubts
-        rank = (empty, *first, sure, instrument)
+        life = NOTHING if not facts.holds(channel, values) else facts.idle(values)
+        doubts = (*doubts, "no value in it") if life == NOTHING else doubts
+        doubts = (*doubts, "it never changes, or is hardly ever there") if life == IDLE else doubts
+        rank = (life, *first, sure, instrument)
         found.append(with_doubts(one, *doubts, rank=rank))
     return sorted(found, key=lambda one: one.rank)
 

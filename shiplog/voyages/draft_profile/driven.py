@@ -35,7 +35,7 @@ _COMMANDS = _SPINS | {"pwm", "us", "out", "output", "lever", "level"}
 ACTUATOR_COLUMNS = {  # kind: its names, words that may follow them, the unit where none is stated
     "azimuth": ({"azimuth", "azipod", "azi", "pod"},
                 _TURNS | {"thruster", "rpm", "rps", "speed"}, "deg"),
-    "rudder": ({"rudder", "rudders", "steering", "delta"}, _TURNS, "deg"),
+    "rudder": ({"rudder", "rudders", "rud", "ruds", "steering", "delta"}, _TURNS, "deg"),
     "propeller": ({"rpm", "rps", "propeller", "propellers", "prop", "props", "shaft", "shafts",
                    "rev", "revs", "revolutions", "engine"}, _SPINS, "rps"),
     "thruster": ({"thr", "thrust", "thruster", "thrusters", "throttle", "pwm", "motor", "motors",
@@ -56,14 +56,19 @@ GEARED = "of the engine: its propeller may turn more slowly"
 
 def found_actuators(
     rows: pl.DataFrame, table: DelimitedTable, taken: set[str]
-) -> list[tuple[str, FoundColumn]]:
-    """(kind, column) of each: measured ones, and orders only of a kind that nothing measured."""
+) -> tuple[list[tuple[str, FoundColumn]], list[str]]:
+    """(kind, column) of each: measured ones, and orders only of a kind that nothing measured; and
+    the columns that are called so and never move."""
+    idle: list[str] = []
     actuators: list[tuple[str, FoundColumn]] = []
     taken, names = set(taken), set()
     for ordered in (False, True):
         kinds = {kind for kind, _ in actuators}
         for kind, one in _called_so(rows, table, ordered):
             if one.column in taken or (ordered and kind in kinds):
+                continue
+            if _never_moves(kind, rows[one.column]):
+                idle.append(one.column)
                 continue
             taken.add(one.column)
             alike = [other.column for k, other in actuators if k == kind]
@@ -74,7 +79,16 @@ def found_actuators(
             name = _free_name(kind, one.column, names)
             names.add(name)
             actuators.append((kind, _pulsed(replace(one, channel=name), rows)))
-    return actuators
+    return actuators, idle
+
+
+def _never_moves(kind: str, values: pl.Series) -> bool:
+    """Whether a column is 0 throughout, or a thruster's is one value: the number of an output, or
+    one that nothing is connected to. A shaft may turn evenly for a whole record."""
+    numbers = values.cast(pl.Float64).fill_nan(None).drop_nulls()
+    if len(numbers) < facts.FEW or numbers.n_unique() > 1:
+        return False
+    return kind == "thruster" or numbers[0] == 0.0
 
 
 def _called_so(
@@ -155,6 +169,5 @@ def _pulsed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
     values = rows[one.column].cast(pl.Float64).fill_nan(None).drop_nulls()
     if bool(values.is_between(*PULSES_US).all()):
         doubts = tuple(doubt for doubt in one.doubts if doubt != UNIT_UNSTATED)
-        pulsed = replace(one, unit="pwm", offset=NEUTRAL_US, doubts=doubts)
-        return with_doubts(pulsed, "the neutral pulse")
+        return replace(one, unit="pwm", offset=NEUTRAL_US, doubts=doubts, why="the neutral pulse")
     return with_doubts(one, "no pulses of a servo in µs") if one.unit == "pwm" else one

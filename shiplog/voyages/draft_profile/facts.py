@@ -12,6 +12,9 @@ E7 = 1e-7  # deg, what receivers count whole numbers of
 MOST_E7 = POLE / E7
 MOST_DDMM = 100.0 * POLE  # 9000.00 is 90 degrees and no minutes
 NOT_AVAILABLE = {"heading": 511.0, "sog": 102.3}  # what AIS has for "not available" [deg, kn]
+FEW = 20  # rows of which it is told whether a value ever changes
+SELDOM = 0.01  # of the rows: a value in fewer of them is no measurement of the voyage
+BURSTS = 5.0  # times the median step that the mean one is where several rows come at once
 ASKED = 8  # vessels named where a draft has to ask
 
 
@@ -79,17 +82,29 @@ def holds(channel: str, values: pl.Series) -> bool:
     return bool((numbers.is_finite() & (numbers != mark if mark else True)).any())
 
 
+def idle(values: pl.Series) -> int:
+    """1 of a column that holds one value throughout, or one in hardly any row; else 0."""
+    if not values.dtype.is_numeric():
+        return 0
+    numbers = values.cast(pl.Float64).fill_nan(None).drop_nulls()
+    seldom = len(values) >= FEW and len(numbers) < SELDOM * len(values)
+    return int(seldom or (len(numbers) >= FEW and numbers.n_unique() == 1))
+
+
 def _largest(values: pl.Series) -> float:
     most = values.abs().max()
     return float(most) if isinstance(most, (int, float)) else 0.0
 
 
 def of_times(times: pl.Series) -> str:
-    """Rate and count of messages at `times` [ns]."""
-    step = times.sort().diff().drop_nulls().median()
-    if not isinstance(step, (int, float)) or step <= 0:
+    """Rate and count of messages at `times` [ns]: the median's, of bursts the mean's."""
+    steps = times.sort().diff().drop_nulls()
+    step, mean = steps.median(), steps.mean()
+    if not isinstance(step, (int, float)) or not isinstance(mean, (int, float)) or mean <= 0:
         return f"{len(times)} messages"
-    return f"{1e9 / step:.3g} Hz, {len(times)} messages"
+    if step < mean / BURSTS and len(times) >= FEW and steps.quantile(1.0 - 1.0 / BURSTS) >= mean:
+        return f"{1e9 / mean:.3g} Hz in bursts, {len(times)} messages"
+    return f"{1e9 / step:.3g} Hz, {len(times)} messages" if step > 0 else f"{len(times)} messages"
 
 
 def counted(counts: dict[str, int], what: str) -> str:

@@ -23,18 +23,22 @@ class Guess:
 
 ENU = 'CHECK: ROS turns from east; some compasses write "quaternion_ned"'
 AXES_TO_CHECK = 'CHECK: axes of the ship; or "enu", "ned" of the earth'
+NED_TO_CHECK = 'CHECK: to the north and to the east; or "body"'
 LINEAR = (r"(twist_)?linear[._]x$", r"(twist_)?linear[._]y$")
 EDGED = r"(?<![a-z])({})(?![a-z])"  # short words: `esc` stands in `description`, too
 GUESSES = {  # in order of trust, after that of the topics themselves
     "position": (
-        Guess("geodetic", (r"lat(itude)?(_deg)?$", r"lon(gitude)?(_deg)?$"), "deg"),
+        Guess("geodetic", (r"lat(itude)?(_deg)?$", r"(lon(gitude)?|lng)(_deg)?$"), "deg"),
         Guess("local", (r"x0?(_m)?$", r"y0?(_m)?$"), "m", r"local|pos|pose|state|ned|odom"),
         Guess("local", (r"north(_m)?$", r"east(_m)?$"), "m"),
     ),
     "velocity": (
-        Guess("sog_cog", (r"sog(_\w+)?$|speed(_\w+)?$", r"cog(_\w+)?$|course(_\w+)?$"), "m/s deg"),
+        Guess("sog_cog", (r"sog(_\w+)?$|speed(_\w+)?$|spd$",
+                          r"cog(_\w+)?$|course(_\w+)?$|gcrs$"), "m/s deg"),
         Guess("body", (r"(surge|ahead)(_\w+)?$", r"(sway|starboard)(_\w+)?$"), "m/s"),
         Guess("ned", (r"(v_?n|north)(_\w+)?$", r"(v_?e|east)(_\w+)?$"), "m/s", r"vel|gnss|gps|ned"),
+        Guess("ned", (r"vel_?n(_\w+)?$", r"vel_?e(_\w+)?$"), "m/s"),
+        Guess("ned", (r"v_?x$", r"v_?y$"), "m/s", r"position|gps|gnss|ned", NED_TO_CHECK),
         Guess("ned", LINEAR, "m/s", EDGED.format("ned")),
         Guess("enu", LINEAR, "m/s", r"enu|gnss|gps|fix"),
         Guess("enu", LINEAR, "m/s", r"velocity_local", AXES_TO_CHECK),

@@ -129,6 +129,11 @@ def _time(values: pl.Series, table: DelimitedTable, with_date: bool) -> FoundCol
     return FoundColumn(values.name, "time", None, ("taken as UTC",) if assumed else ())
 
 
+def counted_time(number: pl.Series, table: DelimitedTable) -> FoundColumn:
+    """A column of numbers as a time, by its size, its name and its step."""
+    return _counted(number, table, False)
+
+
 def _counted(number: pl.Series, table: DelimitedTable, with_date: bool) -> FoundColumn:
     """Times that are numbers: Unix time by their size, else what their name or their rate says."""
     name, number = number.name, number.cast(pl.Float64).fill_nan(None)

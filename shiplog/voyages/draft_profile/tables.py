@@ -14,7 +14,14 @@ from shiplog.logs.conversion import clock
 from shiplog.logs.conversion.columns import text_of
 from shiplog.logs.conversion.delimited import read_table
 from shiplog.profile_channels import TABLE_CHANNELS
-from shiplog.voyages.draft_profile import facts
+from shiplog.voyages.draft_profile import (
+    accuracy,
+    facts,
+    particulars,
+    table_drive,
+    table_motion,
+    words,
+)
 from shiplog.voyages.draft_profile.column_names import (
     CHANNEL_COLUMNS,
     UNIT_UNSTATED,
@@ -25,7 +32,6 @@ from shiplog.voyages.draft_profile.column_names import (
 from shiplog.voyages.draft_profile.coordinates import on_earth
 from shiplog.voyages.draft_profile.driven import found_actuators
 from shiplog.voyages.draft_profile.labels import found_labels
-from shiplog.voyages.draft_profile.speed_units import fitting_speed
 from shiplog.voyages.draft_profile.status_columns import found_status
 from shiplog.voyages.draft_profile.toml_text import in_comment, quoted
 from shiplog.voyages.draft_profile.topics import NO_ACTUATOR, OPTIONAL
@@ -65,33 +71,41 @@ def draft_table(path: Path, vessel: str | None = None) -> str:
     found = {channel: candidates(rows, channel, taken, table) for channel in CHANNEL_COLUMNS}
     _choose_turning(found, labels, rows)
     chosen, second = _kinds(found, rows)
-    chosen = _with_fitting_speed(chosen, labels, rows)
+    chosen = table_motion.by_motion(chosen, labels, rows)
+    labels = table_motion.taking_turns(chosen, labels, rows)
     taken |= {f.column for _, _, columns in chosen for f in columns}
     taken |= {f.column for columns in found.values() for f in columns}
     if any(name == "position" for name, _, _ in chosen):
         labels += found_status(rows, taken)
         taken |= {f.column for f in labels}
-    actuators = found_actuators(rows, table, taken)
+    actuators, idle = found_actuators(rows, table, taken)
+    actuators = table_drive.by_response(actuators, chosen, labels, rows)
     parts = [
         f"# Drafted from {in_comment(path.name)}, {rows.height} rows. "
         "Look over every line that says CHECK.\n\n"
-        f"[ship]\nname = {quoted(vessel or path.stem)}\n"
-        "length_m = 1.0  # CHECK: the table does not say\n"
+        f"[ship]\nname = {quoted(vessel or path.stem)}\n" + particulars.SHIP.format(what="table")
     ]
-    parts += [_sensor(name, kind) for name, kind, _ in chosen]
+    parts += [_sensor(name, kind, columns, labels, rows) for name, kind, columns in chosen]
     there = {name for name, _, _ in chosen}
     for name in ("position", "velocity", "heading", "yaw_rate", "wind"):
         if name not in there:
             does = "; shiplog does without it" if name in OPTIONAL else ", and shiplog needs one"
             parts.append(f"# No {name} was recognised{does}.\n")
-    parts += [_actuator(kind, one) for kind, one in actuators] or [NO_ACTUATOR]
+    parts += [_actuator(kind, one, rows) for kind, one in actuators] or [NO_ACTUATOR]
     listed_columns = [*labels, *(f for *_, fs in chosen for f in fs), *(f for _, f in actuators)]
     parts.append(_table(listed_columns, rows, second))
     mentioned = {f.column for f in (*listed_columns, *second)}
     nameless = [n for n in frame.columns if n not in mentioned and n in table.nameless]
     parts += [_nameless(rows[name]) for name in nameless]
     mentioned |= {*nameless}
-    if unused := [n for n in frame.columns if n not in mentioned]:
+    unused = [n for n in frame.columns if n not in mentioned]
+    if alike := [n for n in unused if n in idle or words.drives(n)]:
+        parts.append(
+            "# CHECK: called like an actuator, and not used: "
+            + in_comment(listed(alike, most=60))
+            + "\n"
+        )
+    if unused := [n for n in unused if n not in alike]:
         parts.append("# Columns not used: " + in_comment(listed(unused, most=60)) + "\n")
     return "\n".join(parts)
 
@@ -102,21 +116,6 @@ def _nameless(values: pl.Series) -> str:
         f'# {quoted(values.name)} = {{ channel = "..." }}  # CHECK: no line of the table names it; '
         f"{facts.of_values(values)}"
     )
-
-
-def _with_fitting_speed(
-    chosen: list[tuple[str, str, list[FoundColumn]]], labels: list[FoundColumn], rows: pl.DataFrame
-) -> list[tuple[str, str, list[FoundColumn]]]:
-    """Speeds whose unit is not stated in the one that fits the position."""
-    place = next((columns for name, _, columns in chosen if name == "position"), None)
-    times = [label for label in labels if label.channel == "time"]
-    if place is None:
-        return chosen
-    return [
-        (name, kind, [fitting_speed(c, place, times, rows) if c.channel == "sog" else c
-                      for c in columns])
-        for name, kind, columns in chosen
-    ]  # fmt: skip
 
 
 def _of_numbers(rows: pl.DataFrame, labels: set[str]) -> pl.DataFrame:
@@ -197,7 +196,9 @@ def _kinds(
     return chosen, [f for f in second if f.column not in used]
 
 
-def _sensor(name: str, kind: str) -> str:
+def _sensor(
+    name: str, kind: str, columns: list[FoundColumn], labels: list[FoundColumn], rows: pl.DataFrame
+) -> str:
     topic, fields, unit_names = SINGLE[name, kind]
     named = ", ".join(map(quoted, fields))
     lines = [f"[sensors.{name}]", f'kind = "{kind}"', f'topic = "{topic}"']
@@ -208,26 +209,28 @@ def _sensor(name: str, kind: str) -> str:
         lines.append("units = [" + ", ".join(f'"{u}"' for u in unit_names) + "]")
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
+    seconds = table_motion.seconds_of(labels, rows)
+    if seconds is None:
+        lines.append(accuracy.NOT_SHOWN)
+    else:
+        values = np.stack([table_motion.values_of(one, rows) for one in columns], axis=1)
+        time = np.round(seconds * 1e9).astype(np.int64)
+        lines += accuracy.lines(name, kind, time, values, list(unit_names))
     return "\n".join(lines) + "\n"
 
 
-DIMENSIONS = {  # of an actuator, which only physical models ask for
-    "rudder": "# area_m2 = 0.0  # CHECK: estimated by train --model mmg where left out\n"
-    "# span_m = 0.0  # CHECK: likewise\n",
-    "propeller": "# diameter_m = 0.0  # CHECK: train --model mmg needs it\n",
-}
-
-
-def _actuator(kind: str, one: FoundColumn) -> str:
+def _actuator(kind: str, one: FoundColumn, rows: pl.DataFrame) -> str:
     field, unit = FIELDS[kind]
     if units.measure(one.unit or "1") in ("ratio", "servo pulse"):
         field, unit = FIELDS["thruster"]  # what commands it stands there, and not its value
-    offset = f"offset = {one.offset}  # CHECK: the neutral pulse\n" if one.offset else ""
+    unit = unit or one.unit or "1"
+    offset = f"offset = {one.offset}  # CHECK: {one.why}\n" if one.offset else ""
+    values = rows[one.column].cast(pl.Float64, strict=False).fill_nan(None).abs()
+    most = values.max() if kind == "thruster" else None
     return (
         f'[[actuators]]\nname = "{one.channel}"\nkind = "{kind}"\n'
-        f'topic = "/{kind}/{one.channel}"\nfield = "{field}"\nunit = "{unit or one.unit}"\n{offset}'
-        "position_m = [0.0, 0.0]  # CHECK: ahead and to starboard of midship\n"
-        f"{DIMENSIONS.get(kind, '')}"
+        f'topic = "/{kind}/{one.channel}"\nfield = "{field}"\nunit = "{unit}"\n{offset}'
+        + particulars.of_actuator(kind, unit, most if isinstance(most, float) else None, one.place)
     )
 
 

@@ -7,19 +7,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 
+from shiplog import units
 from shiplog.exceptions import LogUnreadable, ProfileError, listed
 from shiplog.logs.fields import is_number
 from shiplog.logs.read import Contents, contents, fields, read
 from shiplog.profile_units import DRIVEN
-from shiplog.voyages.draft_profile import facts, guesses, words
+from shiplog.voyages.draft_profile import accuracy, facts, guesses, particulars, words
 from shiplog.voyages.draft_profile.guesses import ACTUATOR_TOPICS, GUESSES, Guess
 from shiplog.voyages.draft_profile.toml_text import in_comment, quoted
+from shiplog.voyages.draft_profile.topic_motion import Agreement, Fields, Scales, scales
 
 MMSI = re.compile(r"(?<![^/])\d{7,9}(?![^/])")  # 7 of a base station, whose zeros are lost
-LOOKED_AT = 4  # of the topics that may hold a channel: the first of them with data is drafted
+LOOKED_AT = 8  # of the topics that may hold a channel: the first of them with data is drafted
 OPTIONAL = ("yaw_rate", "wind")  # left out where no topic holds a value
+SLOW_S = 10.0  # s from message to message: no instrument of a voyage, where there is a faster one
+FEW = 20  # messages of which it is told whether a value ever changes
+IRREGULAR = 0.5  # standard deviation of the steps over their mean: sent when it changes
+CHANGES = 0.9  # share of the messages that hold another value than the one before
 SEARCHED = 200  # topics whose data are read at most, for the comments of the lines
 
 
@@ -59,6 +66,51 @@ class Log:
         numbers = [self.column(choice.topic, path) for path in choice.paths]
         return all(bool(number.is_finite().any()) for number in numbers)
 
+    def times(self, topic: str) -> np.ndarray:
+        """When the messages were measured, else recorded [n] ns; a message without a stamp has the
+        recorder's."""
+        frame = self.data.get(topic)
+        if frame is None:
+            return np.zeros(0, np.int64)
+        stamped = frame["stamp"] if "stamp" in frame.columns else frame["log_time"]
+        return stamped.fill_null(frame["log_time"]).to_numpy()
+
+    def life(self, choice: Choice) -> int:
+        """0 of a topic whose values change; 1 of one that comes seldom; 2 of one that stands still,
+        as a home position does or a heading that nothing measures."""
+        numbers = [self.column(choice.topic, path) for path in choice.paths]
+        known = [n.filter(n.is_finite()) for n in numbers]
+        fewest = min(len(n) for n in known)
+        somewhere = choice.guess.kind != "geodetic" or float(known[0].abs().max() or 0.0) <= 90.0
+        if fewest >= FEW and somewhere and all(n.n_unique() == 1 for n in known):
+            return 2
+        if choice.guess.kind == "geodetic" and fewest and max(n.abs().max() for n in known) == 0.0:
+            return 2
+        steps = np.diff(np.sort(self.times(choice.topic)))
+        return int(fewest < 2 or float(np.median(steps)) * 1e-9 > SLOW_S)
+
+    def liveliest(self, choices: list[Choice]) -> list[Choice]:
+        """Of topics that may hold a channel those first that live, else in the order they have."""
+        counts = {one.topic: len(self.times(one.topic)) for one in choices}
+        most = max(counts.values(), default=0)
+
+        def key(one: Choice) -> int:
+            few = counts[one.topic] < FEW and counts[one.topic] * 10 <= most
+            return max(self.life(one), int(few))
+
+        return sorted(choices, key=key)
+
+    def between(self, topic: str, path: str) -> str:
+        """A line for a value that is sent when it changes: it holds until the next one."""
+        frame, number = self.data.get(topic), self.column(topic, path)
+        if frame is None or len(number) < FEW:
+            return ""
+        steps = np.diff(frame["log_time"].to_numpy()) * 1e-9
+        changes = float((number.diff().drop_nulls() != 0).mean() or 0.0)
+        if steps.mean() <= 0 or steps.std() < IRREGULAR * steps.mean() or changes < CHANGES:
+            return ""
+        return 'between = "hold"  # sent when it changes\n'
+
     def rate(self, topic: str) -> str:
         frame = self.data.get(topic)
         return facts.of_times(frame["log_time"]) if frame is not None else "no message"
@@ -79,7 +131,10 @@ class Log:
         frame = self.data.get(topic)
         if frame is None or path not in frame.columns or frame[path].dtype == pl.Boolean:
             return False
-        return bool(self.column(topic, path).is_finite().any())
+        number = self.column(topic, path)
+        number = number.filter(number.is_finite())
+        still = len(number) >= FEW and number.n_unique() == 1 and number[0] == 0.0
+        return len(number) > 0 and not still
 
     def unit(self, paths: Sequence[str], at: int, topic: str, takes: tuple[str, ...]) -> str | None:
         """What the field's own name says, or the channel's metadata, which has one unit."""
@@ -106,20 +161,31 @@ def draft(path: str | Path, vessel: str | None = None) -> str:
         or [c for c in found[:1] if name not in OPTIONAL]
         for name, found in choices.items()
     }
+    choices = {name: log.liveliest(found) for name, found in choices.items()}
     best = [found[0] for found in choices.values() if found]
     driven = _actuators(log, {choice.topic for choice in best})
     parts = [_ship(log.contents)]
-    parts += [_sensor(name, found, log) for name, found in choices.items()]
+    agreement = Agreement()
+    sections = {
+        name: _sensor(name, choices[name], log, agreement)
+        for name in sorted(choices, key=IN_TURN.index)
+    }
+    parts += [sections[name] for name in choices]
     names: set[str] = set()
     parts += [_actuator(*one, names, log=log) for one in driven] or [NO_ACTUATOR]
     listed_first = [choice for found in choices.values() for choice in found[:2]]
     used = {*(choice.topic for choice in listed_first), *(topic for _, topic, _, _ in driven)}
     unused = sorted(set(log.leaves) - used)
+    if alike := [topic for topic in unused if words.drives(topic)]:
+        named = in_comment(listed(alike, most=40))
+        parts.append(f"# CHECK: called like an actuator, and not used: {named}\n")
+        unused = [topic for topic in unused if topic not in alike]
     if unused:
         parts.append("# Topics not used: " + in_comment(listed(unused, most=40)) + "\n")
     return "\n".join(parts)
 
 
+IN_TURN = ("position", "heading", "velocity", "yaw_rate", "wind")  # each goes by those before it
 NO_ACTUATOR = (
     "# No actuator was recognised: the log can be ingested and its sensors checked, but no model\n"
     "# trained. Each actuator needs a section like this one:\n"
@@ -163,7 +229,7 @@ def _ship(found: Contents) -> str:
     name = found.metadata.get("voyage", {}).get("ship") or found.path.stem
     return (
         f"# Drafted from {in_comment(found.path.name)}. Look over every line that says CHECK.\n\n"
-        f"[ship]\nname = {quoted(name)}\nlength_m = 1.0  # CHECK: the log does not say\n"
+        f"[ship]\nname = {quoted(name)}\n" + particulars.SHIP.format(what="log")
     )
 
 
@@ -199,11 +265,11 @@ def _receiver(positions: list[Choice]) -> str:
     return folder + "/" if folder else ""
 
 
-def _sensor(name: str, choices: list[Choice], log: Log) -> str:
+def _sensor(name: str, choices: list[Choice], log: Log, agreement: Agreement) -> str:
     if not choices:
         does = "; shiplog does without it" if name in OPTIONAL else ""
         return f"# No {name} was recognised{does}.\n"
-    text = _section(name, choices[0], log)
+    text = _section(name, choices[0], log, agreement)
     for second in choices[1:2]:
         kind, _ = guesses.kind_of(second.guess, second.topic)
         seen = _axes(second, log)
@@ -216,39 +282,76 @@ def _sensor(name: str, choices: list[Choice], log: Log) -> str:
     return text
 
 
-def _section(name: str, choice: Choice, log: Log) -> str:
+def _section(name: str, choice: Choice, log: Log, agreement: Agreement) -> str:
     guess, topic = choice.guess, choice.topic
     kind, of_kind = guesses.kind_of(guess, topic)
     seen = _axes(choice, log)
     paths, takes = seen.paths, guesses.measures(name, kind)
-    fallback = guess.unit.split()
-    fallback = fallback * len(paths) if len(fallback) == 1 else fallback
+    usual = guess.unit.split()
+    usual = usual * len(paths) if len(usual) == 1 else usual
     known = [log.unit(paths, at, topic, (takes[at],)) for at in range(len(paths))]
-    units = [unit or other for unit, other in zip(known, fallback, strict=True)]
-    sure = all(known) or kind.startswith("quaternion")
+    found = _fields(name, kind, topic, paths, log)
+    signs = seen.sign or (1.0,) * len(paths)
+    drafted = scales(found, known, usual, signs, agreement)
     ordered = "CHECK: a set-point, not a measurement; " if words.is_set_point(topic) else ""
     lines = [f"[sensors.{name}]"]
     lines.append(f'kind = "{kind}"' + (f"  # {of_kind}" if of_kind else ""))
     doubt = f"{ordered}{_doubt(name, topic, paths)}"
-    lines.append(f"topic = {quoted(topic)}  # {doubt}{log.rate(topic)}")
+    life = _idle(log.life(choice))
+    lines.append(f"topic = {quoted(topic)}  # {doubt}{log.rate(topic)}{life}")
     joined = ", ".join(map(quoted, paths))
     named = f"fields = [{joined}]" if len(paths) > 1 else f"field = {joined}"
     lines.append(named + (f"  # {seen.check}" if seen.check and not seen.sign else ""))
     lines += [f"#   {in_comment(path)}: {log.values(topic, path)}" for path in paths]
     if name == "heading" and (blank := facts.unavailable(name, log.column(topic, choice.paths[0]))):
         lines.append(f"# CHECK: {blank}")
-    check = "" if sure else "  # CHECK: the log does not say"
-    if len(set(units)) == 1:
-        lines.append(f'unit = "{units[0]}"{check}')
+    check = f"  # {drafted.check}" if drafted.check else ""
+    if len(set(drafted.units)) == 1:
+        lines.append(f'unit = "{drafted.units[0]}"{check}')
     else:
-        lines.append("units = [" + ", ".join(f'"{u}"' for u in units) + f"]{check}")
-    if seen.sign:
-        lines.append(f"sign = {_toml(seen.sign)}  # {seen.check}")
+        lines.append("units = [" + ", ".join(f'"{u}"' for u in drafted.units) + f"]{check}")
+    signs = drafted.signs
+    if any(sign != 1.0 for sign in signs):
+        lines.append(
+            f"sign = {_toml(signs)}  # {drafted.turned or seen.check or 'CHECK: its unit'}"
+        )
+    factor = 1.0
     if kind == "geodetic":
-        lines += facts.of_coordinates(*(log.column(topic, path) for path in paths))
+        numbers = [log.column(topic, path) for path in paths]
+        factor, _ = facts.scale_of_coordinates(*numbers)
+        lines += facts.of_coordinates(*numbers)
     if name in ("position", "velocity"):
         lines.append("lever_arm_m = [0.0, 0.0]  # CHECK: antenna ahead and to starboard of midship")
+    if name == "position":
+        agreement.position(found, factor)
+    elif name == "heading":
+        agreement.heading(found, drafted.units[0], signs[0])
+    lines += accuracy.lines(name, kind, log.times(topic), _si(found, drafted, factor),
+                            list(drafted.units))  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _fields(name: str, kind: str, topic: str, paths: Sequence[str], log: Log) -> Fields:
+    time = log.times(topic)
+    if not len(time):
+        return Fields(name, kind, time * 1e-9, np.zeros((0, len(paths))))
+    columns = [log.column(topic, path).fill_null(np.nan).to_numpy() for path in paths]
+    whole = all(len(column) == len(time) for column in columns)
+    raw = np.stack(columns, axis=1) if whole else np.full((len(time), len(paths)), np.nan)
+    return Fields(name, kind, (time - time[0]) * 1e-9 + time[0] % 10**15 * 1e-9, raw)
+
+
+def _si(found: Fields, drafted: Scales, factor: float) -> np.ndarray:
+    """Values in SI, coordinates in deg."""
+    if found.kind == "geodetic":
+        return found.raw * factor
+    return found.raw * np.array(
+        [sign * units.factor(unit) for sign, unit in zip(drafted.signs, drafted.units, strict=True)]
+    )
+
+
+def _idle(life: int) -> str:
+    return ("", "; CHECK: seldom sent", "; CHECK: it never changes")[life]
 
 
 def _toml(signs: tuple[float, ...]) -> str:
@@ -312,4 +415,11 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], 
         f'[[actuators]]\nname = "{name}"\nkind = "{kind}"\n'
         f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
         f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
+        f"{log.between(topic, path)}"
+        f"{particulars.of_actuator(kind, unit or fallback, _largest(log.column(topic, path)))}"
     )
+
+
+def _largest(values: pl.Series) -> float | None:
+    most = values.fill_nan(None).abs().max()
+    return float(most) if isinstance(most, (int, float)) else None

@@ -52,6 +52,23 @@ _MAGNETIC = re.compile(r"\(m\)|\[m\]|magnetic|(?<![a-z])(mag|hdm)(?![a-z])")
 _SHAFT = re.compile(r"(?<![a-z])(rpm|rps)(?![a-z])")
 
 
+_DRIVES = re.compile(
+    r"(?<![a-z])(ruds?|rudders?|helm|steer\w*|thr|thrust\w*|throttle|motors?|esc|servo\d*|pwm|"
+    r"propellers?|props?|rpm|shaft|azi\w*|pod|pods|jet|jets|waterjet|engine\w*|nozzle|bucket|"
+    r"bow_?thr\w*|stern_?thr\w*)(?![a-z])"
+)
+_NOT_DRIVING = re.compile(
+    r"zero|neutral|force|torque|power|current|voltage|temp|fuel|press|load|mode|status|state|alarm|"
+    r"_kw|_n$|hours|level|error|trim"
+)
+
+
+def drives(name: str) -> bool:
+    """Whether a topic or column is called like something that moves the ship."""
+    called = parted(name)
+    return bool(_DRIVES.search(called)) and not _NOT_DRIVING.search(called)
+
+
 def parted(name: str) -> str:
     """A name in small letters, with an underscore where a capital began a word: `windTrue`."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()

@@ -1,0 +1,123 @@
+"""Values that repeat although the ship moves, told from rest and from a coarse instrument.
+
+A repeated value is a fault only where another sensor shows that it should have changed. A position
+is compared with the velocity's integral, a heading with the yaw rate's, or, where none is
+measured, with the course; a velocity or a yaw rate that repeats is compared with the change of the
+position or the heading. What an instrument counts in steps stands still until the ship has gone a
+step. A rate may be biased by as much as it scatters, or by DOUBT of what it measures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from shiplog.profile import Profile
+from shiplog.voyages import fault_detection
+from shiplog.voyages.resampling import STEP_NS, Samples
+
+STEP_S = STEP_NS * 1e-9
+DOUBT = 0.02  # of the 95 % quantile of a rate: bias and scale of one that a filter has smoothed
+COURSE_S = 10.0  # s: a course is taken of the way in so many seconds
+COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little, 4 deg and more
+COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
+UNDER_WAY = 0.3  # of the 90 % quantile of the way: at a berth the wind and a current turn a course
+ALONG = 0.7  # sine of the angle between course and keel, in the middle: a ship that makes way
+SWING = math.radians(30.0)  # of the course beyond which a heading turns, too: drift of a hard turn
+
+
+def held(
+    name: str,
+    samples: Samples,
+    sampled: dict[str, Samples],
+    times: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    over_ground: np.ndarray,
+    profile: Profile,
+) -> list[tuple[int, int]]:
+    """Rows (first, last) in which a sensor repeats a value that cannot have stood still.
+
+    times [m] ns and columns [m] of the grid; over_ground [m, 2]: velocity along x0 and y0, m/s,
+    NaN where it is not known.
+    """
+    runs = fault_detection.repeats(samples.value)
+    least = 3.0 * samples.noise + samples.resolution
+
+    def kept(
+        runs: list[tuple[int, int]], travel: np.ndarray | None, least: float, drift: float = 0.0
+    ) -> list[tuple[int, int]]:
+        return fault_detection.held_on_grid(times, samples.time, runs, travel, least, drift)
+
+    speed, turning = np.nan_to_num(over_ground), np.nan_to_num(columns["yaw_rate"])[:, None]
+    gone = np.cumsum(speed, axis=0) * STEP_S
+    turned = np.cumsum(turning, axis=0) * STEP_S
+    if name == "position":
+        return kept(runs, gone, least, _bias(sampled["velocity"], speed))
+    if name == "heading" and profile.sensors.yaw_rate is not None:
+        return kept(runs, turned, least, _bias(sampled["yaw_rate"], turning))
+    position = np.stack([_filled(columns[c]) for c in ("x0", "y0")], axis=1)
+    if name == "heading":
+        noise = sampled["position"].noise
+        keel = columns["heading"].copy()
+        for first, last in kept(runs, None, 0.0):  # what may be frozen is not compared
+            keel[first : last + 1] = np.nan
+        course = _course(position, keel, noise, profile.ship.length_m)
+        return [] if course is None else kept(runs, course[:, None], least + SWING)
+    runs = fault_detection.improbable(runs, len(samples.time))
+    rest = (np.abs(samples.value) <= samples.resolution).all(axis=1)
+    moving = [run for run in runs if not rest[run[0]]]
+    if name == "wind":  # nothing to compare it with; a calm is none
+        return kept(moving, None, 0.0)
+    if name == "velocity":
+        other, off, bias = sampled["position"], position - gone, _bias(samples, speed)
+    else:
+        other, off = sampled["heading"], _unwrapped(columns["heading"])[:, None] - turned
+        bias = _bias(samples, turning)
+    sure = moving if samples.resolution == 0.0 else []  # no value of so many digits comes twice
+    unsure = [run for run in runs if run not in sure]
+    shown = kept(unsure, off, 3.0 * other.noise + other.resolution, bias)
+    return sorted(kept(sure, None, 0.0) + shown)
+
+
+def _bias(samples: Samples, rate: np.ndarray) -> float:
+    """How fast a rate that is 0 may be said to move, in its unit."""
+    return max(samples.noise, DOUBT * float(np.quantile(np.linalg.norm(rate, axis=1), 0.95)))
+
+
+def _course(
+    position: np.ndarray, heading: np.ndarray, noise: float, length: float
+) -> np.ndarray | None:
+    """Unwrapped course [m], rad, of the way over COURSE_S, as it was last where the ship hardly
+    moves; None of a ship that does not mostly go along its keel, ahead or astern."""
+    half = max(round(0.5 * COURSE_S / STEP_S), 1)
+    count = len(position)
+    if count <= 2 * half:
+        return None
+    way = position[2 * half :] - position[: -2 * half]
+    far = np.linalg.norm(way, axis=1)
+    least = max(COURSE_NOISES * noise, COURSE_LENGTHS * length)
+    known = far > max(least, UNDER_WAY * float(np.quantile(far, 0.9)))
+    course, keel = np.arctan2(way[:, 1], way[:, 0]), heading[half:-half]
+    across = np.abs(np.sin(course - keel))[known & np.isfinite(keel)]
+    at = np.flatnonzero(known)
+    if len(at) < 2 or (len(across) and float(np.median(across)) > ALONG):
+        return None
+    last = np.searchsorted(at + half, np.arange(count), side="right") - 1
+    return np.unwrap(course[at])[last.clip(0)]
+
+
+def _filled(column: np.ndarray) -> np.ndarray:
+    """A column [m] without its NaN, on straight lines across them."""
+    known = np.flatnonzero(np.isfinite(column))
+    if len(known) == 0:
+        return np.zeros(len(column))
+    return np.interp(np.arange(len(column)), known, column[known])
+
+
+def _unwrapped(heading: np.ndarray) -> np.ndarray:
+    known = np.isfinite(heading)
+    whole = heading.copy()
+    whole[known] = np.unwrap(heading[known])
+    return _filled(whole)
