@@ -17,6 +17,7 @@ from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
+from shiplog.voyages import beside
 from shiplog.voyages.fitting_profile import fitting_profile
 from shiplog.voyages.ingest import consistency_of, ingest
 from shiplog.voyages.sensor_correction import corrected
@@ -120,7 +121,7 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
         profile = chosen or fitting_profile(found)
     except ShiplogError as error:
         why = error
-    reading = read(path, profile.wanted() if profile else {}, others=True)
+    reading = read(path, beside.wanted(profile) if profile else {}, others=True)
     report = health_of(reading)
     consistency: list[Finding] = []
     try:

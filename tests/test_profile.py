@@ -135,7 +135,8 @@ position = { topic = "/p", fields = ["a", "o"], unit = "deg", lever_arm_m = [1.0
 sigma = 0.1 }
 velocity = { topic = "/v", fields = ["s", "c"], sign = [1.0, -1.0], offset = [0.0, 1.0], \
 sigma = [0.1, 0.2] }
-heading = { topic = "/h", field = "h", sign = -1.0, offset = 3.0, tolerance_s = 0.5 }
+heading = { kind = "quaternion_ned", topic = "/h", fields = ["x", "y", "z", "w"], sign = -1.0, \
+offset = 3.0, tolerance_s = 0.5, mounting_deg = [180.0, 0.0, 90.0] }
 [[actuators]]
 name = "rudder"
 kind = "rudder"

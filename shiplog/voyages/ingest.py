@@ -20,7 +20,15 @@ from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
 from shiplog.profile import Actuator, Profile, Sensor, Source
-from shiplog.voyages import clocks, fault_detection, resampling, sensor_consistency
+from shiplog.voyages import (
+    beside,
+    clocks,
+    fault_detection,
+    orientation,
+    resampling,
+    sensor_consistency,
+    status,
+)
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
@@ -57,7 +65,7 @@ class Voyage:
 
 def ingest(path, profile: Profile) -> Voyage:
     """Read one log through a profile. Raises LogUnreadable, ChannelMissing, ProfileError."""
-    reading = read(path, profile.wanted())
+    reading = read(path, beside.wanted(profile))
     return build(reading, profile)
 
 
@@ -111,6 +119,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
     _require(reading, profile)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
+    reading, refused = status.heeded(reading, profile)
+    mounting = _mounting(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, sensor in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -149,7 +159,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    return _Aligned(table, grid, [*every.items()], [*left_out, *moved], datum)
+    found = [*left_out, *moved, *mounting, *status.said(grid, refused)]
+    return _Aligned(table, grid, [*every.items()], found, datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -233,6 +244,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     components, since halfway between 359° and 1° is 0°.
     """
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
+    sensor = orientation.whole(reading, sensor) if kind in orientation.KINDS else sensor
     times, value = _raw(reading, sensor)
     if kind == "geodetic":
         value = value / channels.DEGREE  # `unit` made it radians; geodesy speaks degrees
@@ -241,10 +253,8 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
         value = value[:, ::-1]
-    elif kind in ("quaternion_enu", "quaternion_ned"):
-        value = frames.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
-            :, None
-        ]
+    elif kind in orientation.KINDS:
+        value = orientation.of(value, sensor, kind).heading[:, None]
     samples = resampling.ordered(times, value, sensor.tolerance_s)
     if name == "heading":
         samples = replace(samples, value=np.unwrap(samples.value, axis=0))
@@ -255,6 +265,16 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     metric = _metric(samples.value, kind)
     spike = fault_detection.spikes(metric, profile.sensors.noise(name))
     return replace(samples, spike=spike, resolution=fault_detection.resolution(metric))
+
+
+def _mounting(reading: Reading, profile: Profile) -> list[Finding]:
+    """What is to be said of how a heading's quaternion is mounted."""
+    sensor, kind = profile.sensors.heading, profile.sensors.kind("heading")
+    if kind not in orientation.KINDS:
+        return []
+    sensor = orientation.whole(reading, sensor)
+    found = orientation.of(_raw(reading, sensor)[1], sensor, kind)
+    return orientation.findings(found, sensor, reading.contents.path.name)
 
 
 def _on_earth(reading: Reading, sensor: Sensor, value: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.logs.dates import UNDATED
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.profile import Column, Profile, Source
-from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS
+from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS, channels_of
 
 log = logging.getLogger(__name__)
 
@@ -136,7 +136,7 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
 def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
     """What the profile reads, and the channels of a table that fill it."""
     sensors = [
-        (sensor, TABLE_CHANNELS[name, profile.sensors.kind(name)])
+        (sensor, channels_of(name, profile.sensors.kind(name), len(sensor.paths)))
         for name, sensor in profile.sensors.items()
     ]
     return [*sensors, *((actuator, (actuator.name,)) for actuator in profile.actuators)]
