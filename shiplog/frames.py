@@ -111,7 +111,7 @@ def quaternion_heading(ahead: np.ndarray, east_north_up: bool) -> np.ndarray:
     return np.arctan2(ahead[:, 1], ahead[:, 0])
 
 
-def mounted(turns: tuple[float, float, float]) -> np.ndarray:
+def mounted(turns: tuple[float, ...]) -> np.ndarray:
     """From a sensor's axes to the ship's [3, 3], both x ahead, y to starboard, z down: turned by
     (roll, pitch, yaw) [rad] about these axes, M = R_z(yaw) R_y(pitch) R_x(roll)."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)

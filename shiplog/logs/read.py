@@ -161,13 +161,15 @@ def _merged(one: Topic, other: Topic) -> Topic:
 
 
 def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> Health:
-    found, count = tables.found, sum(tally.counts.values())
+    found, broken = tables.found, sum(tables.failed.values())
+    count = sum(tally.counts.values()) - broken  # what does not fit its schema was not read
     damaged = bool(found.losses or tally.orphans)
-    lost: int | None = None if damaged else 0
+    lost: int | None = None if damaged else broken
     if found.statistics is not None:
         lost = max(found.statistics.message_count - count, 0)
     topics = {number: channel.topic for number, channel in found.channels.items()}
-    findings = faults.losses(found.losses, tally.first, lost, topics)
+    missing = None if lost is None else lost - broken
+    findings = faults.losses(found.losses, tally.first, missing, topics)
     findings += faults.appended(found.sections)
     findings += faults.left_out(tally.orphans, tables)
     findings += faults.disorder([(found.channels[n].topic, o) for n, o in tally.order.items()])
@@ -195,7 +197,8 @@ def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFr
     if reasons and not frames:
         raise LogUnreadable(
             f"{found.path} has {count} messages, but none can be decoded: {', '.join(reasons)}.",
-            hint="shiplog reads protobuf, ROS 2 CDR (ros2msg) and JSON; convert or record again.",
+            hint="shiplog reads protobuf, JSON, and ROS messages with their definitions (cdr with "
+            "ros2msg or ros2idl, ros1 with ros1msg); convert it or record again.",
         )
     if count:
         return

@@ -117,6 +117,7 @@ class Tables:
         self.too_many: dict[str, int] = {}  # likewise, for being more than a log of this size holds
         self.room = room(found)  # rows that may still come
         self.undecodable: dict[str, str] = {}
+        self.odd: set[int] = set()  # channels whose payloads no other reader may be given
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}
         self._shared: dict[tuple, Decoder | Undecodable] = {}

@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -51,7 +52,7 @@ class Rule:
 
     names: tuple[str, ...]
     speaks: tuple[str, ...]
-    bad: Mapping[float | str, str] = field(default_factory=dict)
+    bad: Mapping[Any, str] = field(default_factory=dict)
     good: tuple[float, ...] = ()
     bits: int = 0
     schema: str = ""
