@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.bars import drawable, tracked
 from shiplog import files
 from shiplog.exceptions import ShiplogError
-from shiplog.logs import reading_limits
-from shiplog.logs.bags import bag_to_log, bags_once, is_bag
+from shiplog.logs import foreign_files, packed, reading_limits
+from shiplog.logs.bags import MCAP, bag_to_log, bags_once, is_bag
 from shiplog.logs.conversion import columns
 from shiplog.logs.conversion.delimited import is_table, read_table
 from shiplog.logs.conversion.heartbeat import saying
 from shiplog.logs.conversion.nmea import is_nmea, read_nmea
-from shiplog.logs.conversion.topics import folder_to_series
+from shiplog.logs.conversion.topics import folder_to_series, holds_tables
+from shiplog.logs.foreign_files import is_foreign
+from shiplog.logs.refusals import begins_as_log, refuse_log
 from shiplog.logs.write import Series, refuse_existing, write_log
 from shiplog.numbers import counted
 from shiplog.paths import check_there, refuse_namesake
@@ -60,23 +63,60 @@ def convert(sources: list[Path], profile: Profile | None, out: Path) -> Converte
 def draft(path: Path, vessel: str | None = None) -> str:
     """TOML text of a profile for a log, a table, or what first has to become a log."""
     reading_limits.begin(path)
-    with saying(f"{path.name}: drafting"):
-        if not path.exists() or path.suffix.lower() == ".mcap":
-            return draft_log(path, vessel)
-        if is_table(path) and not is_nmea(path):
-            return draft_table(path, vessel)
-        if not (is_bag(path) or is_nmea(path) or path.is_dir()):
-            return draft_log(path, vessel)
+    with saying(f"{path.name}: drafting"), packed.unpacked(path) as source:
+        if not path.exists() or is_log(source):
+            return draft_log(source, vessel)
+        if not (is_bag(source) or is_nmea(source) or source.is_dir()):
+            foreign_files.refuse(source)
+            if not is_table(source):
+                foreign_files.refuse_binary(source, source.name)
+            return draft_table(source, vessel)
         with files.temporary_folder() as folder:
             done = Converted()
-            (target,) = _each(path, None, folder, done)
+            (target,) = _each(source, None, folder, done)
             for what in done.lost.values():
                 log.warning("%s: left out: %s", path.name, what)
             return draft_log(target, vessel)
 
 
+@contextmanager
+def as_logs(path: Path, profile: Profile | None, done: Converted) -> Iterator[list[Path]]:
+    """A log itself; of what `convert` takes the logs that it makes, for the time of the block."""
+    if not path.exists() or is_log(path):
+        yield [path]
+        return
+    with packed.unpacked(path) as source:
+        if is_log(source) or not _convertible(source, profile):
+            yield [source]
+            return
+        with files.temporary_folder() as folder:
+            yield list(_each(source, profile, folder, done))
+
+
+def _convertible(path: Path, profile: Profile | None) -> bool:
+    """Whether logs can be made of it; the reader of logs says what is wrong with the others."""
+    if path.is_dir():
+        return is_bag(path) or holds_tables(path)
+    return is_bag(path) or is_nmea(path) or (profile is not None and not is_foreign(path))
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file is an MCAP log, by its name or by its content."""
+    if path.suffix.lower() == MCAP:
+        return not path.is_dir()
+    return path.is_file() and begins_as_log(path)
+
+
 def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> Iterator[Path]:
     check_there(path, "a table, NMEA 0183 text, a ROS bag, or a folder of one table per topic")
+    with packed.unpacked(path) as source:
+        yield from _of_source(source, path, profile, out, done)
+
+
+def _of_source(
+    path: Path, given: Path, profile: Profile | None, out: Path, done: Converted
+) -> Iterator[Path]:
+    """The logs of a file or folder; `given` is what it was unpacked from, or itself."""
     called = path.stem if path.is_file() else Path(os.path.abspath(path)).name  # of `.`, too
     ship = profile.ship.name if profile else called
     target = out / f"{called}.mcap"
@@ -84,35 +124,51 @@ def _each(path: Path, profile: Profile | None, out: Path, done: Converted) -> It
         refuse_existing(target)
         target.parent.mkdir(parents=True, exist_ok=True)
         if lost := bag_to_log(path, target, ship):
-            done.lost[str(path)] = "; ".join(lost)
+            done.lost[str(given)] = "; ".join(lost)
         log.info("%s written", target.name)
         yield target
     elif path.is_dir():
         parts, left_out = folder_to_series(path, profile)
         if left_out:
-            done.lost[str(path)] = " ".join(left_out)
-        yield _written(target, parts, profile, ship, path)
+            done.lost[str(given)] = " ".join(left_out)
+        yield _written(target, parts, profile, ship, given)
+    elif is_log(path):
+        refuse_log(path, given)
+        refuse_existing(target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with files.whole(target) as partial:
+            shutil.copyfile(path, partial)
+        yield target
     elif is_nmea(path):
         parts, damaged = read_nmea(path)
         if damaged:
-            done.lost[str(path)] = counted(damaged, "damaged sentence")
-        yield _written(target, parts, profile, ship, path)
+            done.lost[str(given)] = counted(damaged, "damaged sentence")
+        yield _written(target, parts, profile, ship, given)
     else:
-        profile = columns.required(profile, path)
-        voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
-        if lost:
-            done.lost[str(path)] = ", ".join(lost)
-        begun: set[str] = set()
-        for name, part in voyages:
-            try:  # one bad voyage never ends the others
-                refuse_namesake(name, begun, path)
-                series = columns.series(part, profile)
-                target = _written(out / f"{name}.mcap", series, profile, ship, path)
-            except BaseException as error:
-                where = str(path) if name == path.stem else f"{path}: {name}"
-                done.refused[where] = _why(error, f"{path.name}: {name}")
-                continue
-            yield target
+        foreign_files.refuse(path)
+        if not is_table(path):
+            foreign_files.refuse_binary(path, path.name)
+        yield from _of_table(path, given, columns.required(profile, given), out, done)
+
+
+def _of_table(
+    path: Path, given: Path, profile: Profile, out: Path, done: Converted
+) -> Iterator[Path]:
+    """A log for each voyage of a table."""
+    voyages, lost = columns.voyages(read_table(path, profile.table), profile, path)
+    if lost:
+        done.lost[str(given)] = ", ".join(lost)
+    begun: set[str] = set()
+    for name, part in voyages:
+        try:  # one bad voyage never ends the others
+            refuse_namesake(name, begun, path)
+            series = columns.series(part, profile)
+            target = _written(out / f"{name}.mcap", series, profile, profile.ship.name, given)
+        except BaseException as error:
+            where = str(given) if name == path.stem else f"{given}: {name}"
+            done.refused[where] = _why(error, f"{path.name}: {name}")
+            continue
+        yield target
 
 
 def _why(error: BaseException, doing: str) -> str:

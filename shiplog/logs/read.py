@@ -47,15 +47,32 @@ class Contents:
     metadata: dict[str, dict[str, str]]  # metadata records by name, such as "voyage"
     library: str
     profile: str
+    source: Path | None = None  # the file or folder that it was converted from, if any
+
+    @property
+    def origin(self) -> Path:
+        """What a user has of it."""
+        return self.source or self.path
 
     @cached_property
     def sha256(self) -> str:
-        """Of the bytes that were there when the log was opened; 0.6 s a gigabyte."""
-        digest = hashlib.sha256()
-        with self.path.open("rb") as stream:
-            for begin in range(0, self.size, HASHED_BYTES):
-                digest.update(stream.read(min(HASHED_BYTES, self.size - begin)))
+        """Of the bytes that were there when the log was opened; 0.6 s a gigabyte. Of a log that
+        was converted: those of what it was made of."""
+        return hash_of(self.path, self.size) if self.source is None else hash_of(self.source)
+
+
+def hash_of(path: Path, size: int | None = None) -> str:
+    """SHA-256 of a file, or of its first bytes; of a folder that of its files and their names."""
+    digest = hashlib.sha256()
+    if path.is_dir():
+        for inside in sorted(p for p in path.rglob("*") if p.is_file()):
+            digest.update(f"{inside.relative_to(path).as_posix()}\n{hash_of(inside)}\n".encode())
         return digest.hexdigest()
+    size = path.stat().st_size if size is None else size
+    with path.open("rb") as stream:
+        for begin in range(0, size, HASHED_BYTES):
+            digest.update(stream.read(min(HASHED_BYTES, size - begin)))
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)

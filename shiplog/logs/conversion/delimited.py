@@ -15,6 +15,7 @@ import polars as pl
 
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.clock import number_of
+from shiplog.logs.foreign_files import is_binary
 
 log = logging.getLogger(__name__)
 
@@ -58,7 +59,7 @@ def read_table(path: Path, known: Collection[str] = ()) -> DelimitedTable:
 
     Raises ChannelMissing for what is no table, cannot be read or holds no row.
     """
-    if not path.is_file() or not is_table(path):
+    if not path.is_file() or not (is_table(path) or not is_binary(path)):
         raise ChannelMissing(
             f"{path} is no table.", hint=f"give a file of type .parquet, {', '.join(TEXT)}."
         )

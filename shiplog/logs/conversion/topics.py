@@ -35,6 +35,11 @@ LOGGED = (
 UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", "msec": "ms"}
 
 
+def holds_tables(folder: Path) -> bool:
+    """Whether there is a table in a folder that is not hidden."""
+    return any(is_table(path) for path in folder.glob("[!.]*"))
+
+
 def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series], list[str]]:
     """Each table of a folder as a topic: `a__b.parquet` is /a/b, and every number a field. Also
     the reasons of the tables that had to be left out. Hidden files are none.
