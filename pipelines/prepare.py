@@ -19,7 +19,7 @@ from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
-from shiplog.voyages import beside
+from shiplog.voyages import beside, two_sources
 from shiplog.voyages.fitting_profile import fitting_profile
 from shiplog.voyages.ingest import consistency_of, ingest
 from shiplog.voyages.sensor_correction import corrected
@@ -154,12 +154,13 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
         profile = chosen or fitting_profile(found)
     except ShiplogError as error:
         why = error
-    reading = read(path, beside.wanted(profile) if profile else {}, others=True)
+    sent = two_sources.several(path, profile) if profile else {}
+    reading = read(path, beside.wanted(profile, sent) if profile else {}, others=True)
     report = health_of(reading)
     consistency: list[Finding] = []
     try:
         if profile is not None:
-            consistency = consistency_of(reading, profile)
+            consistency = consistency_of(reading, profile, sent)
     except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)
     if why is not None:

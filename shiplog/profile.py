@@ -118,6 +118,10 @@ class Source(Section):
         default=(), description="raw values that stand for no value, such as 360 of an AIS course"
     )  # fmt: skip
 
+    frame: str | None = Field(
+        default=None, description="which sender's messages count where several share a topic: a "
+        "frame_id, or the name of a publisher; the most frequent one where left out"
+    )  # fmt: skip
     status: Literal["heed", "ignore"] = Field(
         default="heed", description='whether a field beside the values that says "no fix" or "not '
         'valid", as status, fix_type or valid, makes them blank'

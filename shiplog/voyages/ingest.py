@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.logs.senders import Senders
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
     beside,
@@ -28,6 +30,7 @@ from shiplog.voyages import (
     resampling,
     sensor_consistency,
     status,
+    two_sources,
 )
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.sensor_consistency import Estimate
@@ -65,13 +68,16 @@ class Voyage:
 
 def ingest(path, profile: Profile) -> Voyage:
     """Read one log through a profile. Raises LogUnreadable, ChannelMissing, ProfileError."""
-    reading = read(path, beside.wanted(profile))
-    return build(reading, profile)
+    sent = two_sources.several(path, profile)
+    return build(read(path, beside.wanted(profile, sent)), profile, sent)
 
 
-def build(reading: Reading, profile: Profile) -> Voyage:
-    """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
-    aligned = _aligned(reading, profile)
+def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None = None) -> Voyage:
+    """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there.
+
+    sent  by topic, those who send on it, where there are several
+    """
+    aligned = _aligned(reading, profile, sent or {})
     table, grid = aligned.table, aligned.grid
     estimates = tuple(sensor_consistency.estimates(table, profile))
     consistency = sensor_consistency.findings(estimates, table.height, profile)
@@ -96,12 +102,14 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
     return tables.usable(tables.resample([named], profile.columns, profile.circular))
 
 
-def consistency_of(reading: Reading, profile: Profile) -> list[Finding]:
-    """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
-    table = _aligned(reading, profile).table
-    return sensor_consistency.findings(
-        sensor_consistency.estimates(table, profile), table.height, profile
-    )
+def consistency_of(
+    reading: Reading, profile: Profile, sent: Mapping[str, Senders]
+) -> list[Finding]:
+    """What the sensors of a log say of themselves and of each other. Raises as `build` does."""
+    aligned = _aligned(reading, profile, sent)
+    own = [f for f in aligned.left_out if f.kind in ("status", "two_sources", "contradiction")]
+    estimates = sensor_consistency.estimates(aligned.table, profile)
+    return own + sensor_consistency.findings(estimates, aligned.table.height, profile)
 
 
 @dataclass(frozen=True)
@@ -115,8 +123,9 @@ class _Aligned:
     datum: tuple[float, float] | None
 
 
-def _aligned(reading: Reading, profile: Profile) -> _Aligned:
+def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> _Aligned:
     _require(reading, profile)
+    reading, profile, shared = two_sources.told_apart(reading, profile, sent)
     reading, left_out = clocks.without_strays(reading, profile)
     reading, moved = clocks.on_one_date(reading, profile)
     reading, refused = status.heeded(reading, profile)
@@ -159,7 +168,7 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    found = [*left_out, *moved, *mounting, *status.said(grid, refused)]
+    found = [*shared, *left_out, *moved, *mounting, *status.said(grid, refused)]
     return _Aligned(table, grid, [*every.items()], found, datum)
 
 
@@ -222,6 +231,7 @@ def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
+    frame = two_sources.of_one(frame, source)
     times = frame[clocks.of(frame, source)[0]]
     values = [
         (_numbers(frame[path]) - offset) * factor

@@ -146,7 +146,7 @@ def paths(name: str, source: Source) -> set[str]:
         return set()
     return {
         place + field for rule in _rules(name, source) for field in rule.names
-        for place in _above(source)
+        for place in above(source)
     }  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def _rules(name: str, source: Source) -> list[Rule]:
     ]  # fmt: skip
 
 
-def _above(source: Source) -> list[str]:
+def above(source: Source) -> list[str]:
     """The parts of a message that hold a source's values, innermost first: `a.b.`, `a.`, ``."""
     names = source.paths[0].split(".")[:-1]
     return ["".join(f"{name}." for name in names[:depth]) for depth in range(len(names), -1, -1)]
@@ -210,7 +210,7 @@ def _bad(
         if re.search(rule.unlike, schema, re.IGNORECASE):
             continue
         for field_name in rule.names:
-            path = next((p + field_name for p in _above(source) if p + field_name in frame), None)
+            path = next((p + field_name for p in above(source) if p + field_name in frame), None)
             if path is None or path in source.paths:
                 continue
             for value, words, here in _met(frame[path], rule):
