@@ -7,6 +7,7 @@ that a database is whole whose last rows still stand in its write-ahead log.
 from __future__ import annotations
 
 import logging
+import re
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -82,6 +83,21 @@ def parts_of(path: Path) -> Parts:
     missing = [f"{name}: it is in {METADATA}, and not in the folder" for name in named
                if name not in found]  # fmt: skip
     return Parts(listed or there, missing)
+
+
+def part_of(path: Path) -> str:
+    """What to do about a log that may be a part of a split recording, to end a hint; else nothing.
+
+    rosbag2 numbers the parts of a bag, and metadata.yaml lists them.
+    """
+    numbered = re.fullmatch(r"(.+_)\d+", path.stem)
+    alike = list(path.parent.glob(f"{numbered[1]}[0-9]*{path.suffix}")) if numbered else []
+    if len(alike) < 2 or (path.parent / METADATA).is_file():
+        return ""
+    return (
+        "; if this is a part of a split recording, give the folder with its metadata.yaml (ros2 bag "
+        "reindex makes one), or join the parts with mcap merge"
+    )
 
 
 class Part:

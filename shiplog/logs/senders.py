@@ -9,18 +9,20 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 import polars as pl
-from mcap.records import Channel, Message
+from mcap.opcode import Opcode
+from mcap.records import Channel, ChunkIndex
 
 from . import chunks, scan
-from .container import Survey, read_at
+from .container import Survey, head, index_of, read_at
 from .fields import locate
-from .records import HEAD
+from .records import HEAD, MESSAGE
 from .tables import CHANNEL, Tables
 
 CHUNKS = 5  # that are looked at
-MESSAGES = 200  # of a channel in a chunk
+MESSAGES = 64  # of a channel in a chunk
 __all__ = ["CHANNEL", "Senders", "senders"]
 NAMES = ("callerid", "frame_id", "node", "publisher")  # in a channel's metadata: who sends
 
@@ -82,27 +84,40 @@ def _samples(found: Survey, channels: set[int]) -> Iterator[tuple[int, list[byte
     chosen = {round(i * last / (CHUNKS - 1)) for i in range(CHUNKS)} if last > 0 else {0}
     with found.path.open("rb") as stream:
         for at in sorted(chosen) if entries else ():
-            entry = entries[at]
-            length = entry.chunk_length - HEAD.size
-            if not 0 < length <= chunks.AT_ONCE or entry.uncompressed_size > chunks.AT_ONCE:
-                continue
-            body = read_at(stream, entry.chunk_start_offset + HEAD.size, length)
-            yield from _of_chunk(body, channels)
+            yield from _of_chunk(stream, entries[at], channels, found.size)
 
 
-def _of_chunk(body: bytes, channels: Collection[int]) -> Iterator[tuple[int, list[bytes]]]:
-    packed = chunks.chunk(body)
-    met: dict[int, list[bytes]] = {}
-    try:
-        for batch in chunks.contents(chunks.opened(packed), only=channels) if packed else ():
-            for message in batch:
-                if isinstance(message, Message):
-                    payloads = met.setdefault(message.channel_id, [])
-                    if len(payloads) < MESSAGES:
-                        payloads.append(bytes(message.data))
-    except ValueError:  # a damaged one: whoever reads all of them says so
+def _of_chunk(
+    stream: IO[bytes], entry: ChunkIndex, channels: set[int], size: int
+) -> Iterator[tuple[int, list[bytes]]]:
+    """The payloads that stand where the indexes behind the chunk say; what is damaged is nothing
+    here: whoever reads all of the log reports it."""
+    length = entry.chunk_length - HEAD.size
+    if not 0 < length <= chunks.AT_ONCE or entry.uncompressed_size > chunks.AT_ONCE:
         return
-    yield from met.items()
+    packed = chunks.chunk(read_at(stream, entry.chunk_start_offset + HEAD.size, length))
+    try:
+        data = bytes(chunks.opened(packed).data) if packed else b""
+    except ValueError:
+        return
+    for number in channels & set(entry.message_index_offsets):
+        offset = entry.message_index_offsets[number]
+        opcode, length, fault = head(stream, offset, size)
+        if fault is not None or opcode != Opcode.MESSAGE_INDEX:
+            continue
+        for index in index_of(read_at(stream, offset + HEAD.size, length), 0):
+            places = index.places[:MESSAGES].tolist()
+            yield number, [one for place in places if (one := _payload(data, place)) is not None]
+
+
+def _payload(data: bytes, place: int) -> bytes | None:
+    """Of the message whose record begins there."""
+    if not 0 <= place <= len(data) - HEAD.size - MESSAGE.size:
+        return None
+    opcode, length = HEAD.unpack_from(data, place)
+    begin = place + HEAD.size
+    whole = opcode == Opcode.MESSAGE and MESSAGE.size <= length <= len(data) - begin
+    return data[begin + MESSAGE.size : begin + length] if whole else None
 
 
 def _name(channel: Channel, others: Collection[Channel]) -> str:

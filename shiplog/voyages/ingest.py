@@ -20,6 +20,7 @@ from shiplog.exceptions import ChannelMissing, LogUnreadable, listed, nearest
 from shiplog.logs.fields import is_number
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, fields, read
+from shiplog.logs.ros2_bags import part_of
 from shiplog.logs.senders import Senders
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
@@ -201,7 +202,7 @@ def _require(reading: Reading, profile: Profile) -> None:
                 f"{log} has no topic {topic!r}{nearest(topic, topics)}. "
                 f"Topics found: {listed(topics)}.",
                 hint="correct the topic in the ship profile, choose another with --profile, or "
-                "draft one with `shiplog profile LOG`.",
+                f"draft one with `shiplog profile LOG`{part_of(reading.contents.path)}.",
             )
         reason = reading.health.undecodable.get(topic)
         if reason:

@@ -307,3 +307,15 @@ def test_one_ros1_type_that_is_broken_costs_itself_alone(tmp_path):
     assert frames["/x"]["x"].to_list() == list(np.arange(5.0))
     said = "".join(done.lost.values())
     assert "/bad: " in said and "/lost: " in said
+
+
+def test_a_part_given_alone_is_told_what_it_is(tmp_path):
+    """Three parts without their metadata.yaml: the second has no rudder, and the hint says why."""
+    parts = [
+        mcap(tmp_path / f"bag_{k}.mcap", 300 * k, skip=("/rudder",) if k else ()) for k in range(3)
+    ]
+    (tmp_path / "p.toml").write_text(PROFILE)
+    done = ingest_logs(parts, str(tmp_path / "p.toml"), Store(tmp_path / "store"))
+    assert [report.name for report in done.reports] == ["bag_0"]
+    for error in done.refused.values():
+        assert "split recording" in error.hint and "metadata.yaml" in error.hint

@@ -180,3 +180,15 @@ def test_names_in_a_zip_stay_in_its_folder(tmp_path):
     with packed.unpacked(path) as inside:
         assert sorted(p.name for p in inside.rglob("*.csv")) == ["one.csv", "two.csv"]
     assert not (tmp_path.parent / "one.csv").exists()
+
+
+def test_what_is_alike_in_all_tables_of_a_folder_is_said_once(tmp_path):
+    """As ulog2csv leaves them: times since boot in every table."""
+    folder = tmp_path / "px4"
+    folder.mkdir()
+    for number in range(30):
+        rows = "".join(f"{20_471_648 + 200_000 * i},{i}\n" for i in range(30))
+        (folder / f"log_topic{number}_0.csv").write_text(f"timestamp,value\n{rows}")
+    (why,) = convert([folder], None, tmp_path / "out").refused.values()
+    assert why.count("are no Unix time") == 1
+    assert "30 tables" in why and "log_topic0_0.csv" in why and '"timestamp" =' in why

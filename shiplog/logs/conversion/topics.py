@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from shiplog.profile import Profile
 
 log = logging.getLogger(__name__)
 
+NAMED = 4  # tables that a sentence on several names
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
 # A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
 STAMP_COLUMNS = (
@@ -51,18 +53,35 @@ def folder_to_series(folder: Path, profile: Profile | None) -> tuple[list[Series
     """
     parts: list[Series] = []
     reasons: list[str] = []
+    why: dict[str, list[tuple[str, ShiplogError]]] = {}  # alike but for their numbers and names
     for path in sorted(p for p in folder.glob("[!.]*") if is_table(p)):
         try:
             parts += _one(path, profile)
         except ShiplogError as error:
-            reasons.append(error.message)
+            why.setdefault(_kind_of(error.message), []).append((path.name, error))
+    reasons += [_all_of(said) for said in why.values()]
     if not parts:
         raise ChannelMissing(
             f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
-            hint="give one table per topic, each with a column of times such as log_time_ns, or a "
+            hint=next((e.hint for said in why.values() for _, e in said if e.hint), "")
+            or "give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table.",
         )
     return named_apart(parts), reasons
+
+
+def _kind_of(message: str) -> str:
+    """A sentence without what differs from table to table."""
+    return re.sub(r"\d[\d.]*|'[^']*'|\S+\.(csv|txt|tsv|parquet)\b", "#", message)
+
+
+def _all_of(said: list[tuple[str, ShiplogError]]) -> str:
+    """What is said of several tables alike, once, with their names."""
+    names = [name for name, _ in said]
+    message = said[0][1].message
+    if len(said) == 1:
+        return message if names[0] in message else f"{names[0]}: {message}"
+    return f"{len(said)} tables ({listed(names, most=NAMED)}), such as {names[0]}: {message}"
 
 
 def _one(path: Path, profile: Profile | None) -> list[Series]:
