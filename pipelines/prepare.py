@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipelines.bars import tracked
+from pipelines.convert import Converted, as_logs
 from shiplog import profile_file as profiles
 from shiplog.exceptions import ShiplogError
 from shiplog.logs import reading_limits
+from shiplog.logs.bags import MCAP, bags_once, is_bag, only_log
 from shiplog.logs.check import expected_s, health_of
 from shiplog.logs.health_report import Finding, NotCompared, VoyageReport
 from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
+from shiplog.voyages import beside, two_sources
 from shiplog.voyages.fitting_profile import fitting_profile
 from shiplog.voyages.ingest import consistency_of, ingest
 from shiplog.voyages.sensor_correction import corrected
@@ -27,16 +30,18 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class IngestedLogs:
-    """What became of each log: its report, or why it was refused."""
+    """What became of each log: its report, or why it was refused; and what of a file that had to
+    become a log first is not in it."""
 
     reports: list[VoyageReport]
     refused: dict[str, ShiplogError]
+    lost: dict[str, str] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
         """Every log was taken, every message of it could be read, and no two channels exclude
         each other."""
-        return not self.refused and not self.damaged
+        return not self.refused and not self.damaged and not self.lost
 
     @property
     def damaged(self) -> list[VoyageReport]:
@@ -52,64 +57,93 @@ def ingest_logs(
     correct  put right what the sensors say of each other beyond doubt
     """
     chosen = profiles.load(profile) if profile else None
-    reports: list[VoyageReport] = []
-    refused: dict[str, ShiplogError] = {}
+    done = IngestedLogs([], {})
     reported: set[str] = set()
     store.mend()  # else it would wait for the next voyage that is new
-    for path in tracked(paths, "ingesting"):
+    for path, logs in _opened(tracked(paths, "ingesting"), chosen, done):
+        for one in logs:
+            _ingest_one(one, None if one == path else path, chosen, store, correct, done, reported)
+    reading_limits.end()
+    return done
+
+
+def _opened(
+    paths: Iterable[Path], chosen: Profile | None, done: IngestedLogs
+) -> Iterator[tuple[Path, list[Path]]]:
+    """Each path with the logs in it; one that cannot be opened is noted, and stops no other."""
+    for path in paths:
+        made = Converted()
         try:
             reading_limits.begin(path)
-            found = contents(path)
-            profile_of = chosen or fitting_profile(found)
-            if profile_of.source not in reported:
-                reported.add(profile_of.source)
-                for line in tables.estimated(profile_of):
-                    log.info(line)
-            if store.holds(path.stem, found.sha256, profile_of, correct):
-                reports.append(store.report(path.stem))
-                log.info("%s: unchanged", path.stem)
-                continue
-            voyage = ingest(path, profile_of)
-            if correct:
-                voyage = corrected(voyage)
-            state = store.add(voyage)
-        except ShiplogError as error:
-            refused[str(path)] = error
-            continue
-        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
-            refused[str(path)] = unexpected(error, path.name)
-            continue
-        reports.append(voyage.report)
-        log.info("%s: %s", voyage.name, state)
-    reading_limits.end()
-    return IngestedLogs(reports, refused)
+            with as_logs(path, chosen, made) as logs:
+                yield path, logs
+        except GeneratorExit:
+            raise
+        except (
+            BaseException
+        ) as error:  # one bad file never ends the others; a panic is no Exception
+            done.refused[str(path)] = _as_said(error, path)
+        done.refused.update({name: ShiplogError(why) for name, why in made.refused.items()})
+        done.lost.update(made.lost)
+
+
+def _ingest_one(
+    path: Path, source: Path | None, chosen: Profile | None, store: Store, correct: bool,
+    done: IngestedLogs, reported: set[str],
+) -> None:  # fmt: skip
+    """One log, which was made of `source` if there is one, into the store."""
+    try:
+        found = replace(contents(path), source=source)
+        profile_of = chosen or fitting_profile(found)
+        if profile_of.source not in reported:
+            reported.add(profile_of.source)
+            for line in tables.estimated(profile_of):
+                log.info(line)
+        if store.holds(path.stem, found.sha256, profile_of, correct, source is not None):
+            done.reports.append(store.report(path.stem))
+            log.info("%s: unchanged", path.stem)
+            return
+        voyage = ingest(path, profile_of)
+        voyage = replace(voyage, contents=found)
+        if correct:
+            voyage = corrected(voyage)
+        state = store.add(voyage)
+    except BaseException as error:  # one bad log never ends the others; a panic is no Exception
+        done.refused[str(source or path)] = _as_said(error, source or path)
+        return
+    done.reports.append(voyage.report)
+    log.info("%s: %s", voyage.name, state)
+
+
+def _as_said(error: BaseException, path: Path) -> ShiplogError:
+    return error if isinstance(error, ShiplogError) else unexpected(error, path.name)
 
 
 def expand(paths: Iterable[Path]) -> list[Path]:
-    """Folders stand for the logs in them, but for hidden files; one without logs for itself, which
-    no reader takes."""
+    """Folders stand for the logs in them, but for hidden files; a bag of one log for this log, and
+    one of several parts, or a folder of tables, for itself."""
     found: list[Path] = []
-    for path in paths:
-        logs = sorted(path.glob("[!.]*.mcap")) if path.is_dir() else []
-        found += logs or [path]
+    for path in bags_once(paths):
+        alone = only_log(path) if is_bag(path) else None
+        logs = [] if is_bag(path) or not path.is_dir() else sorted(
+            p for p in path.glob("[!.]*") if MCAP in p.suffixes[-2:] and p.is_file()
+        )  # fmt: skip
+        found += [alone] if alone else logs or [path]
     return found
 
 
 def check_logs(paths: Sequence[Path], profile: str | None = None) -> IngestedLogs:
     """The health of each log by itself, and of its sensors by each other; nothing is stored."""
     chosen = profiles.load(profile) if profile else None
-    reports: list[VoyageReport] = []
-    refused: dict[str, ShiplogError] = {}
-    for path in tracked(expand(paths), "checking", expected_s):
-        try:
-            reading_limits.begin(path)
-            reports.append(_checked(path, chosen))
-        except ShiplogError as error:
-            refused[str(path)] = error
-        except BaseException as error:  # one bad log never ends the others; a panic is no Exception
-            refused[str(path)] = unexpected(error, path.name)
+    done = IngestedLogs([], {})
+    for path, logs in _opened(tracked(expand(paths), "checking", expected_s), chosen, done):
+        for one in logs:
+            try:
+                done.reports.append(_checked(one, chosen))
+            except BaseException as error:  # one bad log never ends the others
+                done.refused[str(path)] = _as_said(error, path)
     reading_limits.end()
-    return IngestedLogs(reports, refused)
+    return done
 
 
 def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
@@ -120,13 +154,14 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
         profile = chosen or fitting_profile(found)
     except ShiplogError as error:
         why = error
-    reading = read(path, profile.wanted() if profile else {}, others=True)
+    sent = two_sources.several(path, profile) if profile else {}
+    reading = read(path, beside.wanted(profile, sent) if profile else {}, others=True)
     report = health_of(reading)
     findings: tuple[Finding, ...] = ()
     not_compared: tuple[NotCompared, ...] = ()
     try:
         if profile is not None:
-            compared = consistency_of(reading, profile)
+            compared = consistency_of(reading, profile, sent)
             findings, not_compared = compared.findings, compared.not_compared
     except BaseException as error:  # what ingest would refuse has its health all the same
         why = error if isinstance(error, ShiplogError) else unexpected(error, path.name)

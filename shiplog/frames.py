@@ -87,14 +87,39 @@ def velocity_at_midship(
     return velocity + np.stack((yaw_rate * starboard, -yaw_rate * ahead)).T
 
 
-def quaternion_heading(z: np.ndarray, w: np.ndarray, east_north_up: bool) -> np.ndarray:
-    """Heading [rad, clockwise from north] of a level quaternion (0, 0, z, w); NaN of z = w = 0,
-    which is no rotation but a message that nobody filled in.
+def turned(quaternion: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """An axis [3] turned by unit quaternions (x, y, z, w) [n, 4]: [n, 3] (Rodrigues, 1840).
+
+    a' = a + 2 w (u × a) + 2 u × (u × a),   u = (x, y, z)
+    """
+    u, w = quaternion[:, :3], quaternion[:, 3:]
+    across = 2.0 * np.cross(u, axis)
+    return axis + w * across + np.cross(u, across)
+
+
+def quaternion_heading(ahead: np.ndarray, east_north_up: bool) -> np.ndarray:
+    """Heading [rad, clockwise from north] of an axis of the ship [n, 3] in the earth's.
+
+    With the sensor's x axis ahead it is that of a quaternion, ship heeled or not:
+
+        yaw = atan2(2 (w z + x y), 1 - 2 (y² + z²))
 
     In east-north-up axes (ROS, REP 103) yaw is counter-clockwise from east: ψ = π/2 - yaw.
     """
-    yaw = np.where((z == 0.0) & (w == 0.0), np.nan, 2.0 * np.arctan2(z, w))
-    return np.pi / 2.0 - yaw if east_north_up else yaw
+    if east_north_up:
+        return np.arctan2(ahead[:, 0], ahead[:, 1])
+    return np.arctan2(ahead[:, 1], ahead[:, 0])
+
+
+def mounted(turns: tuple[float, ...]) -> np.ndarray:
+    """From a sensor's axes to the ship's [3, 3], both x ahead, y to starboard, z down: turned by
+    (roll, pitch, yaw) [rad] about these axes, M = R_z(yaw) R_y(pitch) R_x(roll)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(turns), np.sin(turns)
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ])  # fmt: skip
 
 
 def wrap(angle: Any) -> Any:

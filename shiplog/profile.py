@@ -13,7 +13,14 @@ from pydantic import Field, model_validator
 
 from shiplog import channels, units
 from shiplog.exceptions import ProfileError, listed, nearest
-from shiplog.profile_channels import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
+from shiplog.profile_channels import (
+    LEVEL,
+    QUATERNION,
+    SENSOR_KINDS,
+    TABLE_CHANNELS,
+    TABLE_LABELS,
+    channels_of,
+)
 from shiplog.toml_section import Section
 
 Clock = Literal["message", "log", "publish"]
@@ -30,6 +37,7 @@ Place = Annotated[float, Field(ge=-LONGEST_M, le=LONGEST_M)]  # of a ship's part
 Area = Annotated[float, Field(ge=1e-6, le=LONGEST_M * 100.0)]  # nothing on a ship is 100 m high
 Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=360.0)]
+Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 NO_ANGLE = 'needs a unit: nearly every instrument gives "deg", and without one it would be "rad"'
 Chart = Annotated[float, Field(ge=-1e7, le=1e7)]  # m, a quarter of the Earth's girth
 
@@ -115,6 +123,15 @@ class Source(Section):
         default=(), description="raw values that stand for no value, such as 360 of an AIS course"
     )  # fmt: skip
 
+    frame: str | None = Field(
+        default=None, description="which sender's messages count where several share a topic: a "
+        "frame_id, or the name of a publisher; the most frequent one where left out"
+    )  # fmt: skip
+    status: Literal["heed", "ignore"] = Field(
+        default="heed", description='whether a field beside the values that says "no fix" or "not '
+        'valid", as status, fix_type or valid, makes them blank'
+    )  # fmt: skip
+
     @property
     def paths(self) -> tuple[str, ...]:
         return self.fields or ((self.field,) if self.field else ())
@@ -167,6 +184,12 @@ class Sensor(Source):
         "a wind speed; those of its kind of ship where left out"
     )  # fmt: skip
 
+    mounting_deg: tuple[Turn, Turn, Turn] | None = Field(
+        default=None, description="of a quaternion: how the sensor is turned in the ship, [roll "
+        "about ahead, pitch about starboard, yaw about down], deg; [180, 0, 0] where it is upside "
+        "down. Level, with x ahead, where left out"
+    )  # fmt: skip
+
     @model_validator(mode="after")
     def _accurate(self) -> Sensor:
         given = self.sigma if isinstance(self.sigma, tuple) else (self.sigma or 0.0,)
@@ -193,11 +216,16 @@ class Sensors(Section):
             kind = sensor.kind or kinds[0]
             if kind not in kinds:
                 raise ValueError(f"sensors.{name}.kind is {kind!r}; it can be {listed(kinds)}")
-            fields = len(TABLE_CHANNELS[name, kind])
-            if len(sensor.paths) != fields:
+            if not channels_of(name, kind, len(sensor.paths)):
+                counts = [len(TABLE_CHANNELS[name, kind]), *_fewer(name, kind)]
                 raise ValueError(
-                    f"sensors.{name} of kind {kind!r} needs {fields} field(s), "
-                    f"not {len(sensor.paths)}"
+                    f"sensors.{name} of kind {kind!r} needs {' or '.join(map(str, counts))} "
+                    f"field(s), not {len(sensor.paths)}"
+                )
+            if sensor.mounting_deg and TABLE_CHANNELS[name, kind] != QUATERNION:
+                raise ValueError(
+                    f"sensors.{name} has `mounting_deg` and is of kind {kind!r}: only a quaternion "
+                    "says how a sensor is turned. Leave it out"
                 )
             if sensor.limits is not None and name in ("position", "heading"):
                 raise ValueError(
@@ -222,6 +250,10 @@ class Sensors(Section):
         return [
             (name, getattr(self, name)) for name in SENSOR_KINDS if getattr(self, name) is not None
         ]
+
+
+def _fewer(name: str, kind: str) -> list[int]:
+    return [LEVEL[name, kind]] if (name, kind) in LEVEL else []
 
 
 class Actuator(Source):

@@ -14,6 +14,7 @@ NEEDED = {  # sensors without which there is no table, and what records them
     "velocity": "speed and course over ground, or velocities",
     "heading": "a gyro or a GNSS compass (the course over ground is not the heading)",
 }
+QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")
 # What a table's column may hold, sensor by sensor and kind by kind, in the order of its fields.
 TABLE_CHANNELS = {
     ("position", "geodetic"): ("latitude", "longitude"),
@@ -23,10 +24,14 @@ TABLE_CHANNELS = {
     ("velocity", "ned"): ("velocity_north", "velocity_east"),
     ("velocity", "enu"): ("velocity_east", "velocity_north"),
     ("heading", "angle"): ("heading",),
-    ("heading", "quaternion_enu"): ("quaternion_z", "quaternion_w"),
-    ("heading", "quaternion_ned"): ("quaternion_z", "quaternion_w"),
+    ("heading", "quaternion_enu"): QUATERNION,
+    ("heading", "quaternion_ned"): QUATERNION,
     ("yaw_rate", "rate"): ("yaw_rate",),
     ("wind", "from_bow"): ("wind_speed", "wind_angle"),
+}
+LEVEL = {  # kinds that do with their last fields alone, and how many: of what is mounted level
+    ("heading", "quaternion_enu"): 2,
+    ("heading", "quaternion_ned"): 2,
 }
 TABLE_LABELS = {  # columns of a table that say whose row it is, and when
     "time": "the row's time; one without a zone is taken as UTC",
@@ -36,3 +41,11 @@ TABLE_LABELS = {  # columns of a table that say whose row it is, and when
     "status": "says which rows have a fix: position and velocity are blank where it holds one of "
     "its `missing`",
 }
+
+
+def channels_of(sensor: str, kind: str, fields: int) -> tuple[str, ...]:
+    """What each of so many fields of a sensor holds; no channel where there cannot be so many."""
+    channels = TABLE_CHANNELS[sensor, kind]
+    if fields == LEVEL.get((sensor, kind)):
+        return channels[-fields:]
+    return channels if fields == len(channels) else ()

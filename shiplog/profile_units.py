@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from shiplog import units
 from shiplog.exceptions import ProfileError
 from shiplog.profile import Profile
-from shiplog.profile_channels import TABLE_CHANNELS
+from shiplog.profile_channels import QUATERNION, channels_of
 
 MEASURE = {  # what each channel of a sensor measures
     "latitude": "angle", "longitude": "angle", "x0": "length", "y0": "length",
     "sog": "speed", "cog": "angle", "surge": "speed", "sway": "speed",
     "velocity_north": "speed", "velocity_east": "speed",
-    "heading": "angle", "quaternion_z": "ratio", "quaternion_w": "ratio",
+    "heading": "angle", **dict.fromkeys(QUATERNION, "ratio"),
     "yaw_rate": "rate of turn", "wind_speed": "speed", "wind_angle": "angle", "time": "time",
 }  # fmt: skip
 DRIVEN = {  # of an actuator: its value, or the share or the pulse that commands it
@@ -52,7 +52,7 @@ def _stated(profile: Profile) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """(where it stands, unit, what it may measure) of every unit that the profile states."""
     for name, sensor in profile.sensors.items():
         given = sensor.units or ((sensor.unit,) * len(sensor.paths) if sensor.unit else ())
-        channels = TABLE_CHANNELS[name, profile.sensors.kind(name)]
+        channels = channels_of(name, profile.sensors.kind(name), len(sensor.paths))
         for channel, path, unit in zip(channels, sensor.paths, given, strict=False):
             yield f"the field {path!r} of sensors.{name}", unit, (MEASURE[channel],)
     for actuator in profile.actuators:

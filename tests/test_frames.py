@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from shiplog import frames
 
@@ -46,9 +47,23 @@ def test_the_local_plane_has_the_ellipsoids_radii():
 
 def test_a_quaternion_pointing_north_in_both_conventions():
     yaw = np.pi / 2  # counter-clockwise from east: north
-    z, w = np.array([np.sin(yaw / 2)]), np.array([np.cos(yaw / 2)])
-    assert frames.quaternion_heading(z, w, east_north_up=True)[0] == pytest.approx(0.0)
-    assert frames.quaternion_heading(z, w, east_north_up=False)[0] == pytest.approx(np.pi / 2)
+    level = np.array([[0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]])
+    ahead = frames.turned(level, np.array([1.0, 0.0, 0.0]))
+    assert ahead[0] == pytest.approx([0.0, 1.0, 0.0])
+    assert frames.quaternion_heading(ahead, east_north_up=True)[0] == pytest.approx(0.0)
+    assert frames.quaternion_heading(ahead, east_north_up=False)[0] == pytest.approx(np.pi / 2)
+
+
+def test_a_turned_axis_is_that_of_the_rotation_matrix():
+    turn = Rotation.from_rotvec([[0.3, -1.2, 0.7], [2.0, 0.1, -0.4]])
+    axis = np.array([0.2, -0.5, 0.8])
+    assert frames.turned(turn.as_quat(), axis) == pytest.approx(turn.apply(axis), abs=1e-12)
+
+
+def test_a_mounting_is_turned_about_ahead_then_starboard_then_down():
+    turns = (0.3, -0.2, 1.1)
+    known = Rotation.from_euler("ZYX", turns[::-1]).as_matrix()
+    assert frames.mounted(turns) == pytest.approx(known, abs=1e-12)
 
 
 @pytest.mark.parametrize(

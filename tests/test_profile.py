@@ -135,8 +135,9 @@ position = { topic = "/p", fields = ["a", "o"], unit = "deg", lever_arm_m = [1.0
 sigma = 0.1 }
 velocity = { topic = "/v", fields = ["s", "c"], sign = [1.0, -1.0], offset = [0.0, 1.0], \
 sigma = [0.1, 0.2] }
-heading = { topic = "/h", field = "h", sign = -1.0, offset = 3.0, tolerance_s = 0.5, \
-missing = [511.0], resolution = 0.1 }
+heading = { kind = "quaternion_ned", topic = "/h", fields = ["x", "y", "z", "w"], sign = -1.0, \
+offset = 3.0, tolerance_s = 0.5, missing = [511.0], resolution = 0.1, \
+mounting_deg = [180.0, 0.0, 90.0] }
 yaw_rate = { topic = "/h", field = "r", limits = [-1.0, 1.0] }
 [[actuators]]
 name = "rudder"

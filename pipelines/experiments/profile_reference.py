@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from shiplog import profile, profile_file, units
 from shiplog.profile import Section
-from shiplog.profile_channels import SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
+from shiplog.profile_channels import LEVEL, SENSOR_KINDS, TABLE_CHANNELS, TABLE_LABELS
 from shiplog.profile_units import DRIVEN
 from shiplog.report import tables
 
@@ -73,8 +73,10 @@ MEANT = {  # each kind of a sensor in words
     "sog_cog": "speed over ground, and course over ground clockwise from north",
     "body": "ahead and to starboard", "ned": "to the north and to the east",
     "enu": "to the east and to the north", "angle": "clockwise from north",
-    "quaternion_enu": "z and w of a quaternion whose yaw counts from east towards north",
-    "quaternion_ned": "z and w of a quaternion whose yaw counts from north towards east",
+    "quaternion_enu": "x, y, z, w of a quaternion whose yaw counts from east towards north (ROS: "
+    "x ahead, z up); z and w alone of what is mounted level",
+    "quaternion_ned": "x, y, z, w of a quaternion whose yaw counts from north towards east (x "
+    "ahead, z down); z and w alone of what is mounted level",
     "rate": "positive where the bow turns to starboard",
     "from_bow": "apparent wind: speed, and where it blows from, clockwise from the bow",
 }  # fmt: skip
@@ -192,11 +194,17 @@ def _toml(value: object) -> str:
 
 def _kinds() -> str:
     rows = [
-        (f"`{sensor}`", f"`{_toml(kind)}`", str(len(TABLE_CHANNELS[sensor, kind])), MEANT[kind])
+        (f"`{sensor}`", f"`{_toml(kind)}`", _count(sensor, kind), MEANT[kind])
         for sensor, kinds in SENSOR_KINDS.items()
         for kind in kinds
     ]
     return tables.table(("sensor", "kind", "fields", "what they are"), rows)
+
+
+def _count(sensor: str, kind: str) -> str:
+    """How many fields a kind has."""
+    fewer = LEVEL.get((sensor, kind))
+    return str(len(TABLE_CHANNELS[sensor, kind])) + (f" or {fewer}" if fewer else "")
 
 
 def _actuators() -> str:

@@ -91,6 +91,8 @@ def leave(done, json_to: str | None) -> None:
     answer(text, tables.voyages_json(done.reports, done.refused), json_to)
     for path, error in done.refused.items():
         typer.echo(f"{Path(path).name} refused: {error}", err=True)
+    for path, what in done.lost.items():
+        typer.echo(f"{Path(path).name}: not read: {what}", err=True)
     if done.refused and not done.reports:
         raise typer.Exit(1)
     if not done.complete:

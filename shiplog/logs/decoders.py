@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from mcap.records import Channel, Schema
 
-from . import json_text, protobuf, ros2
+from . import json_text, protobuf, ros, ros_definitions
 from .messages import Decoder, Undecodable
+
+KNOWN = {
+    ("protobuf", "protobuf"): protobuf.messages, ("cdr", "ros2msg"): ros.messages,
+    ("cdr", "ros2idl"): ros.messages, ("ros1", "ros1msg"): ros.messages,
+}  # fmt: skip
+UNSTATED = ("", "unknown")  # what rosbag2 writes of a type whose definition it did not find
 
 
 def decoder(channel: Channel, schema: Schema | None) -> Decoder:
@@ -15,8 +21,12 @@ def decoder(channel: Channel, schema: Schema | None) -> Decoder:
     named = f"message encoding {channel.message_encoding!r}"
     if schema is None:
         raise Undecodable(f"{named} without a schema")
-    known = {("protobuf", "protobuf"): protobuf.messages, ("cdr", "ros2msg"): ros2.messages}
-    made = known.get((channel.message_encoding, schema.encoding))
+    if channel.message_encoding == "cdr" and schema.encoding in UNSTATED:
+        known = ros_definitions.of_its_name(schema)
+        if known is None:
+            raise Undecodable(f"nothing says what a {schema.name} holds")
+        schema = known
+    made = KNOWN.get((channel.message_encoding, schema.encoding))
     if made is None:
         raise Undecodable(f"{named} with schema encoding {schema.encoding!r} is not known")
     try:

@@ -20,7 +20,12 @@ class Finding:
     low: float | None = None
     high: float | None = None
     unit: str = ""
-    reason: str = ""  # of a contradiction: one of REASONS
+    reason: str = ""  # of a contradiction, or of two sources between which the profile is to choose
+
+    @property
+    def serious(self) -> bool:
+        """Whether `check` and `ingest` end with exit 3 for it."""
+        return self.kind in SERIOUS or (self.kind == "two_sources" and bool(self.reason))
 
 
 REASONS = ("unit", "sign", "frame", "swapped", "clock", "mounting", "none known")
@@ -103,7 +108,7 @@ class VoyageReport:
     @property
     def serious(self) -> bool:
         """Whether something was lost, or two channels exclude each other."""
-        return self.messages_lost != 0 or any(f.kind in SERIOUS for f in self.findings)
+        return self.messages_lost != 0 or any(f.serious for f in self.findings)
 
     @property
     def slowest(self) -> Instrument | None:

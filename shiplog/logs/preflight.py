@@ -13,7 +13,7 @@ import polars as pl
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message
 
-from . import chunks, rerun_route, salvage, scan
+from . import chunks, rerun_route, ros, salvage, scan
 from .container import Index, Sound
 from .protobuf import ProtobufMessages
 from .records import MESSAGE
@@ -61,6 +61,7 @@ class _Decoded:
     def __init__(self, tables: Tables) -> None:
         self.tables = tables
         self.channels = {number: Waiting(tables, number) for number in candidates(tables)}
+        self._cdr = {n for n in rerun_route.suitable(tables) if _is_cdr(tables.found.channels[n])}
         self._chunk = np.zeros(0, np.uint8)
         self._held = 0
 
@@ -71,16 +72,35 @@ class _Decoded:
         if item.chunk.compression == "" and item.chunk.uncompressed_size <= chunks.AT_ONCE:
             self._chunk = np.frombuffer(item.chunk.data, np.uint8)
             return
-        for batch in chunks.contents(item.chunk, only=self.channels):
+        for batch in chunks.contents(item.chunk, only=self.channels.keys() | self._cdr):
             for message in batch:
-                if isinstance(message, Message):
+                if not isinstance(message, Message):
+                    continue
+                if message.channel_id in self._cdr:
+                    self._plain(message.channel_id, np.frombuffer(message.data[:2], np.uint8)[None])
+                if message.channel_id in self.channels:
                     self.channels[message.channel_id].take_alone(message)
+
+    def _plain(self, channel: int, begins: np.ndarray) -> None:
+        """Keep a channel from Rerun whose payloads [n, 2 bytes] do not all begin as plain CDR:
+        compressed ones would be taken for numbers."""
+        if begins.shape[1] < 2 or not (
+            (begins[:, 0] == 0).all() and np.isin(begins[:, 1], ros.PLAIN).all()
+        ):
+            self.tables.odd.add(channel)
+            self._cdr.discard(channel)
 
     def take(self, index: Index) -> None:
         """Raises ValueError where a message is not where the index says."""
-        if index.channel not in self.channels or not len(self._chunk) or not len(index.times):
+        asked = index.channel in self.channels or index.channel in self._cdr
+        if not asked or not len(self._chunk) or not len(index.times):
             return
         heads, sizes = _heads(self._chunk, index)
+        if index.channel in self._cdr:
+            least = 2 if sizes.min() >= 2 else 0
+            self._plain(index.channel, _windows(self._chunk, least, index.places + HEADS.itemsize))
+        if index.channel not in self.channels:
+            return
         waiting = self.channels[index.channel]
         if not waiting.suits(sizes):
             del self.channels[index.channel]
@@ -165,6 +185,10 @@ class Waiting:
         logged, published = (pl.Series(heads[name][~bad]) for name in ("logged", "published"))
         self.tables.add(topic, frame, logged, published)
         self._heads, self._rows, self._payloads = [], 0, {}
+
+
+def _is_cdr(channel: Channel) -> bool:
+    return channel.message_encoding == "cdr"
 
 
 def candidates(tables: Tables) -> list[int]:

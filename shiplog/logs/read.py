@@ -47,15 +47,32 @@ class Contents:
     metadata: dict[str, dict[str, str]]  # metadata records by name, such as "voyage"
     library: str
     profile: str
+    source: Path | None = None  # the file or folder that it was converted from, if any
+
+    @property
+    def origin(self) -> Path:
+        """What a user has of it."""
+        return self.source or self.path
 
     @cached_property
     def sha256(self) -> str:
-        """Of the bytes that were there when the log was opened; 0.6 s a gigabyte."""
-        digest = hashlib.sha256()
-        with self.path.open("rb") as stream:
-            for begin in range(0, self.size, HASHED_BYTES):
-                digest.update(stream.read(min(HASHED_BYTES, self.size - begin)))
+        """Of the bytes that were there when the log was opened; 0.6 s a gigabyte. Of a log that
+        was converted: those of what it was made of."""
+        return hash_of(self.path, self.size) if self.source is None else hash_of(self.source)
+
+
+def hash_of(path: Path, size: int | None = None) -> str:
+    """SHA-256 of a file, or of its first bytes; of a folder that of its files and their names."""
+    digest = hashlib.sha256()
+    if path.is_dir():
+        for inside in sorted(p for p in path.rglob("*") if p.is_file()):
+            digest.update(f"{inside.relative_to(path).as_posix()}\n{hash_of(inside)}\n".encode())
         return digest.hexdigest()
+    size = path.stat().st_size if size is None else size
+    with path.open("rb") as stream:
+        for begin in range(0, size, HASHED_BYTES):
+            digest.update(stream.read(min(HASHED_BYTES, size - begin)))
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,13 +179,15 @@ def _merged(one: Topic, other: Topic) -> Topic:
 
 
 def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> Health:
-    found, count = tables.found, sum(tally.counts.values())
+    found, broken = tables.found, sum(tables.failed.values())
+    count = sum(tally.counts.values()) - broken  # what does not fit its schema was not read
     damaged = bool(found.losses or tally.orphans)
-    lost: int | None = None if damaged else 0
+    lost: int | None = None if damaged else broken
     if found.statistics is not None:
         lost = max(found.statistics.message_count - count, 0)
     topics = {number: channel.topic for number, channel in found.channels.items()}
-    findings = faults.losses(found.losses, tally.first, lost, topics)
+    missing = None if lost is None else lost - broken
+    findings = faults.losses(found.losses, tally.first, missing, topics)
     findings += faults.appended(found.sections)
     findings += faults.left_out(tally.orphans, tables)
     order = [(found.channels[n].topic, one) for n, one in tally.order.items()]
@@ -199,7 +218,8 @@ def _refuse_nothing(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFr
     if reasons and not frames:
         raise LogUnreadable(
             f"{found.path} has {count} messages, but none can be decoded: {', '.join(reasons)}.",
-            hint="shiplog reads protobuf, ROS 2 CDR (ros2msg) and JSON; convert or record again.",
+            hint="shiplog reads protobuf, JSON, and ROS messages with their definitions (cdr with "
+            "ros2msg or ros2idl, ros1 with ros1msg); convert it or record again.",
         )
     if count:
         return

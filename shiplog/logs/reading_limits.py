@@ -52,6 +52,12 @@ def begin(path: Path) -> None:
     _limit(size_of(path))
 
 
+def grown(path: Path) -> None:
+    """What the file that is being read has become: unpacked, it is larger."""
+    if watch is not None:
+        _limit(size_of(path))
+
+
 def end() -> None:
     """Nothing is being read any more."""
     if watch is not None:

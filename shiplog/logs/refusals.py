@@ -8,6 +8,8 @@ from pathlib import Path
 
 from shiplog.exceptions import LogUnreadable
 
+from . import foreign_files
+
 MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -31,16 +33,34 @@ class Refusal:
     final: bool = True
 
 
+def begins_as_log(path: Path) -> bool:
+    """Whether a file begins as an MCAP log does."""
+    with path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
+
+
+def refuse_log(path: Path, given: Path) -> None:
+    """Raises LogUnreadable for a log that was given as it is: there is nothing to convert."""
+    if path == given:
+        raise LogUnreadable(
+            f"{path.name} is an MCAP log already: there is nothing to convert.",
+            hint=f"ingest it: shiplog ingest {path}.",
+        )
+
+
 def refusal(path: Path, start: bytes, size: int) -> Refusal | None:
     """Why a file that begins so is no log; None where it begins as every MCAP log does."""
     if start == MAGIC:
         return None
     if size == 0:
         return _refused(f"{path} is empty (0 bytes).", "copy or record it again.")
+    if (known := foreign_files.refusal(path)) is not None:
+        return Refusal(known)
     if start[:4] == b"PAR1" or path.suffix.lower() in (".csv", ".parquet", ".txt"):
         return _refused(
             f"{path} is a table, not an MCAP log.",
-            "turn it into a log first: shiplog convert TABLE --profile P --out DIR.",
+            f"draft a profile with `shiplog profile {path} --out my-ship.toml`, look it over, and "
+            "give it with --profile; shiplog convert makes logs of tables without ingesting them.",
         )
     found = start.hex(" ").upper()
     if start[:6] == MAGIC[:6]:
@@ -55,7 +75,8 @@ def refusal(path: Path, start: bytes, size: int) -> Refusal | None:
         return _refused(f"{path} is cut off after {size} bytes.", "copy it again.")
     return _refused(
         f"{path} is no MCAP log: it begins with {found}, expected {MAGIC.hex(' ').upper()}.",
-        "give an .mcap file; for a CSV or Parquet table use shiplog convert.",
+        "copy the original again if it is a log; shiplog reads MCAP logs, ROS bags, NMEA 0183 "
+        "text, and CSV or Parquet tables.",
         final=False,
     )
 

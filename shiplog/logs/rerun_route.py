@@ -85,7 +85,8 @@ def suitable(tables: Tables) -> dict[int, list[str]]:
         schema = found.schemas.get(channel.schema_id)
         kind = (channel.message_encoding, schema.encoding if schema else "")
         counts = found.statistics.channel_message_counts if found.statistics else {}
-        if kind not in ENCODINGS or alone[channel.topic] > 1 or not counts.get(number):
+        fits = kind in ENCODINGS and number not in tables.odd
+        if not fits or alone[channel.topic] > 1 or not counts.get(number):
             continue
         reader = tables.decoder(channel)
         if reader is not None:

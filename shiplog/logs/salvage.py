@@ -127,7 +127,7 @@ def _decode(
     published = nanoseconds([m.publish_time for m in met])
     if bad.any():
         tables.failed[topic] = tables.failed.get(topic, 0) + int(bad.sum())
-    tables.add(topic, frame, pl.Series(logged[~bad]), pl.Series(published[~bad]))
+    tables.add(topic, frame, pl.Series(logged[~bad]), pl.Series(published[~bad]), channel.id)
 
 
 def _columns(

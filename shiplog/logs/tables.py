@@ -29,6 +29,7 @@ def room(found: Survey) -> int:
     return LEAST_ROWS + int(ROWS_PER_BYTE * found.size)
 
 
+CHANNEL = ":channel"  # asked for as a field: by which of a topic's channels each message came
 TIME_COLUMNS = ("log_time", "publish_time", "stamp")
 
 
@@ -125,6 +126,7 @@ class Tables:
         self.too_many: dict[str, int] = {}  # likewise, for being more than a log of this size holds
         self.room = room(found)  # rows that may still come
         self.undecodable: dict[str, str] = {}
+        self.odd: set[int] = set()  # channels whose payloads no other reader may be given
         self._tables: dict[str, Table] = {}
         self._decoders: dict[int, Decoder | None] = {}
         self._shared: dict[tuple, Decoder | Undecodable] = {}
@@ -170,8 +172,12 @@ class Tables:
         found = [locate(path, reader.layout) for path in asked]
         return list(dict.fromkeys(at[0] for at in found if at))
 
-    def add(self, topic: str, frame: pl.DataFrame, logged: pl.Series, published: pl.Series) -> None:
-        """Rows of one topic: its leaves, and the two times that are not in the messages."""
+    def add(
+        self, topic: str, frame: pl.DataFrame, logged: pl.Series, published: pl.Series,
+        channel: int = 0,
+    ) -> None:  # fmt: skip
+        """Rows of one topic: its leaves, and the two times that are not in the messages. `channel`
+        they came by, where several have the topic."""
         table = self._tables.setdefault(topic, Table())
         if not len(logged):
             return
@@ -189,6 +195,8 @@ class Tables:
             table.parts.append(pl.DataFrame(columns))
             return
         expressions = []
+        if CHANNEL in self.wanted.get(topic, ()):
+            columns.append(pl.Series(CHANNEL, np.full(len(logged), channel)))
         for path in self.wanted.get(topic, ()):
             at = locate(path, frame.schema)
             if at is not None and path not in TIME_COLUMNS:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,16 +19,21 @@ from shiplog.channels import Quality
 from shiplog.exceptions import LogUnreadable
 from shiplog.logs.health_report import Finding, Instrument, VoyageReport
 from shiplog.logs.read import Contents, Reading, read
+from shiplog.logs.senders import Senders
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
+    beside,
     clocks,
     empty_course,
+    orientation,
     plausible_measures,
     required_topics,
     resampling,
     sample_faults,
     sampling_findings,
+    status,
     time_line,
+    two_sources,
 )
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages import plausible_values as plausible
@@ -67,13 +73,16 @@ class Voyage:
 
 def ingest(path, profile: Profile) -> Voyage:
     """Read one log through a profile. Raises LogUnreadable, ChannelMissing, ProfileError."""
-    reading = read(path, profile.wanted())
-    return build(reading, profile)
+    sent = two_sources.several(path, profile)
+    return build(read(path, beside.wanted(profile, sent)), profile, sent)
 
 
-def build(reading: Reading, profile: Profile) -> Voyage:
-    """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there."""
-    aligned = _aligned(reading, profile)
+def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None = None) -> Voyage:
+    """Align, reduce to midship, mark. Raises ChannelMissing for a topic or field not there.
+
+    sent  by topic, those who send on it, where there are several
+    """
+    aligned = _aligned(reading, profile, sent or {})
     table, grid = aligned.table, aligned.grid
     compared = _compared(aligned, profile)
     usable_s, windows = usable(table, profile)
@@ -105,12 +114,12 @@ def usable(table: pl.DataFrame, profile: Profile) -> tuple[int, int]:
     return min(seconds, (table.height - 1) * resampling.STEP_NS // 1_000_000_000), windows
 
 
-def consistency_of(reading: Reading, profile: Profile) -> Comparison:
-    """What the sensors of a log say of each other, and nothing else. Raises as `build` does."""
-    aligned = _aligned(reading, profile)
+def consistency_of(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> Comparison:
+    """What the sensors of a log say of themselves and of each other. Raises as `build` does."""
+    aligned = _aligned(reading, profile, sent)
     compared = _compared(aligned, profile)
-    clocks_apart = [one for one in aligned.left_out if one.kind == "contradiction"]
-    return replace(compared, findings=(*clocks_apart, *compared.findings))
+    own = [f for f in aligned.left_out if f.kind in ("status", "two_sources", "contradiction")]
+    return replace(compared, findings=(*own, *compared.findings))
 
 
 def _compared(aligned: _Aligned, profile: Profile) -> Comparison:
@@ -131,12 +140,15 @@ class _Aligned:
     datum: tuple[float, float] | None
 
 
-def _aligned(reading: Reading, profile: Profile) -> _Aligned:
+def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> _Aligned:
     required_topics.require(reading, profile)
+    reading, profile, shared = two_sources.told_apart(reading, profile, sent)
     timed = time_line.one(reading, profile)
     reading, moved = timed.reading, list(timed.findings)
+    reading, refused = status.heeded(reading, profile)
     reading, screen = plausible.screened(reading, profile)
     moved += empty_course.findings_of(reading, profile, _raw)
+    mounting = _mounting(reading, profile)
     sampled = {name: _samples(reading, profile, name) for name, _ in profile.sensors.items()}
     base = sampled["heading"].time
     if len(base) < 2:
@@ -186,7 +198,8 @@ def _aligned(reading: Reading, profile: Profile) -> _Aligned:
         pl.col("time").cast(pl.Datetime("ns", "UTC")),
         pl.col(profile.columns).fill_nan(None),
     )
-    return _Aligned(table, grid, [*every.items()], moved, datum)
+    found = [*shared, *moved, *mounting, *status.said(grid, refused)]
+    return _Aligned(table, grid, [*every.items()], found, datum)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -215,6 +228,7 @@ def _raw(reading: Reading, source: Source) -> tuple[np.ndarray, np.ndarray]:
     frame = reading.frames.get(source.topic)
     if frame is None or frame.height == 0:
         return np.zeros(0, np.int64), np.zeros((0, len(source.paths)))
+    frame = two_sources.of_one(frame, source)
     times = frame[clocks.of(frame, source)[0]]
     values = [
         (_numbers(frame[path]) - offset) * factor
@@ -237,6 +251,7 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
     components, since halfway between 359° and 1° is 0°.
     """
     sensor, kind = getattr(profile.sensors, name), profile.sensors.kind(name)
+    sensor = orientation.whole(reading, sensor) if kind in orientation.KINDS else sensor
     times, raw = _raw(reading, sensor)
     value = raw
     if kind == "geodetic":
@@ -247,10 +262,8 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         value = frames.earth_velocity(value[:, 0], value[:, 1])
     elif kind == "enu":
         value = value[:, ::-1]
-    elif kind in ("quaternion_enu", "quaternion_ned"):
-        value = frames.quaternion_heading(value[:, 0], value[:, 1], kind == "quaternion_enu")[
-            :, None
-        ]
+    elif kind in orientation.KINDS:
+        value = orientation.of(value, sensor, kind).heading[:, None]
     samples = resampling.ordered(
         times, value, sensor.tolerance_s, sensor.between == "hold",
         resampling.longest_s(profile.ship.length_m),
@@ -262,6 +275,16 @@ def _samples(reading: Reading, profile: Profile, name: str) -> resampling.Sample
         longitude = np.unwrap(longitude, period=360.0)
         samples = replace(samples, value=np.stack((latitude, longitude), axis=1))
     return sample_faults.judged(samples, _metric(samples.value, kind), raw, profile.sensors, name)
+
+
+def _mounting(reading: Reading, profile: Profile) -> list[Finding]:
+    """What is to be said of how a heading's quaternion is mounted."""
+    sensor, kind = profile.sensors.heading, profile.sensors.kind("heading")
+    if kind not in orientation.KINDS:
+        return []
+    sensor = orientation.whole(reading, sensor)
+    found = orientation.of(_raw(reading, sensor)[1], sensor, kind)
+    return orientation.findings(found, sensor, reading.contents.path.name)
 
 
 def _on_earth(reading: Reading, sensor: Sensor, value: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from shiplog.exceptions import ChannelMissing, listed, nearest
 from shiplog.logs.fields import is_number
 from shiplog.logs.read import Reading, fields
+from shiplog.logs.ros2_bags import part_of
 from shiplog.profile import Profile
 
 
@@ -18,7 +19,7 @@ def require(reading: Reading, profile: Profile) -> None:
                 f"{log} has no topic {topic!r}{nearest(topic, topics)}. "
                 f"Topics found: {listed(topics)}.",
                 hint="correct the topic in the ship profile, choose another with --profile, or "
-                "draft one with `shiplog profile LOG`.",
+                f"draft one with `shiplog profile LOG`{part_of(reading.contents.path)}.",
             )
         reason = reading.health.undecodable.get(topic)
         if reason:

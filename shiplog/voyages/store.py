@@ -116,7 +116,8 @@ class Store:
 
     def _add(self, voyage: Voyage, place: Path) -> str:
         asked = voyage.corrected is not None
-        fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked)
+        made = voyage.contents.source is not None
+        fingerprint = fingerprint_of(voyage.contents.sha256, voyage.profile, asked, made)
         state = "added"
         if place.is_dir():
             facts = catalogue.known(place)
@@ -146,12 +147,15 @@ class Store:
             self._sweep()
         return state
 
-    def holds(self, name: str, sha256: str, profile: Profile, correct: bool = False) -> bool:
+    def holds(
+        self, name: str, sha256: str, profile: Profile, correct: bool = False,
+        converted: bool = False,
+    ) -> bool:  # fmt: skip
         """Whether this very log, read through this very profile, is here already and whole, and
-        was corrected if that is requested."""
+        was corrected if that is requested. Of what was `converted` the [table] counts, too."""
         folder = self._folder(name)
         facts = catalogue.known(folder) if folder.is_dir() else None
-        fingerprint = fingerprint_of(sha256, profile, correct)
+        fingerprint = fingerprint_of(sha256, profile, correct, converted)
         return bool(facts) and facts["fingerprint"] == fingerprint and _whole(folder, facts)
 
     def mend(self, wait: bool = True) -> None:
@@ -296,9 +300,12 @@ class Store:
             shutil.rmtree(new, ignore_errors=True)
 
 
-def fingerprint_of(sha256: str, profile: Profile, correct: bool = False) -> str:
+def fingerprint_of(
+    sha256: str, profile: Profile, correct: bool = False, converted: bool = False
+) -> str:
     """Identity of a table: the log's content, the profile's meaning, and how it was ingested."""
-    text = f"{sha256}:{profile.model_dump_json(exclude={'table'})}:{INGEST_VERSION}"
+    unread = None if converted else {"table"}
+    text = f"{sha256}:{profile.model_dump_json(exclude=unread)}:{INGEST_VERSION}"
     text += ":corrected" if correct else ""
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -336,7 +343,7 @@ def _describe(voyage: Voyage, fingerprint: str) -> dict:
         "contract": CONTRACT,
         "fingerprint": fingerprint,
         "sha256": voyage.contents.sha256,
-        "source": voyage.contents.path.name,
+        "source": voyage.contents.origin.name,
         "start": str(voyage.table["time"][0]),
         "datum": voyage.datum,
         "profile": voyage.profile.model_dump(mode="json"),

@@ -87,6 +87,11 @@ def _from_east(value: np.ndarray) -> np.ndarray:
     return (90.0 - value) % 360.0
 
 
+def _whole_numbers(seen: Recorded, how: How, motion: Motion, rng: np.random.Generator) -> None:
+    for name in ("latitude", "longitude"):
+        seen.columns[name] = np.round(seen.columns[name] * 1e7)
+
+
 def _exchanged(one: str, other: str) -> Act:
     def act(seen: Recorded, how: How, motion: Motion, rng: np.random.Generator) -> None:
         c = seen.columns
@@ -261,9 +266,8 @@ CHANGES = (
            "plausibility", speed=0.4),
     Change("shaft: rps as rpm", "unit", _column("rps", _times(1 / 60.0)), ("rps", "propeller"),
            "plausibility", speed=0.4),
-    Change("position: whole numbers of 1e-7 deg", "unit", lambda seen, how, motion, rng: [
-        _column(n, _times(1e7))(seen, how, motion, rng) for n in ("latitude", "longitude")] and None,
-           POSITION, recorders=NOT_NMEA),
+    Change("position: whole numbers of 1e-7 deg", "unit", _whole_numbers, POSITION,
+           recorders=NOT_NMEA),
     Change("wind: knots as m/s", "unit", _column("wind_speed", _times(1 / KNOT)), ("wind",),
            "undetermined"),
     Change("yaw rate to port", "sign", _column("yaw_rate", np.negative), ("yaw_rate", "yaw rate"),

@@ -21,7 +21,7 @@ from shiplog.logs.health_report import Finding
 from shiplog.logs.write import SCHEMAS, Series
 from shiplog.numbers import counted
 from shiplog.profile import Column, Profile, Source
-from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS
+from shiplog.profile_channels import TABLE_CHANNELS, TABLE_LABELS, channels_of
 
 log = logging.getLogger(__name__)
 
@@ -168,7 +168,7 @@ def series(table: pl.DataFrame, profile: Profile) -> list[Series]:
 def sources(profile: Profile) -> list[tuple[Source, tuple[str, ...]]]:
     """What the profile reads, and the channels of a table that fill it."""
     sensors = [
-        (sensor, TABLE_CHANNELS[name, profile.sensors.kind(name)])
+        (sensor, channels_of(name, profile.sensors.kind(name), len(sensor.paths)))
         for name, sensor in profile.sensors.items()
     ]
     return [*sensors, *((actuator, (actuator.name,)) for actuator in profile.actuators)]

@@ -16,6 +16,7 @@ import polars as pl
 from shiplog.exceptions import ChannelMissing
 from shiplog.logs.conversion.sound_rows import sound_rows
 from shiplog.logs.conversion.written_numbers import is_number, read_columns
+from shiplog.logs.foreign_files import is_binary
 from shiplog.profile import Column
 
 log = logging.getLogger(__name__)
@@ -72,7 +73,7 @@ def read_table(path: Path, known: Mapping[str, Column] | None = None) -> Delimit
 
     Raises ChannelMissing for what is no table, cannot be read or holds no row.
     """
-    if not path.is_file() or not is_table(path):
+    if not path.is_file() or not (is_table(path) or not is_binary(path)):
         raise ChannelMissing(
             f"{path} is no table.", hint=f"give a file of type .parquet, {', '.join(TEXT)}."
         )

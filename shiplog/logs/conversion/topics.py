@@ -21,6 +21,7 @@ from shiplog.profile import Column, Profile
 
 log = logging.getLogger(__name__)
 
+NAMED = 4  # tables that a sentence on several names
 # Column names of clocks, the one that is trusted most first: of the message, then the recorder's.
 # A flight recorder's GNSS topic also holds UTC; its `timestamp` is what all its topics share.
 STAMP_COLUMNS = (
@@ -36,6 +37,11 @@ LOGGED = (
     "timestamp_received",
 )
 UNIT_IN_NAME = {"ns": "ns", "nsec": "ns", "us": "us", "usec": "us", "ms": "ms", "msec": "ms"}
+
+
+def holds_tables(folder: Path) -> bool:
+    """Whether there is a table in a folder that is not hidden."""
+    return any(is_table(path) for path in folder.glob("[!.]*"))
 
 
 def folder_to_series(
@@ -55,28 +61,39 @@ def folder_to_series(
     Raises ChannelMissing where no table has a time.
     """
     parts: list[Series] = []
-    reasons: dict[str, list[str]] = {}
+    reasons: list[str] = []
+    why: dict[str, list[tuple[str, ShiplogError]]] = {}  # alike but for their numbers and names
     for path in sorted(p for p in folder.glob("[!.]*") if is_table(p) and p not in without):
         try:
             found, lost = _one(path, profile, times or {})
             parts += found
-            for one in lost:
-                reasons.setdefault(one, []).append(one)
+            reasons += lost
         except ShiplogError as error:
-            kind = re.sub(r"\d+", "", error.message.replace(path.name, ""))
-            reasons.setdefault(kind, []).append(error.message)
-    said = [
-        why[0] + (f" So it is of {len(why) - 1} more." if len(why) > 1 else "")
-        for why in reasons.values()
-    ]
+            why.setdefault(_kind_of(error.message), []).append((path.name, error))
+    reasons += [_all_of(said) for said in why.values()]
     if not parts:
         raise ChannelMissing(
-            f"{folder} holds no table of a topic. {' '.join(said)}".rstrip(),
-            hint="give one table per topic, each with a column of times such as log_time_ns, or a "
+            f"{folder} holds no table of a topic. {' '.join(reasons)}".rstrip(),
+            hint=next((e.hint for said in why.values() for _, e in said if e.hint), "")
+            or "give one table per topic, each with a column of times such as log_time_ns, or a "
             "single table; a clock that counts since boot is named in a profile's [table], as "
             'timestamp = { channel = "time", unit = "us" }.',
         )
-    return named_apart(parts), said
+    return named_apart(parts), reasons
+
+
+def _kind_of(message: str) -> str:
+    """A sentence without what differs from table to table."""
+    return re.sub(r"\d[\d.]*|'[^']*'|\S+\.(csv|txt|tsv|parquet)\b", "#", message)
+
+
+def _all_of(said: list[tuple[str, ShiplogError]]) -> str:
+    """What is said of several tables alike, once, with their names."""
+    names = [name for name, _ in said]
+    message = said[0][1].message
+    if len(said) == 1:
+        return message if names[0] in message else f"{names[0]}: {message}"
+    return f"{len(said)} tables ({listed(names, most=NAMED)}), such as {names[0]}: {message}"
 
 
 def _one(

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from shiplog import profile_units
-from shiplog.profile_channels import TABLE_CHANNELS
+from shiplog.profile_channels import channels_of
 from shiplog.voyages.draft_profile import words
 
 
@@ -22,6 +22,7 @@ class Guess:
 
 
 ENU = 'CHECK: ROS turns from east; some compasses write "quaternion_ned"'
+TURNED = r"(orientation|quaternion|rotation)[._]"
 AXES_TO_CHECK = 'CHECK: axes of the ship; or "enu", "ned" of the earth'
 NED_TO_CHECK = 'CHECK: to the north and to the east; or "body"'
 LINEAR = (r"(twist_)?linear[._]x$", r"(twist_)?linear[._]y$")
@@ -46,8 +47,8 @@ GUESSES = {  # in order of trust, after that of the topics themselves
     ),
     "heading": (
         Guess("angle", (r"(true_?)?(heading|hdg|psi|yaw)(_deg|_rad)?$",), "deg"),
-        Guess("quaternion_enu", (r"(orientation|quaternion|rotation)[._]z$",
-                                 r"(orientation|quaternion|rotation)[._]w$"), "1", "", ENU),
+        Guess("quaternion_enu", tuple(TURNED + rf"{axis}$" for axis in "xyzw"), "1", "", ENU),
+        Guess("quaternion_enu", (TURNED + "z$", TURNED + "w$"), "1", "", ENU),
     ),
     "yaw_rate": (
         Guess("rate", (r"(yaw_?rate|rot|rate_of_turn)(_\w+)?$",), "deg/s"),
@@ -86,9 +87,9 @@ class Axes:
     check: str = ""
 
 
-def measures(name: str, kind: str) -> tuple[str, ...]:
-    """What each field of a sensor measures."""
-    return tuple(profile_units.MEASURE[channel] for channel in TABLE_CHANNELS[name, kind])
+def measures(name: str, kind: str, fields: int) -> tuple[str, ...]:
+    """What each of so many fields of a sensor measures."""
+    return tuple(profile_units.MEASURE[channel] for channel in channels_of(name, kind, fields))
 
 
 def first(pattern: str, columns: tuple[str, ...], takes: tuple[str, ...]) -> str | None:

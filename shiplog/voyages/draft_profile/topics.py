@@ -241,7 +241,7 @@ def _choices(name: str, leaves: dict[str, tuple[str, ...]], near: str = "") -> l
         for order, guess in enumerate(GUESSES[name]):
             if not re.search(guess.topic, called, re.IGNORECASE):
                 continue
-            takes = guesses.measures(name, guess.kind)
+            takes = guesses.measures(name, guess.kind, len(guess.patterns))
             paths = [
                 guesses.first(pattern, columns, (of_one,))
                 for pattern, of_one in zip(guess.patterns, takes, strict=True)
@@ -286,7 +286,7 @@ def _section(name: str, choice: Choice, log: Log, agreement: Agreement) -> str:
     guess, topic = choice.guess, choice.topic
     kind, of_kind = guesses.kind_of(guess, topic)
     seen = _axes(choice, log)
-    paths, takes = seen.paths, guesses.measures(name, kind)
+    paths, takes = seen.paths, guesses.measures(name, kind, len(seen.paths))
     usual = guess.unit.split()
     usual = usual * len(paths) if len(usual) == 1 else usual
     known = [log.unit(paths, at, topic, (takes[at],)) for at in range(len(paths))]
