@@ -22,6 +22,7 @@ SAME_SPAN = 1e-9  # of the span of a channel: values nearer than that are one va
 FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
 FEWEST_CHANGES = 3  # a value is come to, on the average, where fewer values than that are seen
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
+EVEN, MOST_EVEN = 0.3, 0.8  # of a step, and of the samples: values that a motion spaces evenly
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
 NEIGHBOURS = 12  # samples on either side of one that say how lively a channel is just then
@@ -128,9 +129,15 @@ def resolution(value: np.ndarray) -> float:
         step = float(apart.min())
         step = float(np.median(apart[apart < 1.5 * step]))  # rounding averaged away
         off = np.abs(apart / step - np.round(apart / step))
-        if np.mean(off < LATTICE) >= MOST_ON_LATTICE:
+        if np.mean(off < LATTICE) >= MOST_ON_LATTICE and not _even_motion(column, step):
             found = max(found, step)
     return found
+
+
+def _even_motion(column: np.ndarray, step: float) -> bool:
+    """Whether values are a step apart since the ship went as far from each sample to the next."""
+    gone = np.abs(np.diff(column)) / step
+    return float(np.mean(np.abs(gone - 1.0) < EVEN)) > MOST_EVEN
 
 
 def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:

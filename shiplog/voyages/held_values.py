@@ -66,7 +66,7 @@ def held(
         course = _course(position, keel, noise, profile.ship.length_m)
         return [] if course is None else kept(runs, course[:, None], least + SWING)
     runs = fault_detection.improbable(runs, len(samples.time))
-    rest = (np.abs(samples.value) <= samples.resolution).all(axis=1)
+    rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
     moving = [run for run in runs if not rest[run[0]]]
     if name == "wind":  # nothing to compare it with; a calm is none
         return kept(moving, None, 0.0)
