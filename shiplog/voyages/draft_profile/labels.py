@@ -17,7 +17,8 @@ from shiplog.voyages.draft_profile.column_names import FoundColumn
 
 _CALLED = r"(_?(id|nr|no|num|number|name|code))"
 LABEL_COLUMNS = {  # how a label's column is called
-    "time": r"t(_(s|sec|ms|us|ns|utc))?|t_\w+_(s|sec|ms|us|ns)|time\w*|stamp\w*|utc\w*|(base_?)?date_?time|epoch\w*|"
+    "time": r"t(_(s|sec|ms|us|ns|utc))?|t_\w+_(s|sec|ms|us|ns)|"
+            r"time\w*|stamp\w*|utc\w*|(base_?)?date_?time|epoch\w*|"
             r"unix\w*|.*_timestamp|(gps|gnss|log|rec)_?time\w*|elapsed\w*|seconds",
     "date": r"date(_utc)?|day|(gps|gnss|utc)_?date",
     "voyage": rf"(run|voyage|trial|trip){_CALLED}?|test{_CALLED}|sequence",
