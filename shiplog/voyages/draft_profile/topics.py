@@ -406,6 +406,10 @@ def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
 def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], *, log: Log) -> str:
     unit = log.unit((path,), 0, topic, DRIVEN[kind])
     check = "" if unit else "  # CHECK: the log does not say"
+    most = _largest(log.column(topic, path))
+    if not unit and fallback == "1":
+        fallback, size = particulars.unit_by_size(path, most)
+        check += f"; {size}" if size else ""
     ordered = "CHECK: a set-point, what was ordered; " if words.is_set_point(topic) else ""
     name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_").lower() or kind
     if name[:1].isdigit():
@@ -418,7 +422,7 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], 
         f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
         f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
         f"{log.between(topic, path)}"
-        f"{particulars.of_actuator(kind, unit or fallback, _largest(log.column(topic, path)))}"
+        f"{particulars.of_actuator(kind, unit or fallback, most)}"
     )
 
 
