@@ -23,8 +23,10 @@ HEAD = """# The ship profile
 
 A profile is a TOML file. It says which topic and field of a log is which channel of the ship, in
 which unit, and where it is measured. `shiplog profile LOG` drafts one from a log or a table; look
-over every line that says CHECK. A key that is not listed here is refused, and the message names the
-nearest one that is.
+over every line that says CHECK. Such a line's key is kept with the voyage, and `train` refuses it
+by name: delete the word when you have looked, or give `--unchecked`. A key that is not listed here
+is refused, and the message names the nearest one that is. Where `sigma` or `resolution` is left
+out, `ingest` estimates it from each record, and `voyage.json` has what it found.
 
     [ship]
     name = "my ship"

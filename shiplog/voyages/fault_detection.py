@@ -22,6 +22,9 @@ SAME_SPAN = 1e-9  # of the span of a channel: values nearer than that are one va
 FEWEST_STEPS = 8  # different values that show in what steps an instrument counts
 FEWEST_CHANGES = 3  # a value is come to, on the average, where fewer values than that are seen
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
+NEXT = 7  # changes on one side of a run of repeats that show in what steps it counts there
+MANY = 6.5  # steps: numbers so much larger are near whole multiples of anything
+EVEN, MOST_EVEN = 0.3, 0.8  # of a step, and of the samples: values that a motion spaces evenly
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
 NEIGHBOURS = 12  # samples on either side of one that say how lively a channel is just then
@@ -128,9 +131,39 @@ def resolution(value: np.ndarray) -> float:
         step = float(apart.min())
         step = float(np.median(apart[apart < 1.5 * step]))  # rounding averaged away
         off = np.abs(apart / step - np.round(apart / step))
-        if np.mean(off < LATTICE) >= MOST_ON_LATTICE:
+        if np.mean(off < LATTICE) >= MOST_ON_LATTICE and not _even_motion(column, step):
             found = max(found, step)
     return found
+
+
+def steps_around(value: np.ndarray, runs: list[tuple[int, int]]) -> np.ndarray:
+    """The step in which an instrument counts about each run of repeats, 0 where none shows.
+
+    Numbers of three digits count in 0.1 up to 100 and in 1 beyond. The changes of a value [n, k]
+    that are next to a run are then whole multiples of one step; what a fault held changes by any
+    amount before and after.
+    """
+    found = np.zeros(len(runs))
+    for column in value.T:
+        changes = np.diff(column)
+        at = np.flatnonzero(changes)
+        size = np.abs(changes[at])
+        for number, (first, _) in enumerate(runs):
+            middle = int(np.searchsorted(at, first))
+            for near in (size[max(middle - NEXT, 0) : middle], size[middle : middle + NEXT]):
+                if len(near) < NEXT:
+                    continue
+                step = float(near.min())
+                whole = np.abs(near / step - np.round(near / step)) < LATTICE
+                if whole.all() and (near < MANY * step).all():
+                    found[number] = max(found[number], step)
+    return found
+
+
+def _even_motion(column: np.ndarray, step: float) -> bool:
+    """Whether values are a step apart since the ship went as far from each sample to the next."""
+    gone = np.abs(np.diff(column)) / step
+    return float(np.mean(np.abs(gone - 1.0) < EVEN)) > MOST_EVEN
 
 
 def improbable(runs: list[tuple[int, int]], count: int) -> list[tuple[int, int]]:
@@ -190,25 +223,26 @@ def held_on_grid(
     sampled: np.ndarray,
     runs: list[tuple[int, int]],
     travel: np.ndarray | None,
-    least: float,
+    least: float | np.ndarray,
     drift: float = 0.0,
 ) -> list[tuple[int, int]]:
     """Runs of repeats as grid rows, where the ship moved by more than the instrument would show.
 
     times [m] ns; sampled [n] ns; travel [m, k]: where the channel should be at each row,
     integrated from its rate (None: no rate is known, and the runs are taken as they are);
-    least: the smallest change that is detected, in the channel's unit; drift: how fast a rate of
-    zero may be said to move, in that unit per second.
+    least: the smallest change that is detected, in the channel's unit, or one of each run;
+    drift: how fast a rate of zero may be said to move, in that unit per second.
     """
     kept = []
-    for first, last in runs:
+    shown = np.broadcast_to(least, len(runs))
+    for (first, last), smallest in zip(runs, shown, strict=True):
         a = int(np.searchsorted(times, sampled[max(first - 1, 0)]))
         b = int(np.searchsorted(times, sampled[last], side="right")) - 1
         if b <= a or a >= len(times):
             continue
         if travel is not None:
             span = float(np.linalg.norm(np.ptp(travel[a : b + 1], axis=0)))
-            if span <= least + drift * (b - a) * STEP_NS * 1e-9:
+            if span <= smallest + drift * (b - a) * STEP_NS * 1e-9:
                 continue
         kept.append((a, b))
     return kept

@@ -25,6 +25,8 @@ COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little
 COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
 UNDER_WAY = 0.3  # of the 90 % quantile of the way: at a berth the wind and a current turn a course
 ALONG = 0.7  # sine of the angle between course and keel, in the middle: a ship that makes way
+METRE = 111_320.0  # m, a degree of latitude
+COUNTED = ("position", "heading")  # whose steps may be others where their numbers are larger
 SWING = math.radians(30.0)  # of the course beyond which a heading turns, too: drift of a hard turn
 
 
@@ -43,10 +45,16 @@ def held(
     NaN where it is not known.
     """
     runs = fault_detection.repeats(samples.value)
-    least = 3.0 * samples.noise + samples.resolution
+    around = fault_detection.steps_around(samples.value, runs) if name in COUNTED else 0.0
+    if name == "position" and profile.sensors.kind(name) == "geodetic":
+        around = around * METRE
+    least = 3.0 * samples.noise + np.maximum(samples.resolution, around)
 
     def kept(
-        runs: list[tuple[int, int]], travel: np.ndarray | None, least: float, drift: float = 0.0
+        runs: list[tuple[int, int]],
+        travel: np.ndarray | None,
+        least: float | np.ndarray,
+        drift: float = 0.0,
     ) -> list[tuple[int, int]]:
         return fault_detection.held_on_grid(times, samples.time, runs, travel, least, drift)
 
@@ -66,7 +74,7 @@ def held(
         course = _course(position, keel, noise, profile.ship.length_m)
         return [] if course is None else kept(runs, course[:, None], least + SWING)
     runs = fault_detection.improbable(runs, len(samples.time))
-    rest = (np.abs(samples.value) <= samples.resolution).all(axis=1)
+    rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
     moving = [run for run in runs if not rest[run[0]]]
     if name == "wind":  # nothing to compare it with; a calm is none
         return kept(moving, None, 0.0)

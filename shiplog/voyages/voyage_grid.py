@@ -24,6 +24,7 @@ STEP_S = resampling.STEP_NS * 1e-9
 JUMP_S = 3.0
 JUMP_LENGTHS = 0.1
 JUMP_RAD = math.radians(30.0)
+MOST_STEPS = 2.0  # in which an instrument counts: a difference that rounding alone makes
 
 
 @dataclass
@@ -124,7 +125,9 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     position = np.stack((columns["x0"], columns["y0"]), 1)
 
     found = []
-    for row, step in _jumps(grid, sampled["position"], position, over_ground):
+    scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
+    steps = _jumps(grid, sampled["position"], position, over_ground, scale=scale)
+    for row, step in steps:
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
             grid.marks[row] |= int(Quality.JUMP)
@@ -156,13 +159,21 @@ def _jumps(
     gone: np.ndarray,
     rate: np.ndarray,
     period: float | None = None,
+    scale: float = 1.0,
 ) -> list[tuple[int, float]]:
-    """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are."""
+    """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are; but for
+    those that are a step in which the instrument counts there, of samples `scale` times as large.
+    """
     usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
     every = max(round(samples.period_s / STEP_S), 1)
     if every > 1:
         usable &= samples.nearest_rows(grid.times)
-    return fault_detection.jumps(gone, rate, usable, samples.noise, every, period)
+    found = fault_detection.jumps(gone, rate, usable, samples.noise, every, period)
+    at = np.searchsorted(samples.time, grid.times[[row for row, _ in found]])
+    counted = fault_detection.steps_around(samples.value, [(int(i), int(i)) for i in at])
+    return [
+        one for one, step in zip(found, counted * scale, strict=True) if one[1] > MOST_STEPS * step
+    ]
 
 
 def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, float]]:

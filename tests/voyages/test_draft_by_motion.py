@@ -355,3 +355,16 @@ def test_two_receivers_in_one_table_are_said(tmp_path):
     line = next(one for one in text.splitlines() if 'channel = "time"' in one)
     assert "CHECK" in line and "two receivers" in line and "12 m" in line
     assert "333 Hz" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "unit"),
+    [("motor_left", 1.0, "1"), ("motor_left", 100.0, "%"), ("motor_left", 1000.0, "permille"),
+     ("motor_speed", 900.0, "rpm"), ("motor_speed", 30.0, "rps")],
+)  # fmt: skip
+def test_a_command_has_the_unit_of_its_size(tmp_path, name, most, unit):
+    line, profile, _ = drafted(tmp_path, **{name: most * np.sin(T / 11.0)})
+    assert profile.actuators[0].unit == unit and "CHECK" in line[name]
+    path = log_of(tmp_path / "a.mcap", topics(**{f"/motor/{name}": {
+        "motor_speed" if "speed" in name else "command": most * np.sin(T / 11.0)}}))  # fmt: skip
+    assert profiles.parse(draft_log(path), "d").actuators[0].unit == unit

@@ -99,3 +99,57 @@ def test_long_lists_are_counted_not_cut():
     assert len(findings) == fault_detection.LISTED + 1
     assert "10 more stretches" in findings[-1].sentence
     assert findings[-1].value == 5.0
+
+
+@pytest.mark.parametrize("speed", [0.058, 1.2])
+def test_an_even_motion_is_no_resolution(speed):
+    way = speed * np.arange(600) + 1e-3 * speed * np.sin(TIME)
+    assert fault_detection.resolution(way[:, None]) == 0.0
+    step = 3.0 * speed
+    assert fault_detection.resolution(step * np.round(way / step)[:, None]) == pytest.approx(step)
+
+
+@pytest.mark.parametrize(("levels", "found"), [(2, 1.0), (4, 1.0)])
+def test_a_few_values_that_come_again_show_a_step(levels, found):
+    value = RNG.integers(0, levels, 400).astype(float)[:, None]
+    assert fault_detection.resolution(value) == found
+    assert fault_detection.resolution(np.sort(value, axis=0)) == 0.0
+
+
+def test_what_a_faster_log_writes_several_times_is_no_run_of_repeats():
+    value = np.repeat(RNG.normal(0, 1, 120), 5)[:, None]
+    assert fault_detection.repeats(value) == []
+    value[200:215] = value[200]
+    assert fault_detection.repeats(value) == [(201, 214)]
+
+
+def test_a_lively_stretch_of_a_quiet_record_has_no_spikes_and_a_spike_in_either_is_found():
+    value = RNG.normal(0, 1e-4, 600)
+    value[400:] += np.cumsum(RNG.normal(0, 0.05, 200))
+    assert not fault_detection.spikes(value[:, None], 1e-4).any()
+    for at, size in ((150, 0.02), (500, 3.0)):
+        spiked = value.copy()
+        spiked[at] += size
+        assert np.flatnonzero(fault_detection.spikes(spiked[:, None], 1e-4)).tolist() == [at]
+
+
+def test_a_step_is_found_and_neither_a_spike_nor_a_turn_is():
+    heading = 0.2 * np.sin(2 * np.pi * TIME / 12) + RNG.normal(0, 0.001, 600)
+    assert fault_detection.steps(heading, 0.001, 2 * np.pi) == []
+    heading[100] += 1.0
+    assert fault_detection.steps(heading, 0.001, 2 * np.pi) == []
+    heading[300:] += 2 * np.pi + 0.8
+    ((at, size),) = fault_detection.steps(heading, 0.001, 2 * np.pi)
+    assert at == 300 and size == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_late_rate_makes_no_jumps():
+    heading = 0.6 * np.sin(2 * np.pi * TIME / 8)[:, None]
+    heading -= heading[500]
+    rate = 0.6 * 2 * np.pi / 8 * np.cos(2 * np.pi * (TIME - 0.3) / 8)[:, None]
+    still = np.where(TIME[:, None] < 50, 0.0, 1.0)
+    usable = np.ones(600, bool)
+    assert fault_detection.jumps(still * heading, still * rate, usable, 1e-4) == []
+    jumped = still * heading
+    jumped[550:] += 0.5
+    assert [r for r, _ in fault_detection.jumps(jumped, still * rate, usable, 1e-4)] == [550]

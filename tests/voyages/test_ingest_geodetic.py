@@ -44,7 +44,7 @@ def test_a_circle_across_the_180_degree_meridian_is_a_circle(voyage):
     assert (table["quality"] == 0).all()
 
 
-def test_the_datum_is_no_position_before_the_first_fix(voyage, caplog):
+def test_the_datum_is_no_position_before_the_first_fix(voyage):
     parts, text = geodetic(0.0, 135.0)
     fix = parts["/position"].columns
     fourth = fix["lat"][3], fix["lon"][3]
@@ -54,6 +54,17 @@ def test_the_datum_is_no_position_before_the_first_fix(voyage, caplog):
     assert done.table["x0"].to_numpy()[10:] == pytest.approx(0.0, abs=50.0)
     (unfixed,) = [f for f in done.report.findings if f.kind == "not_available"]
     assert "3 of 600" in unfixed.sentence and "without a fix" in unfixed.sentence
+    assert not (np.abs(done.table["x0"].to_numpy()) > 50.0).any()
+
+
+def test_the_datum_is_no_position_that_wanders_before_the_first_fix(voyage, caplog):
+    parts, text = geodetic(0.0, 135.0)
+    fix = parts["/position"].columns
+    fourth = fix["lat"][3], fix["lon"][3]
+    fix["lat"][:3], fix["lon"][:3] = 1e-5 * np.arange(3), 0.0
+    done = voyage(parts, text)
+    assert done.datum == pytest.approx(fourth, abs=1e-12)
+    assert "the datum is position 4" in caplog.text and "135 degrees" in caplog.text
 
 
 @pytest.mark.parametrize(

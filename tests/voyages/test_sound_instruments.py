@@ -304,3 +304,20 @@ def test_a_yaw_rate_that_is_held_is_found(tmp_path):
     parts["/gyro"].columns["rate"][1330:1500] = parts["/gyro"].columns["rate"][1330]
     (held,) = [f for f in stored(tmp_path, parts, text).report.findings if f.kind in FALSE]
     assert (held.kind, held.channel) == ("held", "yaw_rate")
+
+
+@pytest.mark.parametrize("digits", [3, 4])
+def test_numbers_of_a_few_digits_are_not_held(tmp_path, digits):
+    """A heading of three digits counts in 0.1 deg below 100 and in 1 deg beyond."""
+    parts, text = record(FINE, swing=100.0, period=300.0, seconds=600.0)
+    heading = parts["/compass"].columns["heading"]
+    with np.errstate(divide="ignore"):
+        step = 10.0 ** (np.floor(np.log10(np.abs(heading))) - digits + 1)
+    parts["/compass"].columns["heading"] = np.round(heading / step) * step
+    voyage = stored(tmp_path, parts, text)
+    assert false_alarms(voyage) == []
+    parts["/compass"].columns["heading"][2000:2400] = parts["/compass"].columns["heading"][2000]
+    other = tmp_path / "other"
+    other.mkdir()
+    found = [f for f in stored(other, parts, text).report.findings if f.kind == "held"]
+    assert any(f.channel == "heading" and f.start_s == pytest.approx(200.0, abs=3) for f in found)

@@ -97,7 +97,7 @@ DATA_SETS: dict[str, DataSet] = {
         mended={
             "length_m = 1.0": "length_m = 3.6",
         },
-        train=("--window", "15"),
+        train=("--window", "15", "--unchecked"),
     ),
     "qixing": DataSet(
         "USV, Qixing bay, no actuators",

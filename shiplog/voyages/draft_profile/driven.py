@@ -11,7 +11,7 @@ import polars as pl
 from shiplog import units
 from shiplog.logs.conversion.delimited import DelimitedTable
 from shiplog.profile_units import DRIVEN
-from shiplog.voyages.draft_profile import facts, words
+from shiplog.voyages.draft_profile import facts, particulars, words
 from shiplog.voyages.draft_profile.column_names import (
     UNIT_UNSTATED,
     FoundColumn,
@@ -170,4 +170,8 @@ def _pulsed(one: FoundColumn, rows: pl.DataFrame) -> FoundColumn:
     if bool(values.is_between(*PULSES_US).all()):
         doubts = tuple(doubt for doubt in one.doubts if doubt != UNIT_UNSTATED)
         return replace(one, unit="pwm", offset=NEUTRAL_US, doubts=doubts, why="the neutral pulse")
-    return with_doubts(one, "no pulses of a servo in µs") if one.unit == "pwm" else one
+    if one.unit == "pwm":
+        return with_doubts(one, "no pulses of a servo in µs")
+    most = values.abs().max()
+    unit, size = particulars.unit_by_size(one.column, most if isinstance(most, float) else None)
+    return with_doubts(replace(one, unit=unit), size) if size else one

@@ -98,11 +98,13 @@ def _largest(values: pl.Series) -> float:
 
 def of_times(times: pl.Series) -> str:
     """Rate and count of messages at `times` [ns]: the median's, of bursts the mean's."""
-    steps = times.sort().diff().drop_nulls()
+    steps = times.diff().drop_nulls()
+    steps = steps.filter(steps >= 0)  # a table of several voyages begins again
     step, mean = steps.median(), steps.mean()
     if not isinstance(step, (int, float)) or not isinstance(mean, (int, float)) or mean <= 0:
         return f"{len(times)} messages"
-    if step < mean / BURSTS and len(times) >= FEW and steps.quantile(1.0 - 1.0 / BURSTS) >= mean:
+    longest = steps.quantile(1.0 - 1.0 / BURSTS) or 0.0
+    if step < mean / BURSTS and len(times) >= FEW and longest >= mean:
         return f"{1e9 / mean:.3g} Hz in bursts, {len(times)} messages"
     return f"{1e9 / step:.3g} Hz, {len(times)} messages" if step > 0 else f"{len(times)} messages"
 

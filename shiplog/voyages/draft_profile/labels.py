@@ -17,7 +17,8 @@ from shiplog.voyages.draft_profile.column_names import FoundColumn
 
 _CALLED = r"(_?(id|nr|no|num|number|name|code))"
 LABEL_COLUMNS = {  # how a label's column is called
-    "time": r"t(_(s|sec|ms|us|ns|utc))?|time\w*|stamp\w*|utc\w*|(base_?)?date_?time|epoch\w*|"
+    "time": r"t(_(s|sec|ms|us|ns|utc))?|t_\w+_(s|sec|ms|us|ns)|"
+            r"time\w*|stamp\w*|utc\w*|(base_?)?date_?time|epoch\w*|"
             r"unix\w*|.*_timestamp|(gps|gnss|log|rec)_?time\w*|elapsed\w*|seconds",
     "date": r"date(_utc)?|day|(gps|gnss|utc)_?date",
     "voyage": rf"(run|voyage|trial|trip){_CALLED}?|test{_CALLED}|sequence",
@@ -31,6 +32,7 @@ TIME_UNITS = {  # how a name's last word says in what it counts time
 }  # fmt: skip
 RATES_HZ = (0.02, 100.0)  # how often a ship's motion is recorded
 USUAL_HZ = (1.0, 10.0)  # and how often it mostly is
+STANDS_STILL = 0.01  # of the rows: a clock that stands still in more is less fit than another
 DAY_S, MINUTE = 86_400.0, 100.0  # seconds of a day; of hhmmss, what a minute adds
 
 
@@ -43,7 +45,8 @@ def found_labels(table: DelimitedTable, path: Path, vessel: str | None) -> list[
         names = [n for n in frame.columns if re.fullmatch(pattern, words.bare(n))]
         if channel == "time":
             names = [n for n in frame.columns if isinstance(frame[n].dtype, pl.Datetime)] + names
-            names = sorted(names, key=lambda n: not facts.holds("time", frame[n]))
+            names = sorted(names, key=lambda n: (not facts.holds("time", frame[n]),
+                                                 _repeats(frame[n])))  # fmt: skip
         elif channel == "date":
             names = [] if dated else names
         else:
@@ -62,6 +65,14 @@ def found_labels(table: DelimitedTable, path: Path, vessel: str | None) -> list[
         else:
             labels.append(FoundColumn(names[0], channel, None))
     return labels
+
+
+def _repeats(values: pl.Series) -> bool:
+    """Whether a clock of numbers stands still from row to row, as one of too few digits does."""
+    if not values.dtype.is_numeric() or len(values) < 2:
+        return False
+    same = (values.cast(pl.Float64).diff().drop_nulls() == 0).mean()
+    return isinstance(same, float) and same > STANDS_STILL
 
 
 def _tells_apart(values: pl.Series, table: DelimitedTable) -> bool:

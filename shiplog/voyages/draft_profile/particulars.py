@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 SHIP = (
     "length_m = 1.0  # CHECK: the {what} does not say; between perpendiculars\n"
     "# breadth_m = 0.0  # CHECK: estimated of the length where left out\n"
@@ -17,7 +19,21 @@ DIMENSIONS = {  # of an actuator, which only physical models ask for
     "direction_deg = 0.0  # CHECK: 0 where it pushes ahead, 90 to starboard, of a bow thruster\n",
     "azimuth": "",
 }
+FULL = 1.05  # of full command: a share of more is none
+FASTEST_RPS = 50.0  # rev/s: no propeller turns faster, and a number beyond counts minutes
 LIMITED = ("rpm", "rps", "rev/s", "deg", "rad")  # units of a thruster that has to have `limits`
+
+
+def unit_by_size(name: str, most: float | None) -> tuple[str, str]:
+    """(unit, what to check) of a thruster's command that states no unit: a share is no more than
+    1, and what turns is called a speed."""
+    if most is None or most <= FULL:
+        return "1", ""
+    if re.search(r"speed|rpm|rps|rev", name, re.IGNORECASE):
+        unit = "rpm" if most > FASTEST_RPS else "rps"
+    else:
+        unit = "%" if most <= 100.0 * FULL else "permille"
+    return unit, f"its values go up to {most:.4g}"
 
 
 def of_actuator(kind: str, unit: str, most: float | None = None, place: str = "") -> str:

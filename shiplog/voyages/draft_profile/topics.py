@@ -78,13 +78,15 @@ class Log:
     def life(self, choice: Choice) -> int:
         """0 of a topic whose values change; 1 of one that comes seldom; 2 of one that stands still,
         as a home position does or a heading that nothing measures."""
-        numbers = [self.column(choice.topic, path) for path in choice.paths]
-        known = [n.filter(n.is_finite()) for n in numbers]
+        numbers = [self.column(choice.topic, path).fill_null(np.nan) for path in choice.paths]
+        known = [n.filter(n.is_finite()).to_numpy() for n in numbers]
         fewest = min(len(n) for n in known)
-        somewhere = choice.guess.kind != "geodetic" or float(known[0].abs().max() or 0.0) <= 90.0
-        if fewest >= FEW and somewhere and all(n.n_unique() == 1 for n in known):
+        most = [float(np.abs(n).max(initial=0.0)) for n in known]
+        geodetic = choice.guess.kind == "geodetic"
+        if geodetic and fewest and max(most) == 0.0:
             return 2
-        if choice.guess.kind == "geodetic" and fewest and max(n.abs().max() for n in known) == 0.0:
+        somewhere = not geodetic or most[0] <= facts.POLE
+        if fewest >= FEW and somewhere and all(np.ptp(n) == 0.0 for n in known):
             return 2
         steps = np.diff(np.sort(self.times(choice.topic)))
         return int(fewest < 2 or float(np.median(steps)) * 1e-9 > SLOW_S)
@@ -102,11 +104,11 @@ class Log:
 
     def between(self, topic: str, path: str) -> str:
         """A line for a value that is sent when it changes: it holds until the next one."""
-        frame, number = self.data.get(topic), self.column(topic, path)
+        frame, number = self.data.get(topic), self.column(topic, path).to_numpy()
         if frame is None or len(number) < FEW:
             return ""
         steps = np.diff(frame["log_time"].to_numpy()) * 1e-9
-        changes = float((number.diff().drop_nulls() != 0).mean() or 0.0)
+        changes = float(np.mean(np.diff(number) != 0))
         if steps.mean() <= 0 or steps.std() < IRREGULAR * steps.mean() or changes < CHANGES:
             return ""
         return 'between = "hold"  # sent when it changes\n'
@@ -404,6 +406,10 @@ def _actuators(log: Log, used: set[str]) -> list[tuple[str, str, str, str]]:
 def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], *, log: Log) -> str:
     unit = log.unit((path,), 0, topic, DRIVEN[kind])
     check = "" if unit else "  # CHECK: the log does not say"
+    most = _largest(log.column(topic, path))
+    if not unit and fallback == "1":
+        fallback, size = particulars.unit_by_size(path, most)
+        check += f"; {size}" if size else ""
     ordered = "CHECK: a set-point, what was ordered; " if words.is_set_point(topic) else ""
     name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_").lower() or kind
     if name[:1].isdigit():
@@ -416,7 +422,7 @@ def _actuator(kind: str, topic: str, path: str, fallback: str, names: set[str], 
         f"topic = {quoted(topic)}  # {ordered}{log.rate(topic)}\n"
         f'field = {quoted(path)}  # {log.values(topic, path)}\nunit = "{unit or fallback}"{check}\n'
         f"{log.between(topic, path)}"
-        f"{particulars.of_actuator(kind, unit or fallback, _largest(log.column(topic, path)))}"
+        f"{particulars.of_actuator(kind, unit or fallback, most)}"
     )
 
 
