@@ -193,6 +193,11 @@ class Sensors(Section):
                     f"sensors.{name} of kind {kind!r} needs {fields} field(s), "
                     f"not {len(sensor.paths)}"
                 )
+            if sensor.between == "hold" and name != "wind":
+                raise ValueError(
+                    f'sensors.{name} has between = "hold": a ship moves between two samples; it is '
+                    "for orders, set-points and states"
+                )
             if kind == "geodetic" and not (sensor.unit or sensor.units):
                 raise ValueError(f"sensors.{name} of kind {kind!r} {NO_ANGLE}")
         return self
