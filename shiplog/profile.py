@@ -99,14 +99,14 @@ class Source(Section):
     )  # fmt: skip
     tolerance_s: float | None = Field(
         default=None, ge=1e-3, le=86_400.0, description="the longest time between two samples that "
-        "are interpolated, or for which one holds, s; where left out one and a half periods, but no "
-        "more than 5 s or, of a long ship, the time in which it goes its length at Fn = 0.2"
+        "are interpolated, or for which one holds, s; where left out one and a half periods, but "
+        "no more than 5 s or, of a long ship, the time in which it goes its length at Fn = 0.2"
     )  # fmt: skip
 
     between: Literal["line", "hold"] = Field(
         default="line", description='between two samples: "line", a straight line, or "hold", the '
-        "value of the former until the next one, as of an order that is sent when it changes; a motion "
-        "has a line"
+        "value of the former until the next one, as of an order that is sent when it changes; a "
+        "motion has a line"
     )  # fmt: skip
     missing: tuple[Number, ...] = Field(
         default=(), description="raw values that stand for no value, such as 360 of an AIS course"

@@ -63,6 +63,7 @@ class Instrument:
     rate_hz: float
     resolution: float  # the step in which it counts, in `unit`; 0 where none shows
     unit: str
+    clock_s: float = 0.0  # by how much the time of a sample can be off, by what its stamps show
 
 
 @dataclass(frozen=True, slots=True)

@@ -194,7 +194,7 @@ def _recorder_right(
         moved = times - np.array(wrong)[np.searchsorted(edges, times)]
         frames[source.topic] = frame.with_columns(pl.Series(RECORDER, moved))
         topics.append(source.topic)
-    if not topics:
+    if not topics or max(map(abs, wrong)) < STEP_S * SECOND_NS:
         return []
     size = max(wrong, key=abs) / SECOND_NS
     sentence = (

@@ -178,7 +178,8 @@ def _instrument(name: str, samples: resampling.Samples) -> Instrument:
     channel = RESOLVED.get(name)
     finest = samples.resolution * channel.to_display if channel else 0.0
     unit = channel.display_unit if channel else ""
-    return Instrument(name, round(1.0 / samples.period_s, 3), float(f"{finest:.3g}"), unit)
+    rate, unsure = round(1.0 / samples.period_s, 3), round(samples.unsure_s, 3)
+    return Instrument(name, rate, float(f"{finest:.3g}"), unit, clock_s=unsure)
 
 
 def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int]:

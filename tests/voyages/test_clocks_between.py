@@ -223,3 +223,33 @@ def test_usable_seconds_are_no_more_than_the_voyage_has(voyage, seconds, shift):
     }
     report = voyage(parts).report
     assert seconds - 2.0 <= (report.usable_s or 0) <= report.seconds
+
+
+CLOCKS = {"clock_offset", "contradiction", "burst", "dropped", "wrapped", "restarted", "held"}
+
+
+@pytest.mark.parametrize("hz", [1, 2, 5, 10, 50])
+@pytest.mark.parametrize("jitter", [0.0, 0.1, 0.3], ids=lambda share: f"{share} periods")
+@pytest.mark.parametrize(
+    "begin", [1_717_286_370, 1_729_990_770, 1_711_846_770], ids=["midnight", "autumn", "spring"]
+)
+def test_a_sound_voyage_has_nothing_to_be_said_of_its_clocks(voyage, hz, jitter, begin):
+    """In UTC, over midnight, or when clocks are changed; with a pause of the whole log."""
+    rng = np.random.default_rng(hz)
+    parts = {}
+    for topic, one in sailing.series(120.0).items():
+        true = (one.time - sailing.START) * 1e-9
+        t = np.arange(0.3, 119.0, 1 / hz)
+        t = np.sort(t + rng.normal(0.0, jitter / hz, len(t)))
+        t = t[(t < 60.0) | (t > 75.0)]
+        columns = {}
+        for name, v in one.columns.items():
+            turns = 360.0 if name in ("cog_deg", "heading_deg", "direction_deg") else None
+            whole = np.interp(t, true, np.unwrap(v, period=turns) if turns else v)
+            columns[name] = whole % turns if turns else whole
+        stamps = begin * SECOND + np.rint(t * 1000).astype(np.int64) * 1_000_000
+        late = rng.integers(5_000_000, 60_000_000, len(t))
+        parts[topic] = Series(topic, one.schema, stamps, columns, log_time=stamps + late)
+    done = voyage(parts)
+    assert not [f for f in done.report.findings if f.kind in CLOCKS]
+    assert (done.report.usable_s or 0) > (90 if jitter < 0.3 or hz > 2 else 60)

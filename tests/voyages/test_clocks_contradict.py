@@ -212,3 +212,19 @@ def unsorted_log(path, parts):
                 writer.add_message(channel, time, data, time)
         writer.finish()
     return path
+
+
+@pytest.mark.parametrize("most", [0.9, 3.0])
+def test_a_delay_that_comes_and_goes_moves_no_stamp(voyage, most):
+    """A computer that hangs for seconds, and catches up, as on milliAmpere."""
+    clean = voyage(sailing.series())
+    parts = moved(0.0, ())
+    one = sailing.series()["/position"]
+    t = (one.time - sailing.START) * 1e-9
+    rng = np.random.default_rng(0)
+    hump = most * np.exp(-(((t - 20.0) / 1.5) ** 2)) * rng.uniform(0.8, 1.0, len(t))
+    logged = np.maximum.accumulate(one.time + LATENCY + np.rint(hump * SECOND).astype(np.int64))
+    parts["/position"] = replace(one, log_time=logged)
+    done = voyage(parts)
+    assert done.table.equals(clean.table)
+    assert not [f for f in done.report.findings if "held against" in f.sentence]
