@@ -112,12 +112,14 @@ class Source(Section):
     )  # fmt: skip
     tolerance_s: float | None = Field(
         default=None, ge=1e-3, le=86_400.0, description="the longest time between two samples that "
-        "are interpolated, s; one and a half periods where left out"
+        "are interpolated, or for which one holds, s; where left out one and a half periods, but "
+        "no more than 5 s or, of a long ship, the time in which it goes its length at Fn = 0.2"
     )  # fmt: skip
 
     between: Literal["line", "hold"] = Field(
         default="line", description='between two samples: "line", a straight line, or "hold", the '
-        "value of the former until the next one, as of an order that is sent when it changes"
+        "value of the former until the next one, as of an order that is sent when it changes; a "
+        "motion has a line"
     )  # fmt: skip
     missing: tuple[Number, ...] = Field(
         default=(), description="raw values that stand for no value, such as 360 of an AIS course"
@@ -230,6 +232,11 @@ class Sensors(Section):
             if sensor.limits is not None and name in ("position", "heading"):
                 raise ValueError(
                     f"sensors.{name} has `limits`; velocity, yaw_rate and wind have some"
+                )
+            if sensor.between == "hold" and name != "wind":
+                raise ValueError(
+                    f'sensors.{name} has between = "hold": a ship moves between two samples; it is '
+                    "for orders, set-points and states"
                 )
             if kind == "geodetic" and not (sensor.unit or sensor.units):
                 raise ValueError(f"sensors.{name} of kind {kind!r} {NO_ANGLE}")

@@ -78,6 +78,7 @@ class Instrument:
     resolution: float  # the step in which it counts, in `unit`; 0 where none shows
     unit: str
     sigma: float = 0.0  # stated, else estimated from the record, in `unit`; 0 where none is known
+    clock_s: float = 0.0  # by how much the time of a sample can be off, by what its stamps show
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ from shiplog.voyages.clocks import RECORDER
 
 OWN = 0.3  # of a step: how far what one clock shows of it may be off
 FEWEST = 20  # messages that show a step
+LEAST_COUNT_NS = 60 * SECOND_NS  # a shorter count cannot be told from a clock that was set
 MOST_PIECES = 20  # more often no clock is set: the delay varies
 
 
@@ -42,10 +43,11 @@ class Steps:
 
     @property
     def reference(self) -> float:
-        """L of the longest piece that can be a latency, or of the longest one."""
+        """L of the piece that is right: the least that can be a latency, since a receiver does not
+        become faster; else that of the longest piece."""
+        can_be = [late for late in self.late if is_latency(late)]
         sizes = [b - a for a, b in self.pieces]
-        can_be = [k for k, late in enumerate(self.late) if is_latency(late)]
-        return self.late[max(can_be or range(len(sizes)), key=lambda k: sizes[k])]
+        return min(can_be) if can_be else self.late[int(np.argmax(sizes))]
 
 
 def put_right(reading: Reading, profile: Profile) -> tuple[Reading, list[Finding]]:
@@ -149,8 +151,9 @@ def _stamps_right(frame: pl.DataFrame, steps: Steps) -> tuple[pl.DataFrame, str]
     add[known] = shift
     step = max((abs(b - a) for a, b in pairwise(steps.late)), default=0.0)
     counter = next(
-        (name for name, size in COUNTERS.items() if abs(size / SECOND_NS - step) < STEP_S), ""
-    )
+        (name for name, size in COUNTERS.items()
+         if size >= LEAST_COUNT_NS and abs(size / SECOND_NS - step) < STEP_S), "",
+    )  # fmt: skip
     what = (
         f"began anew as a count of {counter} does"
         if counter
@@ -191,7 +194,7 @@ def _recorder_right(
         moved = times - np.array(wrong)[np.searchsorted(edges, times)]
         frames[source.topic] = frame.with_columns(pl.Series(RECORDER, moved))
         topics.append(source.topic)
-    if not topics:
+    if not topics or max(map(abs, wrong)) < STEP_S * SECOND_NS:
         return []
     size = max(wrong, key=abs) / SECOND_NS
     sentence = (

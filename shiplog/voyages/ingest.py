@@ -207,7 +207,8 @@ def _instrument(name: str, samples: resampling.Samples) -> Instrument:
     factor = channel.to_display if channel else 0.0
     unit = channel.display_unit if channel else ""
     finest, sigma = (float(f"{v * factor:.3g}") for v in (samples.resolution, samples.noise))
-    return Instrument(name, round(1.0 / samples.period_s, 3), finest, unit, sigma)
+    rate, unsure = round(1.0 / samples.period_s, 3), round(samples.unsure_s, 3)
+    return Instrument(name, rate, finest, unit, sigma, unsure)
 
 
 def _span(base: np.ndarray, sampled: list[resampling.Samples]) -> tuple[int, int]:

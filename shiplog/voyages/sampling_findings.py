@@ -22,7 +22,8 @@ SILENT_S = 3.0  # a longer silence of an order, while the heading goes on, is no
 SILENCES = 0.1  # of the steps: so many are such silences, and not a radio that failed once
 LEVELS = 500  # at most, of orders that are given in steps; a measured angle has noise
 ON_LEVEL = 0.01  # of a step
-UNCERTAIN_S = 0.05  # a time that is surer than this is worth no word
+UNCERTAIN_S = 0.05  # a time that is surer than this is worth no word,
+MANY, SOME = 0.05, 0.005  # unless it is of so many samples; of fewer than the latter, in no case
 
 
 def order_of(samples: Samples, actuator: Actuator, base: np.ndarray) -> Samples:
@@ -72,7 +73,7 @@ def findings(every: Mapping[str, Samples], actuators: frozenset[str]) -> list[Fi
     bursts: dict[tuple, list[str]] = {}
     coarse: dict[float, list[str]] = {}
     for name, samples in every.items():
-        if samples.burst is not None:
+        if samples.burst is not None and _worth_a_word(samples):
             one = samples.burst
             key = (round(one.each_s, 1), one.cut_s, round(one.unsure_s, 2))
             bursts.setdefault(key, []).append(name)
@@ -87,6 +88,13 @@ def findings(every: Mapping[str, Samples], actuators: frozenset[str]) -> list[Fi
     found += [_burst(names, every) for names in bursts.values()]
     found += [_coarse(names, every) for names in coarse.values()]
     return found
+
+
+def _worth_a_word(samples: Samples) -> bool:
+    """Whether bursts are more than the few stamps that a jitter or a rounding made equal."""
+    one = samples.burst
+    share = one.moved / max(len(samples.time), 1) if one else 0.0
+    return one is not None and (share >= MANY or (share >= SOME and one.unsure_s >= UNCERTAIN_S))
 
 
 def _key(name: str, actuator: bool) -> str:

@@ -43,6 +43,13 @@ def test_stamps_cut_off_to_whole_seconds_are_spread_over_the_second_that_they_na
     assert (found.cut_s, found.unsure_s) == (1.0, pytest.approx(1.0 / hz))
 
 
+def test_day_numbers_of_five_decimals_are_cut_off_to_0_864_s():
+    days = np.floor((START * 1e-9 + T) / 0.864) * 1e-5  # a double of 1e4 holds 2e-12 days
+    found = spread(np.rint(days * 86_400e9).astype(np.int64), np.sin(T))
+    assert found.cut_s == 0.864
+    assert (found.time - START) * 1e-9 == pytest.approx(T, abs=0.13)  # 8 or 9 samples each
+
+
 def test_after_a_silence_a_burst_has_its_usual_length():
     t = np.concatenate((T[:300], T[300:] + 40.0))
     found = spread(handed_over(t, 5))

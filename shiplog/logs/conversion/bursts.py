@@ -32,7 +32,11 @@ LATE_BURST = 2.5  # median times between bursts: after a longer silence the buff
 DIFFERING = 0.1  # of how often the value changes between bursts: if it never does within one, the
 # samples of a burst are one sample that came several times
 ZIGZAG = 4.0  # times the change from burst to burst: the samples of a burst are of two instruments
-CUT_NS = (60 * SECOND_NS, 10 * SECOND_NS, SECOND_NS, SECOND_NS // 10, SECOND_NS // 100)
+# Steps of clocks that are cut off; 0.864 s is a day number of five decimals, in doubles to 0.6 us.
+CUT_NS = (
+    60 * SECOND_NS, 10 * SECOND_NS, SECOND_NS, 864_000_000, SECOND_NS // 10, SECOND_NS // 100,
+)  # fmt: skip
+ROUNDED_NS = 2_000
 
 
 @dataclass(frozen=True)
@@ -178,7 +182,8 @@ def _come_evenly(time: np.ndarray, begins: np.ndarray) -> bool:
 def _cut(time: np.ndarray, each: float) -> int:
     """The step [ns] in which stamps count that were cut off, if it is their time apart; else 0."""
     for step in CUT_NS:
-        if abs(each - step) < 1e-3 * step and not (time % step).any():
+        on_step = (time + ROUNDED_NS) % step <= 2 * ROUNDED_NS
+        if abs(each - step) < 1e-3 * step and on_step.all():
             return step
     return 0
 

@@ -122,7 +122,9 @@ def _in_order(
     for name, part in parts:
         rows = part.drop("voyage", strict=False)
         filled = rows.select(pl.exclude("time").is_not_null())
-        course = along(rows["time"].to_numpy(), filled.hash_rows() if filled.width else None)
+        course = along(
+            rows["time"].to_numpy(), filled.hash_rows().to_numpy() if filled.width else None
+        )
         rows = rows.with_columns(time=pl.Series(course.time))
         several = int(course.part.max(initial=0)) + 1
         for number in range(several):

@@ -31,6 +31,8 @@ HOUR_S = 3600.0
 STEP_S = 0.25  # the least step of a clock that is looked for: NTP sets one from 0.128 s on
 STEP_NOISES = 8.0  # of the scatter of L about its running median
 SIDES = 5  # values on either side of a step, of which three must agree
+AROUND = 20  # values on either side that have to stay
+STEADY = 0.5  # of the step, between their 10 % and their 90 % points
 EVIDENCE = 0.7  # of a step must show in the stamps of all lines together
 DRIFT_S = 0.3  # over a piece, and four times the scatter: a clock that does not keep its pace
 BENT = 0.15  # of a drift: a clock's is a straight line; a step of the latency bends by a quarter
@@ -123,7 +125,8 @@ def _of_one_date(late: np.ndarray) -> np.ndarray:
 
 def steps_of(late: np.ndarray) -> list[tuple[int, float]]:
     """Where differences of two clocks [m] s step for good: the first value after each step, and its
-    size [s]. Medians on either side decide; single values do not."""
+    size [s]. Medians on either side decide; single values do not, nor a delay that comes and
+    goes."""
     if len(late) < 2 * SIDES:
         return []
     padded = np.concatenate((np.full(SIDES - 1, late[0]), late, np.full(SIDES - 1, late[-1])))
@@ -136,9 +139,19 @@ def steps_of(late: np.ndarray) -> list[tuple[int, float]]:
     found: list[tuple[int, float]] = []
     for group in np.split(large, np.flatnonzero(np.diff(large) > 1) + 1) if len(large) else ():
         cut = int(group[np.argmax(step[group])]) + 1
-        if not found or cut - found[-1][0] > SIDES // 2:
-            found.append((cut, float(after[cut - 1] - before[cut - 1])))
+        size = float(after[cut - 1] - before[cut - 1])
+        sides = late[max(cut - AROUND, 0) : cut], late[cut : cut + AROUND]
+        if all(_steady(side, size) for side in sides):
+            found.append((cut, size))
     return found
+
+
+def _steady(late: np.ndarray, size: float) -> bool:
+    """Whether differences on one side of a step [s] stay: after a delay they go back to nothing."""
+    if len(late) < SIDES // 2 + 1:
+        return False
+    low, high = np.quantile(late, (0.1, 0.9))
+    return float(high - low) <= STEADY * abs(size)
 
 
 def _pieces(late: np.ndarray, received: np.ndarray, at: np.ndarray) -> list[tuple[int, int]]:

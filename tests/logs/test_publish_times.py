@@ -1,0 +1,59 @@
+"""Publish times that are of the writing of a file: no clock of a publisher, and no false offset."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from shiplog.logs import faults
+from shiplog.logs.health_report import Finding
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+YEARS = 2 * 365 * 86_400 * SECOND
+T = np.arange(3000) * SECOND // 10  # five minutes at 10 Hz
+
+
+def frame(published, late=0):
+    times = {"log_time": START + T + late, "publish_time": published, "stamp": START + T}
+    return pl.DataFrame({name: pl.Series(values, dtype=pl.Int64) for name, values in times.items()})
+
+
+@pytest.mark.parametrize("pace", [30, 1000, 100_000], ids=lambda pace: f"{pace} times as fast")
+@pytest.mark.parametrize(
+    "after", [YEARS, 86_400 * SECOND, 400 * SECOND], ids=["years", "day", "now"]
+)
+def test_a_writer_that_stamps_now_says_nothing_of_clocks(after, pace):
+    written = frame(START + after + T // pace)
+    assert not faults.of_publishers(written)
+    assert faults.clocks({"/gyro": written, "/gnss": written}) == []
+
+
+@pytest.mark.parametrize("late", [0.4, -3.0, 18.0])
+def test_the_recorder_is_then_held_against_the_stamps(late):
+    written = frame(START + YEARS + T // 1000, int(late * SECOND))
+    (finding,) = faults.clocks({"/gyro": written})
+    assert finding.value == pytest.approx(late)
+    assert "recorder's clock" in finding.sentence and "own stamps" in finding.sentence
+    assert ("GPS time" in finding.sentence) == (late == 18.0)
+
+
+@pytest.mark.parametrize("off", [-YEARS, -2 * SECOND, 2 * SECOND, YEARS])
+def test_a_publisher_whose_clock_is_off_is_still_reported(off):
+    published = frame(START + off + T)
+    assert faults.of_publishers(published)
+    found = faults.clocks({"/gyro": published})
+    assert {round(abs(f.value or 0.0)) for f in found} == {abs(off) // SECOND}
+
+
+def test_what_convert_found_is_read_back_and_what_others_wrote_is_not():
+    found = [Finding("wrapped", "log", "It began anew.", value=2.0, unit="times")]
+    channels = {"/a": faults.as_metadata(found), "/b": {}, "/c": faults.as_metadata([])}
+    assert faults.noted(channels) == found
+    for text in (
+        "",
+        "7",
+        "[1]",
+        '[{"kind": "x"}]',
+        '[{"kind": "no", "channel": "a", "sentence": "b"}]',
+    ):
+        assert faults.noted({"/a": {faults.NOTED: text}}) == []
