@@ -95,8 +95,8 @@ def part_of(path: Path) -> str:
     if len(alike) < 2 or (path.parent / METADATA).is_file():
         return ""
     return (
-        "; if this is a part of a split recording, give the folder with its metadata.yaml (ros2 bag "
-        "reindex makes one), or join the parts with mcap merge"
+        "; if this is a part of a split recording, give the folder with its metadata.yaml (ros2 "
+        "bag reindex makes one), or join the parts with mcap merge"
     )
 
 
