@@ -160,7 +160,7 @@ def test_a_speed_without_a_unit_is_in_that_of_the_position(tmp_path, unit, facto
         place += speed / (111_195.0 * 0.587_785_25)
     (tmp_path / "d.csv").write_text("\n".join(["time,lat,lon,sog,cog,heading", *rows]))
     (line,) = [x for x in draft_table(tmp_path / "d.csv").splitlines() if x.startswith('"sog"')]
-    assert f'unit = "{unit}"' in line and "fits how fast the position moves" in line
+    assert f'unit = "{unit}"' in line and "fits how fast the position changes" in line
 
 
 @pytest.mark.parametrize("speeds", ["nothing like it", "at rest"])

@@ -17,6 +17,8 @@ TURNED = 0.2  # of an angle's values, the range from the 5 % to the 95 % quantil
 NOTHING = np.zeros(0)
 Columns = Callable[[str], np.ndarray]  # a field's name to its numbers
 
+AHEAD = np.array([1.0, 0.0, 0.0])  # the sensor's axis that points to the bow
+
 
 @dataclass(frozen=True)
 class Fields:
@@ -48,8 +50,9 @@ class Agreement:
     def heading(self, found: Fields, unit: str, factor: float) -> None:
         """Where the bow pointed."""
         if found.kind.startswith("quaternion"):
-            z, w = found.raw.T
-            angle = frames.quaternion_heading(z, w, found.kind == "quaternion_enu")
+            level = np.zeros((len(found.raw), 4 - found.raw.shape[1]))  # of z and w alone
+            ahead = frames.turned(np.concatenate((level, found.raw), axis=1), AHEAD)
+            angle = frames.quaternion_heading(ahead, found.kind == "quaternion_enu")
         else:
             angle = found.raw[:, 0] * factor * units.factor(unit)
         self.motion = replace(self.motion, heading_time=found.time, heading=angle)
