@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import contradictions_pairs as pairs
-from shiplog.voyages.contradictions_pairs import Joined
+from shiplog.voyages.contradictions_pairs import Joined, UnderWay
 from shiplog.voyages.contradictions_track import STEP_S, Track, degrees
 from shiplog.voyages.contradictions_words import offset_line, sign_line, words
 
@@ -58,6 +58,7 @@ class Evidence:
     faulty: channels that are, or may be, at fault."""
 
     t: Track
+    moved: UnderWay | None
     joined: Joined | None
     turned: Joined | None
     by_position: Way | None
@@ -149,21 +150,26 @@ def ending(culprit: str, why: str, lines: Sequence[str], two: tuple[str, str]) -
 
 def gather(t: Track) -> Evidence:
     """All pairs of one voyage."""
+    turned, moved = pairs.heading_and_yaw_rate(t), pairs.under_way(t)
+    if moved is None:
+        return Evidence(t, None, None, turned, None, None, None, None)
     by_rate = t.profile.sensors.yaw_rate is not None
+    ways = [_way(one) for one in pairs.heading_and_way(t, moved)]
     return Evidence(
         t,
-        pairs.position_and_velocity(t),
-        pairs.heading_and_yaw_rate(t),
-        _way(pairs.heading_and_way(t, True)),
-        None if t.body else _way(pairs.heading_and_way(t, False)),
-        pairs.bend(t, t.turned_by_rate) if by_rate else None,
-        pairs.bend(t, t.turned),
+        moved,
+        pairs.position_and_velocity(t, moved),
+        turned,
+        ways[0],
+        None if t.body else ways[1],
+        pairs.bend(t, moved, t.turned_by_rate) if by_rate else None,
+        pairs.bend(t, moved, t.turned),
     )
 
 
-def _way(j: Joined | None) -> Way | None:
+def _way(j: Joined) -> Way | None:
     """None where no formula joins heading and way, or several do: on one straight course."""
-    if j is None or "as it is" not in j.fits or "current" not in j.extra:
+    if "as it is" not in j.fits or "current" not in j.extra:
         return None
     left = j.left
     best = min(left, key=lambda name: left[name])

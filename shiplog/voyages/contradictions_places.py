@@ -53,10 +53,10 @@ HEADINGS = ("heading mirrored", "heading in radians")  # formulas that a faulty 
 def position_and_velocity(e: Evidence) -> Iterator[Finding]:
     """How they are joined, and how they should not be."""
     j = e.joined
-    if j is None:
+    if j is None or e.moved is None:
         return
     as_is = j.fits.get("as it is")
-    slow = pairs.slowest(e.t)
+    slow = e.moved.slowest
     if (still := _stands(e, j, slow)) is not None:
         yield still
         return

@@ -18,6 +18,7 @@ HUBER = 2.0  # standard deviations
 TURNS = 6
 LEAST_NOISE = 1e-4  # of the size of y: numbers without noise are no instrument
 SPARE = 3  # windows and blocks beyond one a parameter
+MOST = 600  # windows: of more, every second or third is taken
 BLOCKS = 30  # at most: windows next to each other share a block
 NINETY = 0.95  # quantile of either end of a 90 % interval
 
@@ -62,6 +63,9 @@ def regress(
 ) -> Regression | None:
     """y [w], columns k of [w], block [w], prior k: one standard deviation about 0, inf where
     nothing is known. None where there are too few windows."""
+    if len(y) > MOST:
+        every = -(-len(y) // MOST)
+        y, columns, block = y[::every], [one[::every] for one in columns], block[::every]
     x = np.stack(columns, axis=1)
     count, k = x.shape
     names, block = _blocks(block)
@@ -73,8 +77,8 @@ def regress(
     sigma, weight = max(size, floor), np.ones(count)
     theta = np.zeros(k)
     for _ in range(TURNS):
-        normal = np.real(np.einsum("wi,w,wj->ij", x.conj(), weight, x)) / sigma**2 + precision
-        score = np.real(np.einsum("wi,w,w->i", x.conj(), weight, y)) / sigma**2
+        weighted = (x * weight[:, None]).conj().T / sigma**2
+        normal, score = np.real(weighted @ x) + precision, np.real(weighted @ y)
         try:
             theta = np.linalg.solve(normal, score)
         except np.linalg.LinAlgError:
@@ -84,9 +88,8 @@ def regress(
         weight = np.minimum(1.0, HUBER * sigma / np.maximum(away, 1e-15))
     e = y - x @ theta
     try:
-        inverse = np.linalg.inv(
-            np.real(np.einsum("wi,w,wj->ij", x.conj(), weight, x)) / sigma**2 + precision
-        )
+        normal = np.real((x * weight[:, None]).conj().T @ x) / sigma**2 + precision
+        inverse = np.linalg.inv(normal)
     except np.linalg.LinAlgError:
         return None
     scores = np.real(x.conj() * (weight * e)[:, None]) / sigma**2
