@@ -30,7 +30,10 @@ def driven(t: Track, e: Evidence) -> list[Driven]:
     yaw_rate = t.yaw_rate
     if "yaw_rate" in e.faulty:
         yaw_rate = np.gradient(np.unwrap(t.heading), 0.1)
-    return actuators.driven(t, yaw_rate)
+    found = actuators.driven(t, yaw_rate)
+    if t.profile.sensors.yaw_rate is not None and e.turned is None:  # its sense is not known
+        found = [one for one in found if one.direction in ("surge", "sway")]
+    return found
 
 
 def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding]:
@@ -53,22 +56,30 @@ def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding
         against = [one for one in ways if one.against and one.direction != ASTERN]
         if not against or any(one.along for one in ways):
             continue
-        yield _sign(t, e, actuator, against)
+        yield _sign(t, e, actuator, against, _all_against(found, against))
 
 
-def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> Finding:
+def _all_against(found: Sequence[Driven], against: list[Driven]) -> bool:
+    """Whether every actuator that tells anything in these directions drives the other way: it may
+    then be the axes of the motion."""
+    directions = {one.direction for one in against}
+    told = [one for one in found if one.direction in directions and (one.along or one.against)]
+    return len({one.name for one in told}) > 1 and not any(one.along for one in told)
+
+
+def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whole: bool) -> Finding:
     line = _sign_line(actuator)
+    directions = [one.direction for one in against]
     if actuator.kind == "rudder":
-        what = f"The bow turns to port where the rudder {actuator.name} is positive"
-        sure = _sense(t, e)
-        also = "" if sure else "; or heading and yaw rate are counted to port"
+        what = f"The bow turns to port where {actuator.name} is positive"
     else:
-        ways = " and ".join(one.direction for one in against)
-        what = (
-            f"The {actuator.kind} {actuator.name} drives the other way than the profile has it "
-            f"({ways})"
-        )
-        also = ""
+        ways = " and ".join(directions)
+        what = f"{actuator.name} drives the other way than the profile has it ({ways})"
+    also = ""
+    if "yaw rate" in directions and not _sense(e):
+        also = "; or heading and yaw rate are counted to port"
+    elif whole and "yaw rate" not in directions:
+        also = "; or, as the others do so too, the heading is turned by 180 deg"
     best = max(against, key=lambda one: one.explained)
     sentence = (
         f"{what}: {100.0 * best.explained:.0f} % of the change follow it with the sign turned "
@@ -77,10 +88,9 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> F
     return of_voyage(t, actuator.name, (-1.0, None, None), "1", "sign", sentence)
 
 
-def _sense(t: Track, e: Evidence) -> bool:
+def _sense(e: Evidence) -> bool:
     """Whether the way over ground confirms to which side the heading turns."""
-    ways = (e.by_position, e.by_velocity)
-    return any(w is not None and w.how == "as it is" and w.sense for w in ways)
+    return any(w.how == "as it is" and w.sense for w in e.ways)
 
 
 def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:

@@ -21,6 +21,7 @@ NEAR_DEG = 8.0  # of 90 or 180 deg
 SURE_DEG = 12.0  # half interval of an angle that says anything
 FASTEST_CURRENT = 3.0  # m/s: what a stream may do, and a log through the water not see
 SPREAD = 0.15  # of the directions sailed: no straight line
+LEAST_SPREAD = 0.03  # of a way that tells a mirror at all
 BENT = (0.4, 2.5)  # the way's turning over the heading's: they turn together
 NONE_OF_TWO = "no third channel tells which of the two"
 
@@ -79,7 +80,9 @@ class Evidence:
         """(channel at fault, why): that one which the heading does not confirm."""
 
         def confirms(way: Way | None) -> bool:
-            return way is not None and way.ahead and (way.sense or not mirrored)
+            if way is None or not way.ahead:
+                return False
+            return not mirrored or (way.sense and way.spread > LEAST_SPREAD)
 
         p, v = self.by_position, self.by_velocity
         if self.t.body:

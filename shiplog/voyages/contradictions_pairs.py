@@ -41,6 +41,7 @@ CURRENT_SHARE = 0.7  # prior of a current, of the ship's speed
 DELAY_S = 1.0  # prior of a delay
 BIAS_RADPS, BIAS_SHARE = 0.3 * DEGREE, 0.1  # prior of a gyro's bias: rad/s, and of its rms
 RAD = 1.0 / DEGREE  # 57.3
+NATURAL = 0.15  # natural logarithm, and rad: of two that are about one
 PERFECT = 0.02  # unexplained share, and less: nothing is wrong
 TOGETHER = 0.7  # correlation from which the way is said to turn with the yaw rate
 MOST_LAG_S = 120  # longest delay that is looked for
@@ -133,6 +134,12 @@ def complex_fit(
     return regress(y, columns, w.block, prior)
 
 
+def natural(fit: Regression) -> bool:
+    """Whether both sides are of about one size and direction."""
+    size, angle, _, _ = fit.polar()
+    return abs(math.log(size)) < NATURAL and abs(angle) < NATURAL
+
+
 def _spread(y: np.ndarray) -> float:
     """Of the directions of vectors, sign apart."""
     direction = np.exp(2j * np.angle(y))
@@ -150,7 +157,7 @@ def position_and_velocity(t: Track, moved: UnderWay) -> Joined:
     spread = _spread(y if speeds[0] > 0 else x)
     as_is = complex_fit(t, w, y, (x, w.change(t.binned(t.over_ground))), t.body, arm)
     fits = {} if as_is is None else {"as it is": as_is}
-    if as_is is not None and as_is.left < PERFECT:
+    if as_is is not None and as_is.left < PERFECT and natural(as_is):
         return Joined(fits, len(y), w.seconds, spread, speeds)
     tried: dict[str, np.ndarray] = {"mirrored": t.over_ground.conj()}
     if t.body:
