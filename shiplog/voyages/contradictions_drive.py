@@ -14,7 +14,14 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Actuator
 from shiplog.voyages import contradictions_actuators as actuators
 from shiplog.voyages.contradictions_actuators import ASTERN, Driven
-from shiplog.voyages.contradictions_evidence import ALONG_DEG, SPREAD, Evidence, Way, of_voyage
+from shiplog.voyages.contradictions_evidence import (
+    ALONG_DEG,
+    LEAST_SPREAD,
+    SPREAD,
+    Evidence,
+    Way,
+    of_voyage,
+)
 from shiplog.voyages.contradictions_track import Track
 from shiplog.voyages.contradictions_words import offset_line, sign_line
 
@@ -54,7 +61,7 @@ def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding
     for actuator in t.profile.actuators:
         ways = by_name.get(actuator.name, [])
         against = [one for one in ways if one.against and one.direction != ASTERN]
-        if not against or any(one.along for one in ways):
+        if not against or any(one.along or one.together > actuators.SURE for one in ways):
             continue
         yield _sign(t, e, actuator, against, _all_against(found, against))
 
@@ -100,7 +107,7 @@ def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
         ways = {one.direction: one for one in by_name.get(actuator.name, [])}
         surge, yaw = ways.get("surge"), ways.get("yaw rate")
         if yaw is not None and yaw.against and (surge is None or not surge.against):
-            if surge is None or not surge.along or actuator.kind == "rudder":
+            if surge is None or not (surge.along or surge.together > actuators.SURE):
                 continue
             pair.append(actuator)
     sides = {math.copysign(1.0, one.position_m[1]) for one in pair if one.position_m[1] != 0.0}
@@ -122,7 +129,7 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     thrusts = actuators.thrust(t)
     if way is None or way.how != "as it is" or way.drift or not thrusts:
         return None
-    if way.half > 15.0 or actuators.can_push_sideways(t):
+    if way.half > 15.0 or way.spread < LEAST_SPREAD or actuators.can_push_sideways(t):
         return None
     share = _driven_share(t, [part[0] for part in thrusts.values()])
     if way.ahead and share < -MOSTLY:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from shiplog.channels import DEGREE
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import contradictions_pairs as pairs
@@ -12,6 +13,7 @@ from shiplog.voyages.contradictions_pairs import Joined, UnderWay
 from shiplog.voyages.contradictions_track import STEP_S, Track, degrees
 from shiplog.voyages.contradictions_words import offset_line, sign_line, words
 
+AS_GOOD = 1.5  # times what another formula leaves
 JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more, and they do not
 BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
@@ -19,7 +21,7 @@ LEAST_MIRRORED = 0.1  # share that the heading as it is leaves, and less: it is 
 ALONG_DEG = 45.0  # from the bow: the ship goes ahead
 NEAR_DEG = 8.0  # of 90 or 180 deg
 SURE_DEG = 12.0  # half interval of an angle that says anything
-FASTEST_CURRENT = 3.0  # m/s: what a stream may do, and a log through the water not see
+FASTEST_CURRENT = 4.0  # m/s: what a stream may do, and a log through the water not see
 SPREAD = 0.15  # of the directions sailed: no straight line
 LEAST_SPREAD = 0.03  # of a way that tells a mirror at all
 BENT = (0.4, 2.5)  # the way's turning over the heading's: they turn together
@@ -182,9 +184,10 @@ def _way(j: Joined) -> Way | None:
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
     _, angle, _, half = j.fits[best].polar()
-    drift = j.extra["current"] < FASTEST_CURRENT and (
-        j.extra["drifting"] < left[best] * (BETTER if best != "as it is" else 1.0 / BETTER)
+    drift = j.extra["current"] < FASTEST_CURRENT and j.extra["drifting"] < (
+        left[best] * (BETTER if best != "as it is" else AS_GOOD)
     )
+    drift &= abs(j.extra["angle"]) < ALONG_DEG * DEGREE or j.extra["half"] > ALONG_DEG * DEGREE
     return Way(best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift)
 
 

@@ -194,7 +194,8 @@ def heading_and_way(t: Track, moved: UnderWay) -> Iterator[Joined]:
                 fits["in radians"] = fit
         if drifting := complex_fit(t, w, way, as_is, True, 0.0):
             current = float(np.hypot(*drifting.theta[-2:]))
-            extra = {"drifting": drifting.left, "current": current}
+            _, angle, _, half = drifting.polar()
+            extra = {"drifting": drifting.left, "current": current, "angle": angle, "half": half}
         yield Joined(fits, len(way), w.seconds, _spread(way), extra=extra)
 
 

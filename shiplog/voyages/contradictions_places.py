@@ -76,13 +76,9 @@ def position_and_velocity(e: Evidence) -> Iterator[Finding]:
         and as_is.left - left[best] > CLEARLY
     )
     if e.t.body and not pairs.natural(as_is) and _drift(j, as_is) > DRIFTS:
-        best = min((name for name in left if pairs.natural(j.fits[name])), key=left.__getitem__,
-                   default="")  # fmt: skip
-        if (
-            not best
-            or left[best] > ABOUT * as_is.left + CLEARLY
-            or _drift(j, j.fits[best]) > DRIFTS
-        ):
+        plain = [name for name in left if name != "as it is" and _plain(j, name)]
+        best = min(plain, key=lambda name: left[name], default="")
+        if not best or left[best] > ABOUT * as_is.left + CLEARLY:
             return
         better = True
     if e.t.body and "heading" in e.faulty:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+OF_REAL, OF_COMPLEX = 1.4826, 0.8493  # standard deviation of a component over the median of |ε|
 HUBER = 2.0  # standard deviations
 TURNS = 6
 LEAST_NOISE = 1e-4  # of the size of y: numbers without noise are no instrument
@@ -75,6 +76,7 @@ def regress(
     size = float(np.sqrt(np.mean(np.abs(y) ** 2)))
     floor = max(LEAST_NOISE * size, 1e-12)
     sigma, weight = max(size, floor), np.ones(count)
+    typical = OF_COMPLEX if np.iscomplexobj(x) else OF_REAL
     theta = np.zeros(k)
     for _ in range(TURNS):
         weighted = (x * weight[:, None]).conj().T / sigma**2
@@ -84,7 +86,7 @@ def regress(
         except np.linalg.LinAlgError:
             return None
         away = np.abs(y - x @ theta)
-        sigma = max(float(1.4826 * np.median(away)), floor)
+        sigma = max(typical * float(np.median(away)), floor)
         weight = np.minimum(1.0, HUBER * sigma / np.maximum(away, 1e-15))
     e = y - x @ theta
     try:
@@ -101,8 +103,7 @@ def regress(
         return None
     larger = np.sqrt(np.maximum(1.0, alone / np.maximum(np.diag(cov), 1e-300)))
     cov = larger[:, None] * cov * larger[None, :]
-    typical = float(np.median(np.abs(y)))
-    left = float(np.median(np.abs(e))) / max(typical, 1e-12)
+    left = float(np.median(np.abs(e))) / max(float(np.median(np.abs(y))), 1e-12)
     return Regression(theta, cov, left, float(stdtrit(max(names - k, 2), NINETY)), names)
 
 
