@@ -122,7 +122,7 @@ def _rudder_forces(t: Track) -> dict[str, np.ndarray]:
 def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
     """All that can be counted; yaw_rate [n] rad/s to starboard, as the heading has it."""
     body = t.velocity if t.body else t.velocity * t.ahead.conj()
-    speed = np.abs(body)
+    u, v, speed = np.real(body), np.imag(body), np.abs(body)
     thrusts = thrust(t)
     length = t.profile.ship.length_m
     found: list[Driven] = []
@@ -131,7 +131,7 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
         small = np.ones(len(speed), bool)
         for name in rudders:
             small &= np.abs(t.driven[name]) < LARGEST_RUDDER
-        ahead, astern = body.real > AHEAD * speed, body.real < -AHEAD * speed
+        ahead, astern = u > AHEAD * speed, u < -AHEAD * speed
         least = SHIP_TIMES * length / max(float(np.median(speed)), 1e-6)
         if np.ptp(np.quantile(t.turned[t.usable], (0.05, 0.95))) > LEAST_TURN_RAD:
             mostly = (ahead & small).sum() >= (astern & small).sum()
@@ -146,8 +146,8 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             name: part[2] for name, part in thrusts.items()
             if _acts(part[2] / length, thrusts, LEAST_ARM)
         }  # fmt: skip
-        found += _counted(t, "surge", body.real, ahead, everywhere)
-        found += _counted(t, "sway", body.imag, side, everywhere)
+        found += _counted(t, "surge", u, ahead, everywhere)
+        found += _counted(t, "sway", v, side, everywhere)
         if len(turning) > 1 or not rudders:
             found += _counted(t, "yaw rate", yaw_rate, turning, everywhere)
     return found
@@ -215,7 +215,7 @@ def _at(
     if without is None or together is None:
         return
     left = _spread_left(y, still, without.theta)
-    total = sum(w.change(means[name]) for name in scaled)
+    total = np.sum([w.change(means[name]) for name in scaled], axis=0)
     total = total / max(float(np.std(total)), 1e-12)
     summed = regress(y, [total, *still], w.block, free)
     of_all = 0.0 if summed is None else _halves(summed, 0)

@@ -213,6 +213,6 @@ def _abeam(t: Track, way: Way) -> Finding:
 
 
 def _sign_line(actuator: Actuator) -> str:
-    sign = actuator.sign if isinstance(actuator.sign, float) else actuator.sign[0]
+    sign = actuator.sign[0] if isinstance(actuator.sign, tuple) else actuator.sign
     text = f"{-sign:.1f}" if abs(sign) == 1.0 else f"{-sign:g}"
     return f'sign = {text} on the actuator "{actuator.name}"'

@@ -171,7 +171,7 @@ def position_and_velocity(t: Track, moved: UnderWay) -> Joined:
     for name, velocity in tried.items():
         if fit := complex_fit(t, w, y, sailed(t, w, velocity), t.body, arm):
             fits[name] = fit
-    if fit := regress(y, [x.imag + 0j, 1j * x.real], w.block, [np.inf] * 2):
+    if fit := regress(y, [np.imag(x) + 0j, 1j * np.real(x)], w.block, [np.inf] * 2):
         fits["swapped"] = fit
     return Joined(fits, len(y), w.seconds, spread, speeds)
 
@@ -255,8 +255,10 @@ def heading_and_yaw_rate(t: Track) -> Joined | None:
 
 
 def is_late(late: float, then: float, now: float) -> bool:
-    """Whether `lag` found a delay, and one that no fit looks for."""
-    return abs(late) > FIT_LAG_S and then > ALIKE and 1.0 - now > LESS_ALIKE * (1.0 - then)
+    """Whether `lag` found a delay, and one that no fit looks for. A swing of one period turned
+    round looks like half a period late: what is alike with another sign is not late."""
+    apart = 1.0 - abs(now) > LESS_ALIKE * (1.0 - then)
+    return abs(late) > FIT_LAG_S and then > ALIKE and apart
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> float:

@@ -135,7 +135,8 @@ class Track:
     def _so_far(self) -> tuple[np.ndarray, np.ndarray]:
         """Usable bins, and bins with a jump, before each bin [B + 1]."""
         jumps = self.binned(self.jump.astype(float)) > 0.0
-        return tuple(np.concatenate(([0], np.cumsum(one))) for one in (self.usable, jumps))
+        usable, jumped = (np.concatenate(([0], np.cumsum(one))) for one in (self.usable, jumps))
+        return usable, jumped
 
     def windows(self, seconds: int) -> Windows:
         """One after another, `seconds` long, without a jump and nearly whole."""

@@ -129,7 +129,7 @@ def _ratio(e: Evidence, value: float, low: float, high: float) -> Finding:
 def _unit_lines(e: Evidence, culprit: str, ratio: float, size: list[float]) -> list[str]:
     """What to change where the ratio is that of two units."""
     p = e.profile
-    found = {"yaw_rate": other_unit(p, "yaw_rate", ratio, *size)}
+    found = {"yaw_rate": other_unit(p, "yaw_rate", ratio, size[0], size[1])}
     if angle_heading(p):
         found["heading"] = other_unit(p, "heading", 1.0 / ratio, 1.0 / size[1], 1.0 / size[0])
     return [
@@ -142,7 +142,7 @@ def _unit_lines(e: Evidence, culprit: str, ratio: float, size: list[float]) -> l
 def _twice(e: Evidence, culprit: str, ratio: float, size: list[float]) -> str | None:
     if culprit == "heading":
         return None
-    return converted_twice(e.profile, "yaw_rate", ratio, *size)
+    return converted_twice(e.profile, "yaw_rate", ratio, size[0], size[1])
 
 
 def _zero_of_mirrored(e: Evidence) -> float:

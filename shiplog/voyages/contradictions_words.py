@@ -74,7 +74,7 @@ def converted_twice(
     if off > max(0.5 * NEAR, wide):
         return None
     sensor = sensor_of(profile, name)
-    others = sensor.sign if isinstance(sensor.sign, float) else sensor.sign[index]
+    others = sensor.sign[index] if isinstance(sensor.sign, tuple) else sensor.sign
     whole = name != "velocity" or profile.sensors.kind(name) != "sog_cog"
     text = f"{others / stored_over_true:.4g}"
     factor = text if whole else _each(sensor, index, text, "1.0")

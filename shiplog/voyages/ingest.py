@@ -23,7 +23,7 @@ from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import clocks, fault_detection, resampling
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages.comparison import Comparison, compare
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has
