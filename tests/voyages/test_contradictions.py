@@ -1,11 +1,14 @@
 """Two sensors that exclude each other are found before any fit; sound ones of any ship are not."""
 
 import dataclasses
+import json
 import math
 
 import numpy as np
 import polars as pl
 import pytest
+import sailing
+from commands import call
 from known_motion import (
     KNOT,
     METRE,
@@ -523,3 +526,33 @@ def test_more_noise_makes_a_wider_interval():
         (one,) = found(raw, profile())
         widths.append(one.high - one.low)
     assert widths[1] > 2.0 * widths[0]
+
+
+def test_a_command_says_what_contradicts_first_and_what_was_not_compared(tmp_path):
+    parts = sailing.series(300.0)
+    turned = -parts["/gyro"].columns["rate_degpmin"]
+    columns = parts["/gyro"].columns | {"rate_degpmin": turned}
+    parts["/gyro"] = dataclasses.replace(parts["/gyro"], columns=columns)
+    log = sailing.write(tmp_path / "a.mcap", parts)
+    (tmp_path / "ship.toml").write_text(sailing.PROFILE)
+    store = tmp_path / "store"
+    to = tmp_path / "answer.json"
+    words = ["ingest", log, "--profile", tmp_path / "ship.toml", "--store", store, "--json", to]
+    code, out, _ = call(*words)
+    assert code == 3
+    lines = out.splitlines()
+    (first,) = [line for line in lines if "contradiction: The yaw rate" in line]
+    assert "sign = -1.0 on [sensors.yaw_rate]" in first
+    assert any(line.startswith("  could not be compared: ") for line in lines)
+    (voyage,) = json.loads(to.read_text())["voyages"]
+    assert {one["kind"] for one in voyage["findings"]} == {"contradiction"}
+    assert all(one["would_show"] for one in voyage["not_compared"])
+    assert call("check", log, "--profile", tmp_path / "ship.toml")[0] == 3
+
+    assert call(*words)[0] == 3  # as it was stored
+    code, out, _ = call("voyages", "--sensors", "--store", store, "--json", to)
+    assert code == 0 and "- contradiction in a: The yaw rate" in out and "- not compared: " in out
+    (campaign,) = json.loads(to.read_text())["campaigns"]
+    assert [one["voyage"] for one in campaign["contradictions"]] == ["a"]
+    assert campaign["not_compared"]
+    assert "yaw_rate" not in {one["channel"] for one in campaign["estimates"]}
