@@ -14,7 +14,7 @@ from shiplog.report import tables
 from shiplog.training.provenance import Answer
 from shiplog.voyages import campaign_consistency, parts
 from shiplog.voyages.campaign_consistency import SensorCampaign
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 from shiplog.voyages.store import Store
 
 

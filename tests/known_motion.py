@@ -51,8 +51,9 @@ def sailed(seconds, rate, surge, sway=None, heading=0.7, current=(0.0, 0.0), dri
     v = v - current[0] * np.sin(psi) + current[1] * np.cos(psi)
     driven = {name: one(t) + 0 * t for name, one in (drives or {}).items()}
     pick = slice(None, None, FINE)
-    return Sailed(t[pick], *(a[pick] for a in (psi, r, u, v, north, east)),
-                  {name: one[pick] for name, one in driven.items()})  # fmt: skip
+    psi, r, u, v, north, east = (a[pick] for a in (psi, r, u, v, north, east))
+    drives = {name: one[pick] for name, one in driven.items()}
+    return Sailed(t[pick], psi, r, u, v, north, east, drives)
 
 
 def integral(rate, dt):

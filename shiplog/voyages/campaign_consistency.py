@@ -20,12 +20,8 @@ from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
 from shiplog.voyages import contradictions, sensor_consistency
 from shiplog.voyages.contradictions import Contradictions
-from shiplog.voyages.sensor_consistency import (
-    SURE_HALF_INTERVALS,
-    Compared,
-    Estimate,
-    Motion,
-)
+from shiplog.voyages.sensor_consistency import Compared, Motion
+from shiplog.voyages.sensor_findings import SURE_HALF_INTERVALS, Estimate
 
 log = logging.getLogger(__name__)
 

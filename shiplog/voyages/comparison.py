@@ -14,7 +14,7 @@ from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
 from shiplog.voyages import contradictions, sensor_consistency
 from shiplog.voyages.contradictions import Contradictions
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 
 AFTER = "the same comparison once the profile is corrected"
 

@@ -93,7 +93,7 @@ def _not_compared(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotC
             "wind", "no second instrument measures it", "the same wind on opposite headings, or a "
             "weather station",
         )  # fmt: skip
-    yield from _actuators(t, counted)
+    yield from _actuators(t, e, counted)
 
 
 def _heading(t: Track, e: Evidence) -> Iterator[NotCompared]:
@@ -112,12 +112,14 @@ def _heading(t: Track, e: Evidence) -> Iterator[NotCompared]:
         )  # fmt: skip
 
 
-def _actuators(t: Track, counted: list[Driven]) -> Iterator[NotCompared]:
+def _actuators(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotCompared]:
     sure = {o.name for o in counted if o.direction != ASTERN and (o.along or o.against)}
     left = [a.name for a in t.profile.actuators if a.name not in sure and a.kind != "azimuth"]
     if left:
         names = ", ".join(left)
+        doubtful = e.faulty & {"heading", "velocity", "position"}
+        why = "the motion contradicts itself" if doubtful else "too little of the motion follows it"
         yield NotCompared(
-            f"the sign of {names}", "too little of the motion follows it",
+            f"the sign of {names}", why,
             "each actuator moved by itself to both sides, for some ship's lengths",
         )  # fmt: skip

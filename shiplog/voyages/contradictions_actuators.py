@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,8 @@ LARGEST_RUDDER = math.radians(46.0)  # beyond it a rudder deflects a jet, and do
 AHEAD = 0.5  # cosine of the angle between the way and the bow, and more: the ship goes ahead
 WORKS = 0.15  # of its largest value: an actuator that is moved at all
 LATERAL = 0.5  # sine of a direction, and more: the thruster pushes sideways
+OPPOSED = -0.9  # correlation of two rudders that always move against each other
+LOOSE = 100.0  # prior of a coefficient, of the change: of two that are one nothing is known
 LEAST_ARM = 0.02  # lever, of the ship's length: less turns nothing
 
 
@@ -51,14 +53,18 @@ class Driven:
     total: float
     explained: float
     windows: int
+    opposed: bool  # it moves against one of its kind that drives the right way
 
     @property
     def against(self) -> bool:
         """It drives the other way, beyond doubt. Of two that always move together neither is known
-        beside the other: then the sum of all has to say so."""
-        if self.alone > -SURE or self.explained < PARTLY or self.together > SURE:
+        beside the other: then the sum of all has to say so, or that it moves against one that
+        drives the right way."""
+        if self.alone > -SURE or self.explained < PARTLY:
             return False
-        return self.together < -SURE or self.total < -SURE
+        if self.opposed:
+            return True
+        return self.together < SURE and min(self.together, self.total) < -SURE
 
     @property
     def along(self) -> bool:
@@ -116,7 +122,7 @@ def _rudder_forces(t: Track) -> dict[str, np.ndarray]:
 def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
     """All that can be counted; yaw_rate [n] rad/s to starboard, as the heading has it."""
     body = t.velocity if t.body else t.velocity * t.ahead.conj()
-    speed = np.abs(body)
+    u, v, speed = np.real(body), np.imag(body), np.abs(body)
     thrusts = thrust(t)
     length = t.profile.ship.length_m
     found: list[Driven] = []
@@ -125,7 +131,7 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
         small = np.ones(len(speed), bool)
         for name in rudders:
             small &= np.abs(t.driven[name]) < LARGEST_RUDDER
-        ahead, astern = body.real > AHEAD * speed, body.real < -AHEAD * speed
+        ahead, astern = u > AHEAD * speed, u < -AHEAD * speed
         least = SHIP_TIMES * length / max(float(np.median(speed)), 1e-6)
         if np.ptp(np.quantile(t.turned[t.usable], (0.05, 0.95))) > LEAST_TURN_RAD:
             mostly = (ahead & small).sum() >= (astern & small).sum()
@@ -140,8 +146,8 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             name: part[2] for name, part in thrusts.items()
             if _acts(part[2] / length, thrusts, LEAST_ARM)
         }  # fmt: skip
-        found += _counted(t, "surge", body.real, ahead, everywhere)
-        found += _counted(t, "sway", body.imag, side, everywhere)
+        found += _counted(t, "surge", u, ahead, everywhere)
+        found += _counted(t, "sway", v, side, everywhere)
         if len(turning) > 1 or not rudders:
             found += _counted(t, "yaw rate", yaw_rate, turning, everywhere)
     return found
@@ -178,7 +184,7 @@ def _counted(
         w = w.chosen(rows >= 0.9 * ROWS * (seconds + 1))
         if len(w.first) < FEWEST:
             continue
-        for one in _at(w, direction, velocity, means):
+        for one in _at(w, direction, velocity, means, least > 0.0):
             before = best.get(one.name)
             if before is None or one.explained > before.explained:
                 best[one.name] = one
@@ -186,9 +192,9 @@ def _counted(
 
 
 def _at(
-    w: Windows, direction: str, velocity: np.ndarray, means: dict[str, np.ndarray]
+    w: Windows, direction: str, velocity: np.ndarray, means: dict[str, np.ndarray], steers: bool
 ) -> Iterator[Driven]:
-    """At one length of window."""
+    """At one length of window; steers: the forces are those of rudders."""
     y, start = w.change(velocity), velocity[w.first]
     if not np.std(start) > 0 or not np.std(y) > 0:
         return
@@ -202,31 +208,32 @@ def _at(
             scaled[name] = force / np.std(force)
     if not scaled:
         return
-    free = [np.inf] * (2 + len(scaled))
+    free = [np.inf] * 3
     without = regress(y, still, w.block, free[:2])
-    together = regress(y, [*scaled.values(), *still], w.block, free)
+    loose = [LOOSE * float(np.std(y))] * len(scaled)
+    together = regress(y, [*scaled.values(), *still], w.block, [*loose, np.inf, np.inf])
     if without is None or together is None:
         return
     left = _spread_left(y, still, without.theta)
-    total = sum(w.change(means[name]) for name in scaled)
+    total = np.sum([w.change(means[name]) for name in scaled], axis=0)
     total = total / max(float(np.std(total)), 1e-12)
-    summed = regress(y, [total, *still], w.block, free[:3])
+    summed = regress(y, [total, *still], w.block, free)
     of_all = 0.0 if summed is None else _halves(summed, 0)
+    found = []
     for index, (name, force) in enumerate(scaled.items()):
-        alone = regress(y, [force, *still], w.block, free[:3])
+        alone = regress(y, [force, *still], w.block, free)
         if alone is None:
             continue
         after = _spread_left(y, [force, *still], alone.theta)
         explained = 1.0 - (after / left) ** 2 if left > 0 else 0.0
-        yield Driven(
-            name,
-            direction,
-            _halves(alone, 0),
-            _halves(together, index),
-            of_all,
-            explained,
-            len(y),
-        )
+        found.append(
+            Driven(name, direction, _halves(alone, 0), _halves(together, index), of_all, explained,
+                   len(y), opposed=False)
+        )  # fmt: skip
+    right = [scaled[one.name] for one in found if one.along and one.alone > SURE]
+    for one in found:
+        against = any(np.corrcoef(scaled[one.name], other)[0, 1] < OPPOSED for other in right)
+        yield replace(one, opposed=steers and against)
 
 
 def _halves(fit, index: int) -> float:

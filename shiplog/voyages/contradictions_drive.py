@@ -14,7 +14,14 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Actuator
 from shiplog.voyages import contradictions_actuators as actuators
 from shiplog.voyages.contradictions_actuators import ASTERN, Driven
-from shiplog.voyages.contradictions_evidence import ALONG_DEG, SPREAD, Evidence, Way, of_voyage
+from shiplog.voyages.contradictions_evidence import (
+    ALONG_DEG,
+    LEAST_SPREAD,
+    SPREAD,
+    Evidence,
+    Way,
+    of_voyage,
+)
 from shiplog.voyages.contradictions_track import Track
 from shiplog.voyages.contradictions_words import offset_line, sign_line
 
@@ -30,7 +37,10 @@ def driven(t: Track, e: Evidence) -> list[Driven]:
     yaw_rate = t.yaw_rate
     if "yaw_rate" in e.faulty:
         yaw_rate = np.gradient(np.unwrap(t.heading), 0.1)
-    return actuators.driven(t, yaw_rate)
+    found = actuators.driven(t, yaw_rate)
+    if t.profile.sensors.yaw_rate is not None and e.turned is None:  # its sense is not known
+        found = [one for one in found if one.direction in ("surge", "sway")]
+    return found
 
 
 def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding]:
@@ -51,24 +61,32 @@ def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding
     for actuator in t.profile.actuators:
         ways = by_name.get(actuator.name, [])
         against = [one for one in ways if one.against and one.direction != ASTERN]
-        if not against or any(one.along for one in ways):
+        if not against or any(one.along or one.together > actuators.SURE for one in ways):
             continue
-        yield _sign(t, e, actuator, against)
+        yield _sign(t, e, actuator, against, _all_against(found, against))
 
 
-def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> Finding:
+def _all_against(found: Sequence[Driven], against: list[Driven]) -> bool:
+    """Whether every actuator that tells anything in these directions drives the other way: it may
+    then be the axes of the motion."""
+    directions = {one.direction for one in against}
+    told = [one for one in found if one.direction in directions and (one.along or one.against)]
+    return len({one.name for one in told}) > 1 and not any(one.along for one in told)
+
+
+def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whole: bool) -> Finding:
     line = _sign_line(actuator)
+    directions = [one.direction for one in against]
     if actuator.kind == "rudder":
-        what = f"The bow turns to port where the rudder {actuator.name} is positive"
-        sure = _sense(t, e)
-        also = "" if sure else "; or heading and yaw rate are counted to port"
+        what = f"The bow turns to port where {actuator.name} is positive"
     else:
-        ways = " and ".join(one.direction for one in against)
-        what = (
-            f"The {actuator.kind} {actuator.name} drives the other way than the profile has it "
-            f"({ways})"
-        )
-        also = ""
+        ways = " and ".join(directions)
+        what = f"{actuator.name} drives the other way than the profile has it ({ways})"
+    also = ""
+    if "yaw rate" in directions and not _sense(e):
+        also = "; or heading and yaw rate are counted to port"
+    elif whole and "yaw rate" not in directions:
+        also = "; or, as the others do so too, the heading is turned by 180 deg"
     best = max(against, key=lambda one: one.explained)
     sentence = (
         f"{what}: {100.0 * best.explained:.0f} % of the change follow it with the sign turned "
@@ -77,10 +95,9 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven]) -> F
     return of_voyage(t, actuator.name, (-1.0, None, None), "1", "sign", sentence)
 
 
-def _sense(t: Track, e: Evidence) -> bool:
+def _sense(e: Evidence) -> bool:
     """Whether the way over ground confirms to which side the heading turns."""
-    ways = (e.by_position, e.by_velocity)
-    return any(w is not None and w.how == "as it is" and w.sense for w in ways)
+    return any(w.how == "as it is" and w.sense for w in e.ways)
 
 
 def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
@@ -90,7 +107,7 @@ def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
         ways = {one.direction: one for one in by_name.get(actuator.name, [])}
         surge, yaw = ways.get("surge"), ways.get("yaw rate")
         if yaw is not None and yaw.against and (surge is None or not surge.against):
-            if surge is None or not surge.along or actuator.kind == "rudder":
+            if surge is None or not (surge.along or surge.together > actuators.SURE):
                 continue
             pair.append(actuator)
     sides = {math.copysign(1.0, one.position_m[1]) for one in pair if one.position_m[1] != 0.0}
@@ -112,7 +129,7 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     thrusts = actuators.thrust(t)
     if way is None or way.how != "as it is" or way.drift or not thrusts:
         return None
-    if way.half > 15.0 or actuators.can_push_sideways(t):
+    if way.half > 15.0 or way.spread < LEAST_SPREAD or actuators.can_push_sideways(t):
         return None
     share = _driven_share(t, [part[0] for part in thrusts.values()])
     if way.ahead and share < -MOSTLY:
@@ -196,6 +213,6 @@ def _abeam(t: Track, way: Way) -> Finding:
 
 
 def _sign_line(actuator: Actuator) -> str:
-    sign = actuator.sign if isinstance(actuator.sign, float) else actuator.sign[0]
+    sign = actuator.sign[0] if isinstance(actuator.sign, tuple) else actuator.sign
     text = f"{-sign:.1f}" if abs(sign) == 1.0 else f"{-sign:g}"
     return f'sign = {text} on the actuator "{actuator.name}"'

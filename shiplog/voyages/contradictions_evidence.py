@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from shiplog.channels import DEGREE
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
 from shiplog.voyages import contradictions_pairs as pairs
-from shiplog.voyages.contradictions_pairs import Joined
+from shiplog.voyages.contradictions_pairs import Joined, UnderWay
 from shiplog.voyages.contradictions_track import STEP_S, Track, degrees
 from shiplog.voyages.contradictions_words import offset_line, sign_line, words
 
+AS_GOOD = 1.5  # times what another formula leaves
 JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more, and they do not
 BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
@@ -19,8 +21,9 @@ LEAST_MIRRORED = 0.1  # share that the heading as it is leaves, and less: it is 
 ALONG_DEG = 45.0  # from the bow: the ship goes ahead
 NEAR_DEG = 8.0  # of 90 or 180 deg
 SURE_DEG = 12.0  # half interval of an angle that says anything
-FASTEST_CURRENT = 3.0  # m/s: what a stream may do, and a log through the water not see
+FASTEST_CURRENT = 4.0  # m/s: what a stream may do, and a log through the water not see
 SPREAD = 0.15  # of the directions sailed: no straight line
+LEAST_SPREAD = 0.03  # of a way that tells a mirror at all
 BENT = (0.4, 2.5)  # the way's turning over the heading's: they turn together
 NONE_OF_TWO = "no third channel tells which of the two"
 
@@ -58,6 +61,7 @@ class Evidence:
     faulty: channels that are, or may be, at fault."""
 
     t: Track
+    moved: UnderWay | None
     joined: Joined | None
     turned: Joined | None
     by_position: Way | None
@@ -78,7 +82,9 @@ class Evidence:
         """(channel at fault, why): that one which the heading does not confirm."""
 
         def confirms(way: Way | None) -> bool:
-            return way is not None and way.ahead and (way.sense or not mirrored)
+            if way is None or not way.ahead:
+                return False
+            return not mirrored or (way.sense and way.spread > LEAST_SPREAD)
 
         p, v = self.by_position, self.by_velocity
         if self.t.body:
@@ -149,21 +155,26 @@ def ending(culprit: str, why: str, lines: Sequence[str], two: tuple[str, str]) -
 
 def gather(t: Track) -> Evidence:
     """All pairs of one voyage."""
+    turned, moved = pairs.heading_and_yaw_rate(t), pairs.under_way(t)
+    if moved is None:
+        return Evidence(t, None, None, turned, None, None, None, None)
     by_rate = t.profile.sensors.yaw_rate is not None
+    ways = [_way(one) for one in pairs.heading_and_way(t, moved)]
     return Evidence(
         t,
-        pairs.position_and_velocity(t),
-        pairs.heading_and_yaw_rate(t),
-        _way(pairs.heading_and_way(t, True)),
-        None if t.body else _way(pairs.heading_and_way(t, False)),
-        pairs.bend(t, t.turned_by_rate) if by_rate else None,
-        pairs.bend(t, t.turned),
+        moved,
+        pairs.position_and_velocity(t, moved),
+        turned,
+        ways[0],
+        None if t.body else ways[1],
+        pairs.bend(t, moved, t.turned_by_rate) if by_rate else None,
+        pairs.bend(t, moved, t.turned),
     )
 
 
-def _way(j: Joined | None) -> Way | None:
+def _way(j: Joined) -> Way | None:
     """None where no formula joins heading and way, or several do: on one straight course."""
-    if j is None or "as it is" not in j.fits or "current" not in j.extra:
+    if "as it is" not in j.fits or "current" not in j.extra:
         return None
     left = j.left
     best = min(left, key=lambda name: left[name])
@@ -173,9 +184,10 @@ def _way(j: Joined | None) -> Way | None:
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
     _, angle, _, half = j.fits[best].polar()
-    drift = j.extra["current"] < FASTEST_CURRENT and (
-        j.extra["drifting"] < left[best] * (BETTER if best != "as it is" else 1.0 / BETTER)
+    drift = j.extra["current"] < FASTEST_CURRENT and j.extra["drifting"] < (
+        left[best] * (BETTER if best != "as it is" else AS_GOOD)
     )
+    drift &= abs(j.extra["angle"]) < ALONG_DEG * DEGREE or j.extra["half"] > ALONG_DEG * DEGREE
     return Way(best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift)
 
 

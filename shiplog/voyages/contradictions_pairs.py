@@ -17,6 +17,7 @@ yaw rate, from one window to the next: Δ arg Δp = k ∫r dt.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,6 +41,8 @@ CURRENT_SHARE = 0.7  # prior of a current, of the ship's speed
 DELAY_S = 1.0  # prior of a delay
 BIAS_RADPS, BIAS_SHARE = 0.3 * DEGREE, 0.1  # prior of a gyro's bias: rad/s, and of its rms
 RAD = 1.0 / DEGREE  # 57.3
+NATURAL = 0.15  # natural logarithm, and rad: of two that are about one
+PERFECT = 0.02  # unexplained share, and less: nothing is wrong
 TOGETHER = 0.7  # correlation from which the way is said to turn with the yaw rate
 MOST_LAG_S = 120  # longest delay that is looked for
 FIT_LAG_S = 5.0  # shorter ones are for the fit
@@ -67,6 +70,17 @@ class Joined:
         return {name: fit.left for name, fit in self.fits.items()}
 
 
+@dataclass(frozen=True)
+class UnderWay:
+    """Windows in which position or velocity moves, the change of both [w], and the speed below
+    which neither is said to move, m/s."""
+
+    windows: Windows
+    by_position: np.ndarray
+    by_velocity: np.ndarray
+    slowest: float
+
+
 def slowest(t: Track) -> float:
     """m/s: what is slower is at rest, drifts at a berth, or is lost in the steps of a receiver."""
     froude = SLOW_FROUDE * math.sqrt(GRAVITY * t.profile.ship.length_m)
@@ -74,44 +88,56 @@ def slowest(t: Track) -> float:
     return max(SLOW_MPS, min(froude, SLOW_MOST_MPS), steps)
 
 
-def under_way(t: Track) -> tuple[Windows, np.ndarray, np.ndarray] | None:
-    """Windows in which position or velocity moves, and the change of both."""
+def under_way(t: Track) -> UnderWay | None:
+    """At a length of window at which most of the time under way can be used; None where the ship
+    hardly moves."""
     least, floor = slowest(t), math.sqrt(2.0) * OVER_NOISE * noise(t.place, t.usable)
-    found: list[tuple[Windows, np.ndarray, np.ndarray]] = []
+    found = []
     for seconds in LENGTHS_S:
         w = t.windows(seconds)
         y, x = w.change(t.place), w.change(t.sailed)
         moves = np.maximum(np.abs(y), np.abs(x)) > max(floor, least * seconds)
-        found.append((w.chosen(moves), y[moves], x[moves]))
-    most = max(len(w.first) * w.seconds for w, _, _ in found)
+        found.append(UnderWay(w.chosen(moves), y[moves], x[moves], least))
+    lasts = [len(one.by_position) * one.windows.seconds for one in found]
     for fewest in (ENOUGH, FEWEST):
-        for one in found:
-            count = len(one[0].first)
-            if count >= fewest and count * one[0].seconds >= MOST_OF_THEM * most:
+        for one, last in zip(found, lasts, strict=True):
+            if len(one.by_position) >= fewest and last >= MOST_OF_THEM * max(lasts):
                 return one
-    return max((one for one in found if len(one[0].first) >= FEWEST),
-               key=lambda one: len(one[0].first) * one[0].seconds, default=None)  # fmt: skip
+    longest = [(last, i) for i, last in enumerate(lasts) if len(found[i].by_position) >= FEWEST]
+    return found[max(longest)[1]] if longest else None
+
+
+Sailed = tuple[np.ndarray, np.ndarray]  # X and ΔẊ [w] of a velocity
+
+
+def sailed(t: Track, w: Windows, velocity: np.ndarray) -> Sailed:
+    """Integral and change of a velocity over ground [n] over each window."""
+    return w.change(t.integral(velocity)), w.change(t.binned(velocity))
 
 
 def complex_fit(
-    t: Track, w: Windows, y: np.ndarray, velocity: np.ndarray, drift: bool, arm: float
+    t: Track, w: Windows, y: np.ndarray, x: Sailed, drift: bool, arm: float
 ) -> Regression | None:
-    """y = z X - τ ΔẊ + Δ(e^{iψ}) a + c T of a velocity Ẋ [n] over ground: z first. None where
-    that velocity is nothing."""
-    x, late = w.change(t.integral(velocity)), w.change(t.binned(velocity))
-    if not np.any(x):
+    """y = z X - τ ΔẊ + Δ(e^{iψ}) a + c T: z first, c last. None where that velocity is nothing."""
+    if not np.any(x[0]):
         return None
-    columns, prior = [x, 1j * x, late], [np.inf, np.inf, DELAY_S]
+    columns, prior = [x[0], 1j * x[0], x[1]], [np.inf, np.inf, DELAY_S]
     if arm > 0:
-        d = w.change(t.binned(t.ahead))
+        d = w.change(t.bow)
         columns += [d, 1j * d]
         prior += [arm, arm]
     if drift:
-        size = max(float(np.median(np.abs(y))), float(np.median(np.abs(x))))
+        size = max(float(np.median(np.abs(y))), float(np.median(np.abs(x[0]))))
         current = CURRENT_SHARE * size / w.seconds
         columns += [np.full(len(y), w.seconds + 0j), np.full(len(y), 1j * w.seconds)]
         prior += [current, current]
     return regress(y, columns, w.block, prior)
+
+
+def natural(fit: Regression) -> bool:
+    """Whether both sides are of about one size and direction."""
+    size, angle, _, _ = fit.polar()
+    return abs(math.log(size)) < NATURAL and abs(angle) < NATURAL
 
 
 def _spread(y: np.ndarray) -> float:
@@ -120,16 +146,20 @@ def _spread(y: np.ndarray) -> float:
     return 1.0 - float(np.abs(np.mean(direction)))
 
 
-def position_and_velocity(t: Track) -> Joined | None:
-    """None where the ship hardly moves."""
-    moved = under_way(t)
-    if moved is None:
-        return None
-    w, y, x = moved
-    length = t.profile.ship.length_m
+def position_and_velocity(t: Track, moved: UnderWay) -> Joined:
+    """Their formulas; the velocity as it is alone, where it leaves so little that no other one
+    could be said to be better."""
+    w, y, x = moved.windows, moved.by_position, moved.by_velocity
+    length, v = t.profile.ship.length_m, t.velocity
     arm = length * (ARM_LENGTHS if t.body or t.arm != 0 else ARM_SHARED)
-    v = t.velocity
-    tried: dict[str, np.ndarray] = {"as it is": t.over_ground, "mirrored": t.over_ground.conj()}
+    path = w.change(t.integral(np.abs(v)))
+    speeds = float(np.median(np.abs(y))) / w.seconds, float(np.median(path)) / w.seconds
+    spread = _spread(y if speeds[0] > 0 else x)
+    as_is = complex_fit(t, w, y, (x, w.change(t.binned(t.over_ground))), t.body, arm)
+    fits = {} if as_is is None else {"as it is": as_is}
+    if as_is is not None and as_is.left < PERFECT and natural(as_is):
+        return Joined(fits, len(y), w.seconds, spread, speeds)
+    tried: dict[str, np.ndarray] = {"mirrored": t.over_ground.conj()}
     if t.body:
         tried |= {
             "heading mirrored": v * t.ahead.conj(),
@@ -138,50 +168,41 @@ def position_and_velocity(t: Track) -> Joined | None:
         }
     elif t.profile.sensors.kind("velocity") == "sog_cog":
         tried["course in radians"] = np.abs(v) * np.exp(1j * RAD * np.angle(v))
-    fits = {
-        name: fit
-        for name, velocity in tried.items()
-        if (fit := complex_fit(t, w, y, velocity, t.body, arm)) is not None
-    }
-    if fit := regress(y, [x.imag + 0j, 1j * x.real], w.block, [np.inf] * 2):
-        fits["swapped"] = fit
-    path = w.change(t.integral(np.abs(v)))
-    speeds = float(np.median(np.abs(y))) / w.seconds, float(np.median(path)) / w.seconds
-    return Joined(fits, len(y), w.seconds, _spread(y if speeds[0] > 0 else x), speeds)
-
-
-def heading_and_way(t: Track, position: bool) -> Joined | None:
-    """The way over ground, of the position or the velocity, against ∫ |V| e^{iψ} dt."""
-    moved = under_way(t)
-    if moved is None or (not position and t.body):
-        return None
-    w, y, x = moved
-    way = y if position else x
-    speed = np.abs(t.velocity)
-    tried = {
-        "as it is": t.ahead,
-        "mirrored": t.ahead.conj(),
-        "in radians": np.exp(1j * RAD * t.heading),
-    }
-    fits = {}
-    for name, axis in tried.items():
-        fit = complex_fit(t, w, way, speed * axis, False, 0.0)
-        if fit is not None:
+    for name, velocity in tried.items():
+        if fit := complex_fit(t, w, y, sailed(t, w, velocity), t.body, arm):
             fits[name] = fit
-    extra = {}
-    drifting = complex_fit(t, w, way, speed * t.ahead, True, 0.0)
-    if drifting is not None:
-        extra = {"drifting": drifting.left, "current": float(np.hypot(*drifting.theta[-2:]))}
-    return Joined(fits, len(way), w.seconds, _spread(way), extra=extra)
+    if fit := regress(y, [np.imag(x) + 0j, 1j * np.real(x)], w.block, [np.inf] * 2):
+        fits["swapped"] = fit
+    return Joined(fits, len(y), w.seconds, spread, speeds)
 
 
-def bend(t: Track, turned_by: np.ndarray) -> tuple[float, float, float] | None:
+def heading_and_way(t: Track, moved: UnderWay) -> Iterator[Joined]:
+    """The way over ground of the position, and that of a velocity over ground, against
+    ∫ |V| e^{iψ} dt."""
+    w, speed = moved.windows, np.abs(t.velocity)
+    as_is = sailed(t, w, speed * t.ahead)
+    tried = {"as it is": as_is, "mirrored": sailed(t, w, speed * t.ahead.conj())}
+    radians: Sailed | None = None
+    for way in (moved.by_position,) if t.body else (moved.by_position, moved.by_velocity):
+        fits, extra = {}, {}
+        for name, x in tried.items():
+            if fit := complex_fit(t, w, way, x, False, 0.0):
+                fits[name] = fit
+        if "as it is" in fits and fits["as it is"].left > PERFECT:
+            radians = radians or sailed(t, w, speed * np.exp(1j * RAD * t.heading))
+            if fit := complex_fit(t, w, way, radians, False, 0.0):
+                fits["in radians"] = fit
+        if drifting := complex_fit(t, w, way, as_is, True, 0.0):
+            current = float(np.hypot(*drifting.theta[-2:]))
+            _, angle, _, half = drifting.polar()
+            extra = {"drifting": drifting.left, "current": current, "angle": angle, "half": half}
+        yield Joined(fits, len(way), w.seconds, _spread(way), extra=extra)
+
+
+def bend(t: Track, moved: UnderWay, turned_by: np.ndarray) -> tuple[float, float, float] | None:
     """k of Δ arg Δp = k Δψ with its 90 % interval, where the two go together; turned_by [B] rad:
     the heading, or the integral of the yaw rate."""
-    moved = under_way(t)
-    if moved is None:
-        return None
-    w, y, x = moved
+    w, y, x = moved.windows, moved.by_position, moved.by_velocity
     if np.median(np.abs(y)) < 0.1 * np.median(np.abs(x)):  # a position that stands still
         y = x
     next_to = np.flatnonzero(np.diff(w.first) == round(w.seconds))
@@ -234,8 +255,10 @@ def heading_and_yaw_rate(t: Track) -> Joined | None:
 
 
 def is_late(late: float, then: float, now: float) -> bool:
-    """Whether `lag` found a delay, and one that no fit looks for."""
-    return abs(late) > FIT_LAG_S and then > ALIKE and 1.0 - now > LESS_ALIKE * (1.0 - then)
+    """Whether `lag` found a delay, and one that no fit looks for. A swing of one period turned
+    round looks like half a period late: what is alike with another sign is not late."""
+    apart = 1.0 - abs(now) > LESS_ALIKE * (1.0 - then)
+    return abs(late) > FIT_LAG_S and then > ALIKE and apart
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> float:

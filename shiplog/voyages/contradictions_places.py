@@ -30,6 +30,7 @@ from shiplog.voyages.contradictions_pairs import Joined
 from shiplog.voyages.contradictions_regression import Regression
 from shiplog.voyages.contradictions_track import degrees
 from shiplog.voyages.contradictions_words import (
+    converted_twice,
     declared,
     offset_line,
     other_unit,
@@ -45,6 +46,8 @@ BODY_ANGLE_DEG = 20.0  # between position and velocity in body axes: less is a h
 MAGNETIC_DEG = 30.0  # variations at sea are smaller, nearly everywhere
 STANDS = 0.02  # of the other's speed: it does not move
 FOLLOWS = 0.15  # unexplained share, and more: a delay is looked for
+DRIFTS = 0.5  # of the ship's speed: a larger current is not to explain a sign away
+ABOUT = 1.5  # times what is left of the change: as good
 NOTHING = 1e-4  # |z|, and less: the position does not move at all
 TWO = ("velocity", "position")
 HEADINGS = ("heading mirrored", "heading in radians")  # formulas that a faulty heading excuses
@@ -53,10 +56,10 @@ HEADINGS = ("heading mirrored", "heading in radians")  # formulas that a faulty 
 def position_and_velocity(e: Evidence) -> Iterator[Finding]:
     """How they are joined, and how they should not be."""
     j = e.joined
-    if j is None:
+    if j is None or e.moved is None:
         return
     as_is = j.fits.get("as it is")
-    slow = pairs.slowest(e.t)
+    slow = e.moved.slowest
     if (still := _stands(e, j, slow)) is not None:
         yield still
         return
@@ -72,6 +75,12 @@ def position_and_velocity(e: Evidence) -> Iterator[Finding]:
         and as_is.left > BETTER * left[best]
         and as_is.left - left[best] > CLEARLY
     )
+    if e.t.body and not pairs.natural(as_is) and _drift(j, as_is) > DRIFTS:
+        plain = [name for name in left if name != "as it is" and _plain(j, name)]
+        best = min(plain, key=lambda name: left[name], default="")
+        if not best or left[best] > ABOUT * as_is.left + CLEARLY:
+            return
+        better = True
     if e.t.body and "heading" in e.faulty:
         if better and best in HEADINGS:
             yield from _ratio(e, j.fits[best])
@@ -86,6 +95,20 @@ def position_and_velocity(e: Evidence) -> Iterator[Finding]:
         yield from _angle(e, as_is)
     elif min(left.values()) > APART and min(j.speeds) > slow:
         yield _nothing_in_common(e, j)
+
+
+def _drift(j: Joined, fit: Regression) -> float:
+    """Of a velocity in body axes: the current that the fit needs, over the ship's speed."""
+    return float(np.hypot(*fit.theta[-2:])) / max(*j.speeds, 1e-6)
+
+
+def _plain(j: Joined, name: str) -> bool:
+    """Whether a formula needs no current, and no turn but by quarters."""
+    if name == "swapped":
+        return True
+    size, angle, _, _ = j.fits[name].polar()
+    quarter = abs(math.remainder(angle, 0.5 * math.pi)) < pairs.NATURAL
+    return quarter and abs(math.log(size)) < pairs.NATURAL and _drift(j, j.fits[name]) < DRIFTS
 
 
 def _stands(e: Evidence, j: Joined, slow: float) -> Finding | None:
@@ -137,6 +160,8 @@ def _ratio(e: Evidence, fit: Regression) -> Iterator[Finding]:
         for channel, unit in (("velocity", of_velocity), ("position", of_position))
         if unit and culprit in ("", channel)
     ]
+    if not lines and (twice := converted_twice(p, "velocity", ratio, low, high)):
+        lines = [twice]
     why = "a position on Earth has its scale" if culprit else NONE_OF_TWO
     sentence = (
         f"The velocity is {times(ratio)} times ({times(low)} to {times(high)}) what the position "

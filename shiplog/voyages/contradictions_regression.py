@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+OF_REAL, OF_COMPLEX = 1.4826, 0.8493  # standard deviation of a component over the median of |ε|
 HUBER = 2.0  # standard deviations
 TURNS = 6
 LEAST_NOISE = 1e-4  # of the size of y: numbers without noise are no instrument
 SPARE = 3  # windows and blocks beyond one a parameter
+MOST = 600  # windows: of more, every second or third is taken
 BLOCKS = 30  # at most: windows next to each other share a block
 NINETY = 0.95  # quantile of either end of a 90 % interval
 
@@ -62,6 +64,9 @@ def regress(
 ) -> Regression | None:
     """y [w], columns k of [w], block [w], prior k: one standard deviation about 0, inf where
     nothing is known. None where there are too few windows."""
+    if len(y) > MOST:
+        every = -(-len(y) // MOST)
+        y, columns, block = y[::every], [one[::every] for one in columns], block[::every]
     x = np.stack(columns, axis=1)
     count, k = x.shape
     names, block = _blocks(block)
@@ -71,22 +76,22 @@ def regress(
     size = float(np.sqrt(np.mean(np.abs(y) ** 2)))
     floor = max(LEAST_NOISE * size, 1e-12)
     sigma, weight = max(size, floor), np.ones(count)
+    typical = OF_COMPLEX if np.iscomplexobj(x) else OF_REAL
     theta = np.zeros(k)
     for _ in range(TURNS):
-        normal = np.real(np.einsum("wi,w,wj->ij", x.conj(), weight, x)) / sigma**2 + precision
-        score = np.real(np.einsum("wi,w,w->i", x.conj(), weight, y)) / sigma**2
+        weighted = (x * weight[:, None]).conj().T / sigma**2
+        normal, score = np.real(weighted @ x) + precision, np.real(weighted @ y)
         try:
             theta = np.linalg.solve(normal, score)
         except np.linalg.LinAlgError:
             return None
         away = np.abs(y - x @ theta)
-        sigma = max(float(1.4826 * np.median(away)), floor)
+        sigma = max(typical * float(np.median(away)), floor)
         weight = np.minimum(1.0, HUBER * sigma / np.maximum(away, 1e-15))
     e = y - x @ theta
     try:
-        inverse = np.linalg.inv(
-            np.real(np.einsum("wi,w,wj->ij", x.conj(), weight, x)) / sigma**2 + precision
-        )
+        normal = np.real((x * weight[:, None]).conj().T @ x) / sigma**2 + precision
+        inverse = np.linalg.inv(normal)
     except np.linalg.LinAlgError:
         return None
     scores = np.real(x.conj() * (weight * e)[:, None]) / sigma**2
@@ -98,8 +103,7 @@ def regress(
         return None
     larger = np.sqrt(np.maximum(1.0, alone / np.maximum(np.diag(cov), 1e-300)))
     cov = larger[:, None] * cov * larger[None, :]
-    typical = float(np.median(np.abs(y)))
-    left = float(np.median(np.abs(e))) / max(typical, 1e-12)
+    left = float(np.median(np.abs(e))) / max(float(np.median(np.abs(y))), 1e-12)
     return Regression(theta, cov, left, float(stdtrit(max(names - k, 2), NINETY)), names)
 
 

@@ -24,6 +24,8 @@ from shiplog.voyages.resampling import RATE_HZ
 
 STEP_S = 1.0 / RATE_HZ
 ROWS = int(RATE_HZ)  # rows of a bin
+MEAN = np.full(ROWS, 1.0 / ROWS)
+SO_FAR = np.arange(ROWS, 0, -1) / ROWS  # mean over a second of the sum up to each row
 LEAST_ROWS = 5  # measured rows of a bin; the others lie on a straight line between measured ones
 LEAST_BINS = 0.8  # share of a window's bins
 DOUBTFUL = Quality.SPIKE | Quality.FROZEN  # marks of a row that some channel's value is no data
@@ -75,13 +77,17 @@ class Track:
 
     def binned(self, rows: np.ndarray) -> np.ndarray:
         """[n] → the mean of each second [B]."""
-        return rows[: self.bins * ROWS].reshape(-1, ROWS).mean(axis=1)
+        return rows[: self.bins * ROWS].reshape(-1, ROWS) @ MEAN
 
     def integral(self, rate: np.ndarray) -> np.ndarray:
-        """[n] → the mean of its integral over each second [B], by the trapezoidal rule."""
-        total = np.zeros_like(rate)
-        np.cumsum(0.5 * STEP_S * (rate[1:] + rate[:-1]), out=total[1:])
-        return self.binned(total)
+        """[n] → the mean of its integral over each second [B], by the trapezoidal rule.
+
+        The integral at row j is Δt (Σ_{i≤j} r_i - (r_0 + r_j)/2); of its mean over a second, the
+        sum up to that second is one number, and the rest a weighted sum of the second's rows."""
+        seconds = rate[: self.bins * ROWS].reshape(-1, ROWS)
+        sums, inside = (seconds @ np.stack((np.ones(ROWS), SO_FAR - 0.5 * MEAN), axis=1)).T
+        before = np.cumsum(sums) - sums
+        return STEP_S * (before + inside - 0.5 * rate[0])
 
     @cached_property
     def usable(self) -> np.ndarray:
@@ -92,6 +98,11 @@ class Track:
     def ahead(self) -> np.ndarray:
         """e^{iψ} [n]."""
         return np.cos(self.heading) + 1j * np.sin(self.heading)
+
+    @cached_property
+    def bow(self) -> np.ndarray:
+        """e^{iψ} [B]."""
+        return self.binned(self.ahead)
 
     @cached_property
     def turned(self) -> np.ndarray:
@@ -120,13 +131,18 @@ class Track:
         """Integral of the velocity over ground [B], m."""
         return self.integral(self.over_ground)
 
+    @cached_property
+    def _so_far(self) -> tuple[np.ndarray, np.ndarray]:
+        """Usable bins, and bins with a jump, before each bin [B + 1]."""
+        jumps = self.binned(self.jump.astype(float)) > 0.0
+        usable, jumped = (np.concatenate(([0], np.cumsum(one))) for one in (self.usable, jumps))
+        return usable, jumped
+
     def windows(self, seconds: int) -> Windows:
         """One after another, `seconds` long, without a jump and nearly whole."""
         first = np.arange(0, self.bins - seconds, seconds)
         last = first + seconds
-        known = np.concatenate(([0], np.cumsum(self.usable)))
-        jumps = self.jump[: self.bins * ROWS].reshape(-1, ROWS).any(axis=1)
-        jumped = np.concatenate(([0], np.cumsum(jumps)))
+        known, jumped = self._so_far
         good = self.usable[first] & self.usable[last]
         good &= known[last + 1] - known[first] >= LEAST_BINS * (seconds + 1)
         good &= jumped[last + 1] == jumped[first + 1]

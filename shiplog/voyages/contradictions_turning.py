@@ -22,6 +22,7 @@ from shiplog.voyages.contradictions_evidence import (
 from shiplog.voyages.contradictions_regression import Regression
 from shiplog.voyages.contradictions_track import ROWS, STEP_S
 from shiplog.voyages.contradictions_words import (
+    converted_twice,
     declared,
     other_unit,
     sign_line,
@@ -32,11 +33,12 @@ from shiplog.voyages.contradictions_words import (
 
 RATE_RATIO = math.log(1.4)  # of yaw rate and heading; nearer ratios are for the fit
 TURNING, UNRELATED = 0.6, 0.3  # correlation of yaw rate and heading: together, and not at all
+SLOPE_HALVES = 4.0  # half intervals from zero, for a ratio that is far from one
 STANDS = 0.3  # slope of one that stands still over the other, at most
 DRIFTS_RAD = math.radians(30.0)  # a gyro that drifts may add up to less in a voyage
 TWO = ("yaw_rate", "heading")
 STILL_S, STILL_WAY_DEG = 60.0, 25.0  # a heading that never changes for so long, while the way does
-MIRRORED_WINDOWS, MIRRORED_LEFT = 20, 0.2  # of a heading that only the way speaks against
+MIRRORED_WINDOWS, MIRRORED_LEFT = 20, 0.25  # of a heading that only the way speaks against
 
 
 def heading_and_rate(e: Evidence) -> Iterator[Finding]:
@@ -58,18 +60,29 @@ def heading_and_rate(e: Evidence) -> Iterator[Finding]:
         ends = sorted(math.log(abs(one)) for one in (low, high))
         if low < 0 or ends[0] > RATE_RATIO or ends[1] < -RATE_RATIO:
             yield _ratio(e, value, low, high)
+    elif by_heading <= few and by_rate >= enough and _known(back):
+        value, low, high = (1.0 / one for one in back.interval(0))
+        yield _ratio(e, value, *sorted((low, high)))
     elif by_heading <= few and by_rate >= enough:
         most = max(abs(one) for one in back.interval(0)[1:])
         if most < STANDS and (
             e.bent_by_rate is not None or np.ptp(e.t.turned_by_rate) > DRIFTS_RAD
         ):
             yield _stands(e, "heading", "yaw_rate", 1.0 / max(most, 1e-3))
+    elif by_rate <= few and by_heading >= enough and _known(rate):
+        yield _ratio(e, *rate.interval(0))
     elif by_rate <= few and by_heading >= enough:
         most = max(abs(one) for one in rate.interval(0)[1:])
         if most < STANDS:
             yield _stands(e, "yaw_rate", "heading", 1.0 / max(most, 1e-3))
     elif min(by_heading, by_rate) >= enough and abs(together) < UNRELATED:
         yield _unrelated(e, together)
+
+
+def _known(slope: Regression) -> bool:
+    """Whether a small slope is known well, and is not one of things that are alike."""
+    value, low, high = slope.interval(0)
+    return abs(value) > SLOPE_HALVES * 0.5 * (high - low) and abs(value) < STANDS
 
 
 def _hull(rate: Regression, back: Regression) -> tuple[float, float, float]:
@@ -116,14 +129,20 @@ def _ratio(e: Evidence, value: float, low: float, high: float) -> Finding:
 def _unit_lines(e: Evidence, culprit: str, ratio: float, size: list[float]) -> list[str]:
     """What to change where the ratio is that of two units."""
     p = e.profile
-    found = {"yaw_rate": other_unit(p, "yaw_rate", ratio, *size)}
+    found = {"yaw_rate": other_unit(p, "yaw_rate", ratio, size[0], size[1])}
     if angle_heading(p):
         found["heading"] = other_unit(p, "heading", 1.0 / ratio, 1.0 / size[1], 1.0 / size[0])
     return [
         f"{unit_line(p, channel, unit)}, the factor of {unit} read as {declared(p, channel)}"
         for channel, unit in found.items()
         if unit and culprit in ("", channel)
-    ]
+    ] or [twice for twice in (_twice(e, culprit, ratio, size),) if twice]
+
+
+def _twice(e: Evidence, culprit: str, ratio: float, size: list[float]) -> str | None:
+    if culprit == "heading":
+        return None
+    return converted_twice(e.profile, "yaw_rate", ratio, size[0], size[1])
 
 
 def _zero_of_mirrored(e: Evidence) -> float:

@@ -54,6 +54,33 @@ def other_unit(
     return None if same or abs(off) > max(NEAR, min(wide, 0.2)) else found
 
 
+def converted_twice(
+    profile: Profile, name: str, stored_over_true: float, low: float, high: float, index: int = 0
+) -> str | None:
+    """A factor on the channel, where the ratio is that of two units other than the profile's: the
+    recorder converted what was converted already, or the wrong way."""
+    measure = units.measure(declared(profile, name, index))
+    if measure is None or stored_over_true <= 0:
+        return None
+    known = {one: units.TO_SI[one] for one in units.MEASURES[measure]} | OTHER_UNITS.get(
+        measure, {}
+    )
+    wide = min(0.5 * abs(math.log(high / low)), 0.05) if 0 < low < high else 0.0
+    pairs = [
+        (abs(math.log(known[a] / known[b] / stored_over_true)), a, b)
+        for a in known for b in known if abs(math.log(known[a] / known[b])) > LEAST_APART
+    ]  # fmt: skip
+    off, a, b = min(pairs)
+    if off > max(0.5 * NEAR, wide):
+        return None
+    sensor = sensor_of(profile, name)
+    others = sensor.sign[index] if isinstance(sensor.sign, tuple) else sensor.sign
+    whole = name != "velocity" or profile.sensors.kind(name) != "sog_cog"
+    text = f"{others / stored_over_true:.4g}"
+    factor = text if whole else _each(sensor, index, text, "1.0")
+    return f"sign = {factor} on [sensors.{name}], the factor between {a} and {b}"
+
+
 def unit_line(profile: Profile, name: str, unit: str, index: int = 0) -> str:
     """The key and its value, such as `units = ["kn", "deg"] on [sensors.velocity]`."""
     sensor = sensor_of(profile, name)

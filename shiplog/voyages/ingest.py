@@ -38,7 +38,7 @@ from shiplog.voyages import (
 from shiplog.voyages import one_hertz as tables
 from shiplog.voyages import plausible_values as plausible
 from shiplog.voyages.comparison import Comparison, compare
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 from shiplog.voyages.voyage_grid import VoyageGrid, mark_gaps, mark_holds, mark_jumps
 
 RESOLVED = {  # of a sensor: the channel whose unit its resolution has

@@ -22,7 +22,7 @@ from shiplog.voyages import instrument_faults as faults
 from shiplog.voyages.comparison import Comparison, compare
 from shiplog.voyages.ingest import Voyage, usable
 from shiplog.voyages.recording import Record
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 
 STATE_NAMES = [c.name for c in channels.STATE]
 SENSOR_COLUMNS = {"yaw_rate": [5], "position": [0, 2], "velocity": [1, 3]}  # in STATE_NAMES

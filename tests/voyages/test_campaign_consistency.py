@@ -11,7 +11,7 @@ from shiplog.voyages import campaign_consistency, contradictions, sensor_consist
 from shiplog.voyages.campaign_consistency import campaign, deviates, seasons, together
 from shiplog.voyages.contradictions import Contradictions
 from shiplog.voyages.ingest import ingest
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.sensor_findings import Estimate
 from shiplog.voyages.store import Store
 
 DAY = 86_400.0

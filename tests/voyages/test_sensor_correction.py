@@ -1,6 +1,7 @@
 """What is certain is put right by what was hidden, reported, and undone by ingesting again."""
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -11,10 +12,12 @@ from test_sensor_consistency import BODY, DEGREE, VECTWIN, in_body_axes
 
 from pipelines.experiments.simulated_ship import Effects, Wind, cases, sail, write_voyage
 from shiplog.channels import UNUSABLE, Quality
+from shiplog.logs.health_report import VoyageReport
 from shiplog.voyages import one_hertz, sensor_consistency
-from shiplog.voyages.ingest import ingest, usable
-from shiplog.voyages.sensor_consistency import Estimate
+from shiplog.voyages.comparison import compare
+from shiplog.voyages.ingest import Voyage, ingest, usable
 from shiplog.voyages.sensor_correction import corrected, put_right
+from shiplog.voyages.sensor_findings import Estimate
 from shiplog.voyages.store import Store
 
 
@@ -228,3 +231,87 @@ def test_check_says_what_ingest_says_and_stores_nothing(log, tmp_path, monkeypat
     assert len(parities(taken)) == 3
     assert parities(checked) == parities(taken)
     assert checked["rows"] == 0
+
+
+def voyage_of(table, profile=BODY):
+    """As ingest leaves it, of a table that no log was made for."""
+    start = datetime(2026, 5, 1, tzinfo=UTC)
+    stamps = [start + timedelta(milliseconds=100 * i) for i in range(table.height)]
+    others = [pl.lit(0.0).alias(n) for n in (*profile.actuator_names, *profile.wind_names)]
+    table = table.with_columns(time=pl.Series(stamps).cast(pl.Datetime("ns", "UTC")))
+    table = table.with_columns(others)
+    compared = compare(table, profile)
+    report = VoyageReport("v", 1, 0, table.height, 1.0, compared.findings)
+    return Voyage("v", profile, None, table, report, None, compared.estimates)
+
+
+def estimate(kind, channel, value, half, none=0.0, unit="1"):
+    return Estimate(kind, channel, value, value - half, value + half, none, 0.005, unit)
+
+
+@pytest.mark.parametrize(
+    ("one", "certain"),
+    [
+        (estimate("velocity_scale", "velocity", 1.04, 0.002, 1.0), True),
+        (estimate("velocity_scale", "velocity", 1.944, 0.002, 1.0), False),  # knots
+        (estimate("velocity_scale", "velocity", 0.5144, 0.002, 1.0), False),
+        (estimate("velocity_scale", "velocity", 1.151, 0.002, 1.0), False),  # knots and mph
+        (estimate("yaw_rate_scale", "yaw_rate", 0.1, 0.02, 1.0), False),  # the search's limit
+        (estimate("yaw_rate_scale", "yaw_rate", 1.08, 0.005, 1.0), True),
+        (estimate("clock_offset", "position", 1.0, 0.02, unit="s"), True),
+        (estimate("clock_offset", "position", 4.79, 0.02, unit="s"), False),
+    ],
+)
+def test_a_limit_or_a_unit_in_the_interval_is_a_question(one, certain):
+    assert one.notable
+    assert one.certain is certain and one.question is not certain
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda t: t.with_columns(pl.col("yaw_rate") / 60.0),  # deg/s called deg/min
+        lambda t: t.with_columns(
+            ((pl.col("heading").degrees() % 360.0 + np.pi) % (2 * np.pi) - np.pi).alias("heading")
+        ),  # degrees called radians
+        lambda t: t.with_columns(-pl.col("yaw_rate")),
+        lambda t: t.with_columns(pl.col("surge", "sway") * 1.944),
+    ],
+    ids=["deg/min", "heading rad", "sign", "knots"],
+)
+def test_of_a_channel_that_contradicts_nothing_is_corrected(wrong):
+    voyage = voyage_of(wrong(in_body_axes(3, seconds=500.0)))
+    after = corrected(voyage)
+    assert voyage.report.contradictions
+    assert {e.channel for e in after.corrected} == set()
+    assert after.table.equals(voyage.table)
+    assert "Corrected." not in " ".join(f.sentence for f in after.report.findings)
+
+
+def test_a_correction_that_makes_it_no_better_is_undone_and_that_is_said():
+    voyage = voyage_of(in_body_axes(1, seconds=500.0, speed_scale=0.04))
+    (scale,) = [e for e in voyage.estimates if e.certain]
+    assert scale.kind == "velocity_scale"
+    turned = replace(scale, value=0.9, low=0.899, high=0.901)  # the wrong way
+    after = corrected(replace(voyage, estimates=(turned,)))
+    assert after.corrected == () and after.table.equals(voyage.table)
+    (said,) = [f.sentence for f in after.report.findings if f.kind == "velocity_scale"]
+    assert said.endswith("Not corrected: the comparison is no better afterwards.")
+
+
+def test_a_correction_after_which_two_contradict_is_undone():
+    voyage = voyage_of(in_body_axes(1, seconds=500.0, speed_scale=0.04))
+    (scale,) = [e for e in voyage.estimates if e.certain]
+    wild = replace(scale, value=0.6, low=0.599, high=0.601)
+    after = corrected(replace(voyage, estimates=(wild,)))
+    assert after.corrected == () and after.table.equals(voyage.table)
+    (said,) = [f.sentence for f in after.report.findings if f.kind == "velocity_scale"]
+    assert "Not corrected: afterwards two channels contradict each other" in said
+
+
+def test_what_is_certain_is_corrected_all_the_same():
+    voyage = voyage_of(in_body_axes(1, seconds=500.0, speed_scale=0.04))
+    after = corrected(voyage)
+    assert [e.kind for e in after.corrected] == ["velocity_scale"]
+    (said,) = [f.sentence for f in after.report.findings if f.kind == "velocity_scale"]
+    assert said.endswith(" Corrected.")
