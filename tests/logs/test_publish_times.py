@@ -43,17 +43,3 @@ def test_a_publisher_whose_clock_is_off_is_still_reported(off):
     assert faults.of_publishers(published)
     found = faults.clocks({"/gyro": published})
     assert {round(abs(f.value or 0.0)) for f in found} == {abs(off) // SECOND}
-
-
-def test_what_convert_found_is_read_back_and_what_others_wrote_is_not():
-    found = [Finding("wrapped", "log", "It began anew.", value=2.0, unit="times")]
-    channels = {"/a": faults.as_metadata(found), "/b": {}, "/c": faults.as_metadata([])}
-    assert faults.noted(channels) == found
-    for text in (
-        "",
-        "7",
-        "[1]",
-        '[{"kind": "x"}]',
-        '[{"kind": "no", "channel": "a", "sentence": "b"}]',
-    ):
-        assert faults.noted({"/a": {faults.NOTED: text}}) == []

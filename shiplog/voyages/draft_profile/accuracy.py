@@ -62,7 +62,7 @@ def _metric(kind: str, raw: np.ndarray) -> np.ndarray:
     if kind in POLAR:
         return frames.earth_velocity(raw[:, 0], raw[:, 1])
     if kind.startswith("quaternion"):
-        raw = frames.quaternion_heading(raw[:, 0], raw[:, 1], kind == "quaternion_enu")[:, None]
+        raw = quaternion_heading(raw, kind)[:, None]
     if kind == "angle" or kind.startswith("quaternion"):
         return np.unwrap(raw, axis=0)
     return raw
