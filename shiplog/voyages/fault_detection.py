@@ -24,6 +24,7 @@ FEWEST_CHANGES = 3  # a value is come to, on the average, where fewer values tha
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
 NEXT = 7  # changes on one side of a run of repeats that show in what steps it counts there
 MANY = 6.5  # steps: numbers so much larger are near whole multiples of anything
+EXACT = 1e-3  # of a step: as near as numbers that were rounded to steps are to whole ones
 EVEN, MOST_EVEN = 0.3, 0.8  # of a step, and of the samples: values that a motion spaces evenly
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
@@ -163,6 +164,10 @@ def steps_around(value: np.ndarray, runs: list[tuple[int, int]]) -> np.ndarray:
 def _even_motion(column: np.ndarray, step: float) -> bool:
     """Whether values are a step apart since the ship went as far from each sample to the next."""
     gone = np.abs(np.diff(column)) / step
+    exact = float(np.mean(np.abs(gone - np.round(gone)) < EXACT)) > MOST_ON_LATTICE
+    others = float(np.mean(np.round(gone) != 1.0))
+    if exact and others > 1.0 - MOST_ON_LATTICE:  # no motion is as even as that
+        return False
     return float(np.mean(np.abs(gone - 1.0) < EVEN)) > MOST_EVEN
 
 
