@@ -24,6 +24,7 @@ FEWEST_CHANGES = 3  # a value is come to, on the average, where fewer values tha
 LATTICE = 0.05  # of a step: how far a difference may be from a whole number of steps
 NEXT = 7  # changes on one side of a run of repeats that show in what steps it counts there
 MANY = 6.5  # steps: numbers so much larger are near whole multiples of anything
+EXACT = 1e-3  # of a step: as near as numbers that were rounded to steps are to whole ones
 EVEN, MOST_EVEN = 0.3, 0.8  # of a step, and of the samples: values that a motion spaces evenly
 MOST_ON_LATTICE = 0.95  # share of the differences; by chance it would be a tenth
 RARE_CHANCE = 1e-6  # chance below which a run of repeats is no accident of a coarse resolution
@@ -163,6 +164,10 @@ def steps_around(value: np.ndarray, runs: list[tuple[int, int]]) -> np.ndarray:
 def _even_motion(column: np.ndarray, step: float) -> bool:
     """Whether values are a step apart since the ship went as far from each sample to the next."""
     gone = np.abs(np.diff(column)) / step
+    exact = float(np.mean(np.abs(gone - np.round(gone)) < EXACT)) > MOST_ON_LATTICE
+    others = float(np.mean(np.round(gone) != 1.0))
+    if exact and others > 1.0 - MOST_ON_LATTICE:  # no motion is as even as that
+        return False
     return float(np.mean(np.abs(gone - 1.0) < EVEN)) > MOST_EVEN
 
 
@@ -279,6 +284,7 @@ def jumps(
     noise: float,
     every_rows: int = 1,
     period: float | None = None,
+    lively: bool = False,
 ) -> list[tuple[int, float]]:
     """Rows whose step since the last usable row is not what the rate says, and by how much.
 
@@ -286,9 +292,10 @@ def jumps(
     `every_rows` apart where none is missing; period: what a full turn is of a channel that turns.
     The step is compared over everything since the last usable row, so that a value held for a
     while and then caught up is no jump; over a gap the rate is interpolated, and half of that
-    travel is allowed as error. Elsewhere it is SAME_TRAVEL, and what the rate changes by within
-    LATE_S, by which sensors may differ in time: a ship that lay still for most of the record makes
-    errors typical that are none of its motion.
+    travel is allowed as error. lively: of a whole record, in which a ship may lie still for most,
+    so that the typical error is none of its motion. Then SAME_TRAVEL of every step is allowed, and
+    what the rate changes by within LATE_S, by which sensors may differ in time; and a jump stands
+    out of the errors around it, as a spike does.
     """
     step = STEP_NS * 1e-9
     rows = np.flatnonzero(usable)
@@ -304,12 +311,14 @@ def jumps(
     error = np.linalg.norm(beyond, axis=1)
     travel = np.linalg.norm(np.diff(expected[rows], axis=0), axis=1)
     limit = max(12.0 * 1.4826 * float(np.median(error)), 8.0 * noise)
-    share = np.where(np.diff(rows) > 1.5 * every_rows, 0.5, SAME_TRAVEL)
     late = 2 * round(LATE_S / step) + 1
     changes = maximum_filter1d(known, late, axis=0) - minimum_filter1d(known, late, axis=0)
     lag = np.linalg.norm(changes[rows[1:]], axis=1) * np.diff(rows) * step
-    found = np.flatnonzero(error > limit + share * travel + lag)
-    found = found[error[found] > LOUDER * _usual_steps(error, found)]
+    usual = SAME_TRAVEL * travel + lag if lively else 0.0
+    gap = np.where(np.diff(rows) > 1.5 * every_rows, 0.5 * travel, 0.0)
+    found = np.flatnonzero(error > limit + np.maximum(gap, usual))
+    if lively:
+        found = found[error[found] > LOUDER * _usual_steps(error, found)]
     return [(int(rows[i + 1]), float(error[i])) for i in found]
 
 

@@ -168,7 +168,7 @@ def _jumps(
     every = max(round(samples.period_s / STEP_S), 1)
     if every > 1:
         usable &= samples.nearest_rows(grid.times)
-    found = fault_detection.jumps(gone, rate, usable, samples.noise, every, period)
+    found = fault_detection.jumps(gone, rate, usable, samples.noise, every, period, lively=True)
     at = np.searchsorted(samples.time, grid.times[[row for row, _ in found]])
     counted = fault_detection.steps_around(samples.value, [(int(i), int(i)) for i in at])
     return [

@@ -8,6 +8,7 @@ import numpy as np
 
 from shiplog import frames, units
 from shiplog.voyages import fault_detection, noise_estimate
+from shiplog.voyages.draft_profile.motion import quaternion_heading
 from shiplog.voyages.sample_faults import POLAR, RATES
 
 METRE = 111_320.0  # m, a degree of latitude, near enough for an accuracy

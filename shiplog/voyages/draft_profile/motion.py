@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shiplog import units
+from shiplog import frames, units
 
 SPAN_S = 3.0  # s: a way shorter than that is noise, a longer one no straight line
 SPAN_PERIODS = 3.0  # of the position, whichever is longer
@@ -27,6 +27,15 @@ TURNS = 0.6  # correlation of a rate and a turn: with less, the sign is not show
 SPEEDS = ("m/s", "kn", "km/h", "cm/s", "mm/s")
 TURNING = ("deg/s", "rad/s", "deg/min")
 ANGLES = {"deg": 1.0, "rad": 1.0, "cdeg": 0.01}  # and the factor that goes with it
+
+AHEAD = np.array([1.0, 0.0, 0.0])  # the sensor's axis that points to the bow
+
+
+def quaternion_heading(raw: np.ndarray, kind: str) -> np.ndarray:
+    """Heading [n] of a sensor that is mounted level, rad: raw [n, 4] (x, y, z, w) or [n, 2]."""
+    level = np.zeros((len(raw), 4 - raw.shape[1]))  # of z and w alone
+    ahead = frames.turned(np.concatenate((level, raw), axis=1), AHEAD)
+    return frames.quaternion_heading(ahead, kind == "quaternion_enu")
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shiplog import frames, units
-from shiplog.voyages.draft_profile.motion import Motion
+from shiplog import units
+from shiplog.voyages.draft_profile.motion import Motion, quaternion_heading
 
 METRE = 111_320.0  # m, a degree of latitude
 FULL_TURN_RAD = 6.3  # an angle that never passes it, of a ship that turns, may be in radians
 TURNED = 0.2  # of an angle's values, the range from the 5 % to the 95 % quantile: rad or deg
 NOTHING = np.zeros(0)
 Columns = Callable[[str], np.ndarray]  # a field's name to its numbers
-
-AHEAD = np.array([1.0, 0.0, 0.0])  # the sensor's axis that points to the bow
 
 
 @dataclass(frozen=True)
@@ -50,9 +48,7 @@ class Agreement:
     def heading(self, found: Fields, unit: str, factor: float) -> None:
         """Where the bow pointed."""
         if found.kind.startswith("quaternion"):
-            level = np.zeros((len(found.raw), 4 - found.raw.shape[1]))  # of z and w alone
-            ahead = frames.turned(np.concatenate((level, found.raw), axis=1), AHEAD)
-            angle = frames.quaternion_heading(ahead, found.kind == "quaternion_enu")
+            angle = quaternion_heading(found.raw, found.kind)
         else:
             angle = found.raw[:, 0] * factor * units.factor(unit)
         self.motion = replace(self.motion, heading_time=found.time, heading=angle)
