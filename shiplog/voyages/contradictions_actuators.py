@@ -133,7 +133,8 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             small &= np.abs(t.driven[name]) < LARGEST_RUDDER
         ahead, astern = u > AHEAD * speed, u < -AHEAD * speed
         least = SHIP_TIMES * length / max(float(np.median(speed)), 1e-6)
-        if np.ptp(np.quantile(t.turned[t.usable], (0.05, 0.95))) > LEAST_TURN_RAD:
+        turned = t.turned[t.usable]
+        if len(turned) and np.ptp(np.quantile(turned, (0.05, 0.95))) > LEAST_TURN_RAD:
             mostly = (ahead & small).sum() >= (astern & small).sum()
             where = (ahead if mostly else astern) & small
             way = "yaw rate" if mostly else ASTERN

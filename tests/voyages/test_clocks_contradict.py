@@ -99,7 +99,7 @@ def test_check_says_what_ingest_says(tmp_path):
     profile = sailing.profile()
     path = sailing.write(tmp_path / "turn.mcap", moved(3600.0, GNSS))
     found = ingesting.consistency_of(read(path, profile.wanted(), others=True), profile, {})
-    assert [f.kind for f in found][:1] == ["contradiction"]
+    assert [f.kind for f in found.findings][:1] == ["contradiction"]
 
 
 @pytest.mark.parametrize(
