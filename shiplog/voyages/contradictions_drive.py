@@ -88,10 +88,14 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whol
     elif whole and "yaw rate" not in directions:
         also = "; or, as the others do so too, the heading is turned by 180 deg"
     best = max(against, key=lambda one: one.explained)
-    sentence = (
-        f"{what}: {100.0 * best.explained:.0f} % of the change follow it with the sign turned "
-        f"round, in {best.windows} windows{also}. Change: {line}."
-    )
+    along, turned = (math.degrees(one) for one in max(one.turned for one in against))
+    shown = f"{turned:.0f} deg against it while it is held, {along:.0f} deg with it"
+    if best.windows:
+        share = f"{100.0 * best.explained:.0f} %"
+        shown = (
+            f"{share} of the change follow it with the sign turned round, in {best.windows} windows"
+        )
+    sentence = f"{what}: {shown}{also}. Change: {line}."
     return of_voyage(t, actuator.name, (-1.0, None, None), "1", "sign", sentence)
 
 
