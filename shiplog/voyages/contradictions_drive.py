@@ -131,14 +131,14 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     may set."""
     way = e.by_position or e.by_velocity
     thrusts = actuators.thrust(t)
-    if way is None or way.how != "as it is" or way.drift or not thrusts:
+    if way is None or way.how != "as it is" or not thrusts:
         return None
     if way.half > 15.0 or way.spread < LEAST_SPREAD or actuators.can_push_sideways(t):
         return None
     share = _driven_share(t, [part[0] for part in thrusts.values()])
-    if way.ahead and share < -MOSTLY:
+    if way.ahead and way.fixed and share < -MOSTLY:
         return _driven_astern(t, way)
-    if share < MOSTLY:
+    if share < MOSTLY or way.drift:
         return None
     if abs(way.angle) > 180.0 - ALONG_DEG:
         return _reversed(t, way, found)
