@@ -22,11 +22,11 @@ import numpy as np
 
 from shiplog.profile import Actuator
 from shiplog.voyages.contradictions_regression import regress
-from shiplog.voyages.contradictions_track import ROWS, Track, Windows
+from shiplog.voyages.contradictions_track import ROWS, STEP_S, Track, Windows
 
 LENGTHS_S = (2, 4, 8, 16, 32, 64)
 ASTERN = "yaw rate astern"  # of a rudder, where the ship only goes astern
-SHIP_TIMES = 0.8  # L/U: a rudder is counted over no shorter windows, in which waves turn the ship
+SHIP_TIMES = 0.6  # L/U: a rudder is counted over no shorter windows, in which waves turn the ship
 LEAST_TURN_RAD = math.radians(15.0)  # range of headings, and less: it keeps its course
 FEWEST = 14  # windows in which an actuator works
 SURE = 3.0  # half 90 % intervals that a coefficient is from zero: five standard deviations
@@ -35,6 +35,8 @@ LARGEST_RUDDER = math.radians(46.0)  # beyond it a rudder deflects a jet, and do
 AHEAD = 0.5  # cosine of the angle between the way and the bow, and more: the ship goes ahead
 WORKS = 0.15  # of its largest value: an actuator that is moved at all
 LATERAL = 0.5  # sine of a direction, and more: the thruster pushes sideways
+HELD_RAD, HELD_LENGTHS = math.radians(5.0), 2.0  # a rudder that is put over, and for how long
+CIRCLES_RAD, FEW_TURNS = math.pi, 0.1  # turned in all, and the share that may go the other way
 OPPOSED = -0.9  # correlation of two rudders that always move against each other
 LOOSE = 100.0  # prior of a coefficient, of the change: of two that are one nothing is known
 LEAST_ARM = 0.02  # lever, of the ship's length: less turns nothing
@@ -54,12 +56,17 @@ class Driven:
     explained: float
     windows: int
     opposed: bool  # it moves against one of its kind that drives the right way
+    turned: tuple[float, float] = (0.0, 0.0)  # rad, with a rudder that is held, and against it
 
     @property
     def against(self) -> bool:
-        """It drives the other way, beyond doubt. Of two that always move together neither is known
+        """It drives the other way, beyond doubt. A rudder that is held in a steady turn changes
+        nothing, but the turn is counted. Of two that always move together neither is known
         beside the other: then the sum of all has to say so, or that it moves against one that
         drives the right way."""
+        along, against = self.turned
+        if against > CIRCLES_RAD and along < FEW_TURNS * against:
+            return True
         if self.alone > -SURE or self.explained < PARTLY:
             return False
         if self.opposed:
@@ -68,6 +75,9 @@ class Driven:
 
     @property
     def along(self) -> bool:
+        along, against = self.turned
+        if along > CIRCLES_RAD and against < FEW_TURNS * along:
+            return True
         return self.alone > SURE and self.explained > PARTLY and self.together > -SURE
 
 
@@ -138,7 +148,11 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
             mostly = (ahead & small).sum() >= (astern & small).sum()
             where = (ahead if mostly else astern) & small
             way = "yaw rate" if mostly else ASTERN
-            found += _counted(t, way, yaw_rate, rudders, where, least)
+            counted = list(_counted(t, way, yaw_rate, rudders, where, least))
+            found += counted
+            if mostly and not can_push_sideways(t):
+                sure = {one.name for one in counted if one.against or one.along}
+                found += _held(t, yaw_rate, [n for n in rudders if n not in sure], ahead & small)
     if thrusts:
         everywhere = np.ones(len(speed), bool)
         ahead = {name: part[0] for name, part in thrusts.items() if _acts(part[0], thrusts)}
@@ -152,6 +166,25 @@ def driven(t: Track, yaw_rate: np.ndarray) -> list[Driven]:
         if len(turning) > 1 or not rudders:
             found += _counted(t, "yaw rate", yaw_rate, turning, everywhere)
     return found
+
+
+def _held(t: Track, yaw_rate: np.ndarray, names: list[str], where: np.ndarray) -> Iterator[Driven]:
+    """How far the bow turns with a rudder that is held to one side, and how far against it. The
+    first two ship's lengths after it is put over are left out: the old turn ends in them."""
+    speed = np.abs(t.velocity)
+    typical = float(np.median(speed[where])) if where.any() else 0.0
+    if typical <= 0.0:
+        return
+    wait = round(HELD_LENGTHS * t.profile.ship.length_m / typical / STEP_S)
+    for name in names:
+        rudder = np.nan_to_num(t.driven[name])
+        held = where & t.measured & (np.abs(rudder) > HELD_RAD) & (speed > 0.5 * typical)
+        side = np.where(held, np.sign(rudder), 0.0)
+        at = np.arange(len(side))
+        begun = np.maximum.accumulate(np.where(np.diff(side, prepend=0.0) != 0.0, at, 0))
+        turned = STEP_S * (side * yaw_rate)[(side != 0.0) & (at - begun > wait)]
+        both = float(turned[turned > 0].sum()), float(-turned[turned < 0].sum())
+        yield Driven(name, "yaw rate", 0.0, 0.0, 0.0, 0.0, 0, False, both)
 
 
 def _acts(part: np.ndarray, thrusts: dict, share: float = 0.2) -> bool:

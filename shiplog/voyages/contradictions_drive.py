@@ -88,10 +88,14 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whol
     elif whole and "yaw rate" not in directions:
         also = "; or, as the others do so too, the heading is turned by 180 deg"
     best = max(against, key=lambda one: one.explained)
-    sentence = (
-        f"{what}: {100.0 * best.explained:.0f} % of the change follow it with the sign turned "
-        f"round, in {best.windows} windows{also}. Change: {line}."
-    )
+    along, turned = (math.degrees(one) for one in max(one.turned for one in against))
+    shown = f"{turned:.0f} deg against it while it is held, {along:.0f} deg with it"
+    if best.windows:
+        share = f"{100.0 * best.explained:.0f} %"
+        shown = (
+            f"{share} of the change follow it with the sign turned round, in {best.windows} windows"
+        )
+    sentence = f"{what}: {shown}{also}. Change: {line}."
     return of_voyage(t, actuator.name, (-1.0, None, None), "1", "sign", sentence)
 
 
@@ -127,14 +131,14 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     may set."""
     way = e.by_position or e.by_velocity
     thrusts = actuators.thrust(t)
-    if way is None or way.how != "as it is" or way.drift or not thrusts:
+    if way is None or way.how != "as it is" or not thrusts:
         return None
     if way.half > 15.0 or way.spread < LEAST_SPREAD or actuators.can_push_sideways(t):
         return None
     share = _driven_share(t, [part[0] for part in thrusts.values()])
-    if way.ahead and share < -MOSTLY:
+    if way.ahead and way.fixed and share < -MOSTLY:
         return _driven_astern(t, way)
-    if share < MOSTLY:
+    if share < MOSTLY or way.drift:
         return None
     if abs(way.angle) > 180.0 - ALONG_DEG:
         return _reversed(t, way, found)

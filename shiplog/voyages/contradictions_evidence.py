@@ -38,6 +38,7 @@ class Way:
     angle   deg, of the way from the heading so read, to starboard; half: of its 90 % interval
     sense   whether to which side the heading turns is known: the mirrored one fits worse
     drift   whether a current explains the way as well, with the heading as it is
+    fixed   whether the angle is known all the same
     """
 
     how: str
@@ -48,6 +49,7 @@ class Way:
     left: float
     windows: int
     drift: bool
+    fixed: bool
 
     @property
     def ahead(self) -> bool:
@@ -187,8 +189,11 @@ def _way(j: Joined) -> Way | None:
     drift = j.extra["current"] < FASTEST_CURRENT and j.extra["drifting"] < (
         left[best] * (BETTER if best != "as it is" else AS_GOOD)
     )
-    drift &= abs(j.extra["angle"]) < ALONG_DEG * DEGREE or j.extra["half"] > ALONG_DEG * DEGREE
-    return Way(best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift)
+    fixed = j.extra["half"] < ALONG_DEG * DEGREE
+    drift &= abs(j.extra["angle"]) < ALONG_DEG * DEGREE or not fixed
+    return Way(
+        best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift, fixed
+    )
 
 
 def angle_heading(profile: Profile) -> bool:

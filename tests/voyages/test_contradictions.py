@@ -557,3 +557,18 @@ def test_a_command_says_what_contradicts_first_and_what_was_not_compared(tmp_pat
     assert [one["voyage"] for one in campaign["contradictions"]] == ["a"]
     assert campaign["not_compared"]
     assert "yaw_rate" not in {one["channel"] for one in campaign["estimates"]}
+
+
+@pytest.mark.parametrize(("sign", "channels"), [(1.0, []), (-1.0, ["rudder"])])
+def test_the_turns_of_steady_circles_are_counted_against_a_rudder_that_is_held(sign, channels):
+    raw = changed(measured(CIRCLE), rudder=lambda delta: sign * delta)
+    said = found(raw, profile(length=20.0))
+    assert [one.channel for one in said] == channels
+    assert all("deg against it while it is held, 0 deg with it" in one.sentence for one in said)
+
+
+def test_a_shaft_that_never_changes_and_counts_astern():
+    raw = changed(measured(SHIP), propeller=lambda n: 0.0 * n - 5.0)
+    (one,) = found(raw, profile())
+    assert (one.channel, one.reason) == ("propeller", "sign")
+    assert "driven astern" in one.sentence and "heading by 180 deg" in one.sentence
