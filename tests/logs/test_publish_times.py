@@ -5,7 +5,6 @@ import polars as pl
 import pytest
 
 from shiplog.logs import faults
-from shiplog.logs.health_report import Finding
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
