@@ -58,7 +58,7 @@ def profile(motion: Motion, seen: Recorded, recorder: Recorder) -> dict[str, Any
         topic, fields = recorder.topics[group]
         where: dict[str, Any] = {"topic": topic}
         units = [UNITS[name] for name in names]
-        where |= {"field": list(fields)[0]} if len(fields) == 1 else {"fields": list(fields)}
+        where |= {"field": next(iter(fields))} if len(fields) == 1 else {"fields": list(fields)}
         where |= {"unit": units[0]} if len(set(units)) == 1 else {"units": units}
         if group in SENSORS:
             sensors[group] = where
