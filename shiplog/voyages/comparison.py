@@ -12,10 +12,11 @@ import polars as pl
 
 from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
-from shiplog.voyages import contradictions, sensor_consistency
+from shiplog.voyages import contradictions, sensor_consistency, wind_contradictions
 from shiplog.voyages.contradictions import Contradictions
 from shiplog.voyages.sensor_findings import Estimate
 
+MOVING = frozenset({"position", "velocity", "heading"})  # in doubt, they say nothing of the wind
 AFTER = "the same comparison once the profile is corrected"
 
 
@@ -42,4 +43,9 @@ def compare(table: pl.DataFrame, profile: Profile) -> Comparison:
             left.append(
                 NotCompared(f"small errors of {names}", "they contradict each other", AFTER)
             )
-    return Comparison(gross, fine.estimates, (*gross.findings, *small), tuple(left))
+    wind = wind_contradictions.WindComparison()
+    if not {one.channel for one in gross.findings} & MOVING:
+        wind = wind_contradictions.compare(table, profile)
+    left += wind.not_compared
+    found = (*gross.findings, *wind.findings, *small)
+    return Comparison(gross, fine.estimates, found, tuple(left))

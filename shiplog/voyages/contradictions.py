@@ -88,11 +88,6 @@ def _not_compared(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotC
             "the scale that position and velocity share", "a unit that both have wrong cancels",
             "a position in latitude and longitude",
         )  # fmt: skip
-    if p.sensors.wind is not None:
-        yield NotCompared(
-            "wind", "no second instrument measures it", "the same wind on opposite headings, or a "
-            "weather station",
-        )  # fmt: skip
     yield from _actuators(t, e, counted)
 
 

@@ -17,7 +17,6 @@ from shiplog.logs.health_report import Finding
 from shiplog.profile import Actuator, Profile
 from shiplog.voyages.plausibility import LEAST_BLOCK, SHIP, Asked, findings
 from shiplog.voyages.resampling import RATE_HZ
-from shiplog.voyages.wind_contradictions import wind_findings
 
 GRAVITY = 9.80665  # m/s²
 SALT, FRESH, LONG_M = 1025.0, 998.0, 20.0  # kg/m³; a longer ship is taken as at sea
@@ -43,10 +42,7 @@ def of_log(table: pl.DataFrame, profile: Profile, found: Sequence[Finding] = ())
     """
     known = {one.channel for one in found if one.kind == "contradiction"}
     asked = [*of_profile(profile), *of_voyage(table, profile)]
-    mine = findings(one for one in asked if not known & {one.channel, *one.of})
-    if not known & {"heading", "wind"} and not any(f.channel == "wind" for f in mine):
-        mine += wind_findings(table, profile)
-    return mine
+    return findings(one for one in asked if not known & {one.channel, *one.of})
 
 
 def of_profile(profile: Profile) -> list[Asked]:

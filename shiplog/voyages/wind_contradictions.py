@@ -29,7 +29,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.channels import UNUSABLE, Quality
-from shiplog.logs.health_report import Finding
+from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
 from shiplog.voyages.resampling import RATE_HZ
 
@@ -112,19 +112,46 @@ NEAR_SLOPE = 0.15  # share by which β may be off a known one: the hull's flow, 
 SURE_ERRORS = 4.0  # standard errors between β and any flow past a hull
 
 
-def wind_findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
-    """One contradiction where another reading of the wind fits the ship's motion far better."""
+@dataclass(frozen=True)
+class WindComparison:
+    """One contradiction at most, and what this voyage's motion does not say of its wind."""
+
+    findings: tuple[Finding, ...] = ()
+    not_compared: tuple[NotCompared, ...] = ()
+
+
+HARDLY_TURNS = WindComparison(not_compared=(
+    NotCompared("wind", "the ship hardly turns", "turns to both sides, for minutes"),
+))  # fmt: skip
+TOO_SLOW = NotCompared(
+    "the wind's unit, and whether it blows from or to", "the ship is slow beside the gusts",
+    "changes of a higher speed, or less wind",
+)  # fmt: skip
+
+
+def compare(table: pl.DataFrame, profile: Profile) -> WindComparison:
+    """Whether another reading of the wind fits the ship's motion far better."""
     if not profile.has_wind:
-        return []
+        return WindComparison()
     seconds = _seconds(table)
     if seconds is None:
-        return []
+        return HARDLY_TURNS
     speed, angle, heading, velocity = seconds
-    count = len(speed)
-    if count < LEAST_S or 1.0 - abs(np.exp(1j * heading).mean()) < LEAST_TURNING:
-        return []
-    spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
+    if len(speed) < LEAST_S or 1.0 - abs(np.exp(1j * heading).mean()) < LEAST_TURNING:
+        return HARDLY_TURNS
     beta, error = _slope(speed, angle, heading, velocity)
+    found = _contradiction(seconds, beta, error, table)
+    if found:
+        return WindComparison((found,))
+    slow = max(FLOW) + SURE_ERRORS * error > 3600 / 1852
+    return WindComparison(not_compared=(TOO_SLOW,) if slow else ())
+
+
+def _contradiction(
+    seconds: tuple[np.ndarray, ...], beta: float, error: float, table: pl.DataFrame
+) -> Finding | None:
+    speed, angle, heading, velocity = seconds
+    spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
     known = _known_slope(beta, error)
     air = speed * np.exp(1j * angle)
     of_speed = _left(air - (known or 1.0) * velocity, heading)
@@ -138,8 +165,8 @@ def wind_findings(table: pl.DataFrame, profile: Profile) -> list[Finding]:
         turned = of_angle * ALIKE < of_speed
     if turned and best and after is not None and as_it_is is not None:
         times = math.sqrt(as_it_is.mean() / max(float(after.mean()), 1e-12))
-        return [_of_angle(best, times, table)]
-    return [_of_slope(known, beta, error, table)] if known else []
+        return _of_angle(best, times, table)
+    return _of_slope(known, beta, error, table) if known else None
 
 
 def _left(wind: np.ndarray, heading: np.ndarray | float = 0.0) -> float:

@@ -10,8 +10,7 @@ import pytest
 import sailing
 
 from shiplog import profile_file as profiles
-from shiplog.logs.health_report import Finding
-from shiplog.voyages import plausible_measures, wind_contradictions
+from shiplog.voyages import comparison, plausible_measures, wind_contradictions
 from shiplog.voyages.plausibility import TABLE, Asked, findings
 
 SHIPPED = ("esso-vectwin", "esso-osaka", "blueboat", "milliampere", "kvlcc2", "kvlcc2-full-scale")
@@ -250,7 +249,7 @@ def wind_of(psi, speed, wind_speed, wind_angle):
         "wind_speed": wind_speed, "wind_angle": wind_angle,
     }  # fmt: skip
     table = pl.DataFrame({n: columns[n] for n in profile.columns} | {"quality": zero.astype(int)})
-    return wind_contradictions.wind_findings(table, profile)
+    return list(wind_contradictions.compare(table, profile).findings)
 
 
 def test_a_wind_that_keeps_its_direction_is_not_said():
@@ -295,10 +294,10 @@ def test_a_heading_that_is_contradicted_says_nothing_of_the_vane():
         "yaw_rate": zero, "rudder": zero, "propeller": zero, "wind_speed": of, "wind_angle": angle,
     }  # fmt: skip
     table = pl.DataFrame({n: columns[n] for n in profile.columns} | {"quality": zero.astype(int)})
-    known = [Finding("contradiction", "heading", "It counts anticlockwise.")]
-    asked = {f.channel for f in plausible_measures.of_log(table, profile, known)}
-    assert "wind" not in asked
-    assert "wind" in {f.channel for f in plausible_measures.of_log(table, profile)}
+    found = comparison.compare(table, profile)
+    assert any(f.kind == "contradiction" for f in found.findings)
+    assert "wind" not in {f.channel for f in found.findings}
+    assert wind_contradictions.compare(table, profile).findings
 
 
 def test_the_page_has_every_row_with_its_limits():

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from shiplog import profile_file as profiles
-from shiplog.voyages.wind_contradictions import wind_findings
+from shiplog.voyages.wind_contradictions import compare
 
 PROFILE = profiles.load("esso-vectwin")
 KNOT = 1852 / 3600
@@ -63,7 +63,7 @@ WRONG = {  # what was recorded, words of the sentence, reason
 @pytest.mark.parametrize("case", WRONG)
 def test_another_reading_of_the_wind_is_named(case):
     table, changed, words, reason = WRONG[case]
-    (finding,) = wind_findings(recorded(table, **changed), PROFILE)
+    (finding,) = compare(recorded(table, **changed), PROFILE).findings
     kind = "implausible" if case == "from north" else "contradiction"  # or the vane is stuck
     assert (finding.kind, finding.channel, finding.reason) == (kind, "wind", reason)
     assert words in finding.sentence
@@ -82,7 +82,7 @@ SOUND = {
 def test_a_wind_that_stands_still_contradicts_nothing(case, scale):
     """A hull slows or speeds up the air at the mast by a fifth: no other unit."""
     table = SOUND[case].with_columns(pl.col("wind_speed") * scale)
-    assert wind_findings(table, PROFILE) == []
+    assert compare(table, PROFILE).findings == ()
 
 
 def test_a_wind_that_veers_contradicts_nothing():
@@ -92,11 +92,11 @@ def test_a_wind_that_veers_contradicts_nothing():
     row = {name: table[name].to_numpy() for name in table.columns}
     air = row["wind_speed"] * np.exp(1j * row["wind_angle"]) - row["surge"]
     moved = air * np.exp(1j * veered) + row["surge"]
-    assert wind_findings(recorded(table, lambda s, r: np.abs(moved), lambda a, r: np.angle(moved)),
-                         PROFILE) == []  # fmt: skip
+    seen = recorded(table, lambda s, r: np.abs(moved), lambda a, r: np.angle(moved))
+    assert compare(seen, PROFILE).findings == ()
 
 
 def test_without_a_wind_sensor_nothing_is_compared():
     calm = PROFILE.model_copy(update={"sensors": PROFILE.sensors.model_copy(update={"wind": None})})
     table, changed, _, _ = WRONG["mirrored"]
-    assert wind_findings(recorded(table, **changed), calm) == []
+    assert compare(recorded(table, **changed), calm).findings == ()

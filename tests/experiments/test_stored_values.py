@@ -1,0 +1,65 @@
+"""Voyages of known motion through every reader: a few of the thousand of the experiment."""
+
+import numpy as np
+import pymap3d
+import pytest
+
+from pipelines.experiments.stored_values import changes, instruments, judge, motion, recorders
+from pipelines.experiments.stored_values.judge import Draw
+
+USUAL = instruments.SETS["usual"]
+
+
+def drawn(kind, recorder, change=None, seed=3):
+    rng = np.random.default_rng(seed)
+    sailed = motion.sail(motion.KINDS[kind], rng)
+    seen, hz = instruments.recorded(sailed, USUAL, rng)
+    how = {}
+    chosen = next((c for c in changes.CHANGES if c.name == change), None)
+    if chosen:
+        chosen.act(seen, how, sailed, rng)
+    return Draw(seed, sailed, USUAL, hz, recorders.RECORDERS[recorder], chosen, seen, how)
+
+
+@pytest.mark.parametrize("recorder", recorders.RECORDERS)
+def test_a_sound_voyage_is_stored_as_it_was_sailed(recorder):
+    done = judge.judged(drawn("usv", recorder))
+    assert done.right, done.wrong
+    assert not done.wrongly_alarmed, done.findings
+
+
+@pytest.mark.parametrize(
+    ("change", "recorder"),
+    [("speed: knots as m/s", "csv"), ("course reversed", "nmea"), ("yaw rate to port", "mcap"),
+     ("heading anticlockwise", "ros 2 bag"), ("shaft: rps as rpm", "parquet"),
+     ("north and east of the position exchanged", "european csv"),
+     ("longitude counted to the west", "folder of tables"), ("rows twice", "csv"),
+     ("32-bit microseconds wrap", "csv"), ("a field too many in some rows", "csv"),
+     ("typographic minus", "csv"), ("GNSS in GPS time", "mcap")],
+)  # fmt: skip
+def test_what_is_changed_is_stored_right_or_named(change, recorder):
+    done = judge.judged(drawn("usv", recorder, change))
+    assert not done.wrong_and_unsaid, (done.wrong, done.findings)
+
+
+@pytest.mark.parametrize("datum", [(54.0, 10.0), (-33.0, 170.0), (0.5, -0.2)])
+def test_degrees_are_those_of_the_ellipsoid(datum):
+    sailed = motion.sail(motion.KINDS["usv"], np.random.default_rng(0))
+    object.__setattr__(sailed, "datum", datum)
+    north, east = np.array([0.0, 3000.0, -4000.0]), np.array([0.0, -5000.0, 2000.0])
+    latitude, longitude = motion.degrees(sailed, north, east)
+    n, e, _ = pymap3d.geodetic2ned(latitude, longitude, 0.0, *datum, 0.0)
+    assert n == pytest.approx(north, abs=1e-3) and e == pytest.approx(east, abs=1e-3)
+
+
+def test_a_ship_goes_as_fast_as_it_says():
+    """The path has the speed of midship everywhere: the integral against the derivative."""
+    sailed = motion.sail(motion.KINDS["coaster"], np.random.default_rng(1))
+    gone = np.gradient(sailed.x0, sailed.t), np.gradient(sailed.y0, sailed.t)
+    speed = np.hypot(sailed.surge, sailed.sway)
+    assert np.hypot(*gone)[5:-5] == pytest.approx(speed[5:-5], rel=1e-3)
+
+
+def test_there_are_thirty_kinds_of_changes():
+    assert len({c.name for c in changes.CHANGES if c.seen_by != "undetermined"}) >= 30
+    assert {c.family for c in changes.CHANGES} >= {"unit", "sign", "frame", "clock", "order"}
