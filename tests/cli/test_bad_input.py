@@ -89,7 +89,7 @@ LOGS = {
         flipped(d, "index"), "--profile", d.profile())),
     "one sample": (1, ["usable heading sample(s)"], lambda d: d.ingest(
         short(d, 0.1), "--profile", d.profile())),
-    "one second": (0, ["of which 1 s can be used"], lambda d: d.ingest(
+    "one second": (0, ["of which 0 s can be used"], lambda d: d.ingest(
         short(d, 1.0), "--profile", d.profile())),
     "a velocity of NaN": (0, ["velocity is blank", "of which 0 s can be used"],
         lambda d: d.ingest(without(d, np.nan), "--profile", d.profile())),

@@ -11,8 +11,7 @@ from pipelines.prepare import check_logs, expand
 from shiplog import profile_file as profiles
 from shiplog.logs.check import check, expected_s, health_of
 from shiplog.logs.read import read
-from shiplog.voyages import sensor_consistency
-from shiplog.voyages.ingest import ingest
+from shiplog.voyages.ingest import consistency_of, ingest
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 
@@ -66,7 +65,8 @@ def test_a_check_finds_what_reading_everything_and_ingesting_find(tmp_path, make
     assert check(path) == everything
     profile = profiles.load(chosen or "esso-vectwin")
     voyage = ingest(path, profile)
-    consistency = sensor_consistency.findings(voyage.estimates, voyage.table.height, profile)
+    consistency = consistency_of(read(path, profile.wanted(), others=True), profile, {}).findings
+    assert {*consistency} <= {*voyage.report.findings}
     assert report == replace(
         everything,
         findings=(*everything.findings, *consistency),
