@@ -25,9 +25,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from statistics import NormalDist
 
 import numpy as np
-from scipy.special import ndtri
 
 from shiplog import units
 from shiplog.logs.health_report import Instrument
@@ -40,6 +40,7 @@ TO_SIGMA = 1.4826  # standard deviation of a normal distribution over its median
 WHOLE_PERIODS = 1.5  # a longer step is a gap, and no difference is taken across it
 RARE = 0.05  # share of the changes that come sooner than an instrument's own period
 FINEST = 1e-3  # of the 95 % quantile of a rate: a log's or gyro's scale is hardly known better
+NORMAL = NormalDist()  # Φ; of the standard library, since scipy takes half a second to load
 DIGITS = 2  # of an estimate: a median of some hundred differences is good to some per cent
 
 
@@ -112,7 +113,7 @@ def _deviation(size: np.ndarray, resolution: float) -> float:
         return TO_SIGMA * median
     edge = (round(median / resolution) + 0.5) * resolution
     share = min(float(np.mean(size < edge)), 1.0 - 0.5 / len(size))
-    return edge / float(ndtri(0.5 + 0.5 * share))
+    return edge / NORMAL.inv_cdf(0.5 + 0.5 * share)
 
 
 def completed(profile: Profile, instruments: Iterable[Instrument]) -> Profile:

@@ -96,7 +96,7 @@ def test_evaluate_answers_as_the_contract_says(run, store, tmp_path):
     content = json.loads(answer.read_text())
     assert set(content) == {"contract", "loss", "windows", "seeds", "rmse", "end_position_m",
                             "end_heading_deg", "floors", "voyages", "band_90", "winds",
-                            "sentence", "judgement", "too_short"}  # fmt: skip
+                            "sentence", "judgement", "too_short", "contradictions"}  # fmt: skip
     assert content["loss"] == pytest.approx(np.mean(content["seeds"]))
     assert len(content["seeds"]) == 2 and content["windows"] == 3
     assert set(content["floors"]) == {"hold", "least_squares"}
