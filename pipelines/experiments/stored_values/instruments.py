@@ -72,10 +72,11 @@ def recorded(motion: Motion, kit: Instruments, rng: np.random.Generator) -> tupl
         "sog": np.hypot(v_north, v_east),
         "cog": np.degrees(np.arctan2(v_east, v_north)) % 360.0,
         "heading": (np.degrees(psi) + rng.normal(0.0, kit.heading, n)) % 360.0,
-        "rps": motion.at("shaft", t) + rng.normal(0.0, 0.01, n),
         "wind_speed": np.maximum(motion.at("wind_speed", t) + rng.normal(0.0, 0.2, n), 0.0),
         "wind_angle": (np.degrees(motion.at("wind_angle", t)) + rng.normal(0.0, 2.0, n)) % 360.0,
     }
+    if motion.kind.shaft:
+        columns["rps"] = motion.at("shaft", t) + rng.normal(0.0, 0.01, n)
     if motion.kind.rudder:
         columns["rudder"] = np.degrees(motion.at("rudder", t)) + rng.normal(0.0, 0.1, n)
     if kit.yaw_rate is not None:

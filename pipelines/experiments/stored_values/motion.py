@@ -33,6 +33,7 @@ class Kind:
     sideways: float = 0.0  # m/s, of an azimuth ship on purpose
     waves: float = 0.0  # rad, amplitude of the heading's motion in a seaway
     rudder: bool = True  # else it is steered by something that is not recorded
+    shaft: bool = True  # else it is driven by something that is not recorded
 
 
 KINDS = {
@@ -40,13 +41,21 @@ KINDS = {
     for kind in (
         Kind("model ship", 3.0, 0.5, math.radians(3.0)),
         Kind("usv", 5.0, 2.0, math.radians(6.0)),
-        Kind("planing usv", 6.0, 12.0, math.radians(7.0)),
+        Kind("planing usv", 6.0, 10.5, math.radians(7.0)),
         Kind("blueboat", 1.2, 1.1, math.radians(14.0), rudder=False),
         Kind("yacht in waves", 12.0, 3.0, math.radians(3.0), waves=math.radians(1.5)),
         Kind("coaster", 80.0, 5.5, math.radians(0.8), 1200.0),
         Kind("vlcc at dead slow", 320.0, 2.0, math.radians(0.12), 3600.0),
         Kind("ferry stern first", 40.0, -4.0, math.radians(1.0), 900.0, rudder=False),
-        Kind("azimuth ship sideways", 9.0, 0.25, math.radians(2.0), sideways=0.6, rudder=False),
+        Kind(
+            "azimuth ship sideways",
+            9.0,
+            0.25,
+            math.radians(2.0),
+            sideways=0.6,
+            rudder=False,
+            shaft=False,
+        ),
     )
 }
 AT_REST = {

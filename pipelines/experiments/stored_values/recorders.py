@@ -220,7 +220,8 @@ def nmea(folder: Path, seen: Recorded, how: dict[str, Any]) -> Path:
             burst.append(f"TIROT,{c['yaw_rate'][i] * 60.0:.2f},A")
         if "rudder" in c:
             burst.append(f"AGRSA,{c['rudder'][i]:.2f},A,,")
-        burst.append(f"ERRPM,S,1,{c['rps'][i] * 60:.2f},,A")
+        if "rps" in c:
+            burst.append(f"ERRPM,S,1,{c['rps'][i] * 60:.2f},,A")
         burst.append(f"WIMWV,{c['wind_angle'][i] % 360.0:.1f},R,{c['wind_speed'][i]:.2f},M,A")
         stamp = round(float(received[i]) * 1000)
         lines += [f"{stamp};N;{_sentence(body)}" for body in burst]
