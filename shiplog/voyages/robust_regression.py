@@ -83,6 +83,16 @@ def shifted(values: np.ndarray, rows: float) -> np.ndarray:
     return held[:-1] + share * (held[1:] - held[:-1])
 
 
+def spread_over(change: np.ndarray, grid: Bins, seconds: int) -> float:
+    """Mean size of a change [B, c] from bin to bin, added up over so many seconds; 0 where no
+    stretch is so long."""
+    total = np.cumsum(change, axis=0)
+    last = np.flatnonzero(grid.run >= seconds)
+    if len(last) == 0:
+        return 0.0
+    return float(np.mean(np.linalg.norm(total[last] - total[last - seconds], axis=1)))
+
+
 @dataclass(frozen=True)
 class RobustFit:
     """value [k], cov [k, k]; `reverse` [k]: the same with the other side's noise in the slope."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 
 import numpy as np
@@ -30,7 +30,15 @@ from shiplog.logs.health_report import NotCompared
 from shiplog.profile import Profile
 from shiplog.voyages.fault_detection import stretches
 from shiplog.voyages.resampling import RATE_HZ
-from shiplog.voyages.robust_regression import Problem, RobustFit, bins, fit, rough, shifted
+from shiplog.voyages.robust_regression import (
+    Problem,
+    RobustFit,
+    bins,
+    fit,
+    rough,
+    shifted,
+    spread_over,
+)
 from shiplog.voyages.sensor_findings import (
     AT_LIMIT,
     DELAY_SHARE,
@@ -51,6 +59,8 @@ POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, o
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
 ANTENNA_M, ANTENNA_LENGTHS = 0.03, 0.01
+SLOW_S = 32  # s: over which the two sides are compared with and without a delay
+WORSE = 1.05  # times the difference without it: more, and there is no delay
 CANCEL, TOGETHER = 0.3, 0.9  # a delay and an antenna that undo each other: share left, correlation
 
 TAU_R, RATE_SCALE, RATE_BIAS = range(3)
@@ -341,6 +351,27 @@ def _gnss_clocks(found: RobustFit, profile: Profile) -> Iterator[Estimate]:
         yield _later_of_two(late, late - apart, late + apart)
 
 
+def _in_the_way(problem: Problem, found: RobustFit, clocks: tuple[int, ...]) -> bool:
+    """Whether what the two sides differ by over SLOW_S is no more with the delays than without.
+
+    A fit of changes from second to second looks at the noise as much as at the manoeuvre. A delay τ
+    of a velocity moves the way by τ ΔV as well, over any time: without it the others are fitted
+    anew, and the way must not agree better.
+    """
+    ends = [found.interval(clock) for clock in clocks]
+    if not any(abs(v) > max(CLOCK_S, SURE_HALF_INTERVALS * 0.5 * (b - a)) for v, a, b in ends):
+        return True
+    prior = problem.prior.copy()
+    prior[list(clocks)] = 0.0
+    without = fit(replace(problem, prior=prior), np.where(prior > 0.0, found.value, 0.0))
+    if without is None:
+        return True
+    late, punctual = (
+        spread_over(problem.model(one.value), problem.grid, SLOW_S) for one in (found, without)
+    )
+    return late <= WORSE * punctual
+
+
 def _later_of_two(late: float, low: float, high: float) -> Estimate:
     """Of position and velocity, from how late the velocity is against the position."""
     if late >= 0:
@@ -386,5 +417,7 @@ def _solved(
             )
         late = float(np.max(np.abs(found.value[list(clocks)])))
         if late < DELAY_SHARE * margin:
-            return found
+            if _in_the_way(problem(motion, margin), found, clocks):
+                return found
+            return "a delay would explain what changes in a second, and not what does in a minute"
     return f"the search ends at its limit: a delay of more than {DELAY_SHARE * margin:.1f} s"
