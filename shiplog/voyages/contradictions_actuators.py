@@ -19,12 +19,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from shiplog.profile import Actuator
 from shiplog.voyages.contradictions_regression import regress
 from shiplog.voyages.contradictions_track import ROWS, STEP_S, Track, Windows
 
-LENGTHS_S = (2, 4, 8, 16, 32, 64)
+LENGTHS_S = (2, 4, 8, 16, 32, 64, 128)
+AVERAGED = 0.5  # of a window: over so long a velocity is averaged at its ends, against noise
 ASTERN = "yaw rate astern"  # of a rudder, where the ship only goes astern
 SHIP_TIMES = 0.6  # L/U: a rudder is counted over no shorter windows, in which waves turn the ship
 LEAST_TURN_RAD = math.radians(15.0)  # range of headings, and less: it keeps its course
@@ -218,11 +220,16 @@ def _counted(
         w = w.chosen(rows >= 0.9 * ROWS * (seconds + 1))
         if len(w.first) < FEWEST:
             continue
-        for one in _at(w, direction, velocity, means, least > 0.0):
+        for one in _at(w, direction, _averaged(velocity, seconds), means, least > 0.0):
             before = best.get(one.name)
             if before is None or one.explained > before.explained:
                 best[one.name] = one
     yield from best.values()
+
+
+def _averaged(velocity: np.ndarray, seconds: int) -> np.ndarray:
+    """Velocity [B], each second the mean of those around it, over a share of a window."""
+    return uniform_filter1d(velocity, max(round(AVERAGED * seconds), 1), mode="nearest")
 
 
 def _at(

@@ -85,8 +85,9 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whol
     also = ""
     if "yaw rate" in directions and not _sense(e):
         also = "; or heading and yaw rate are counted to port"
-    elif whole and "yaw rate" not in directions:
-        also = "; or, as the others do so too, the heading is turned by 180 deg"
+    elif "yaw rate" not in directions and (whole or _astern(e)):
+        why = "as the others do so too" if whole else "as the ship goes astern by it"
+        also = f"; or, {why}, the heading is turned by 180 deg"
     best = max(against, key=lambda one: one.explained)
     along, turned = (math.degrees(one) for one in max(one.turned for one in against))
     shown = f"{turned:.0f} deg against it while it is held, {along:.0f} deg with it"
@@ -102,6 +103,11 @@ def _sign(t: Track, e: Evidence, actuator: Actuator, against: list[Driven], whol
 def _sense(e: Evidence) -> bool:
     """Whether the way over ground confirms to which side the heading turns."""
     return any(w.how == "as it is" and w.sense for w in e.ways)
+
+
+def _astern(e: Evidence) -> bool:
+    """Whether the way over ground leads astern by the heading."""
+    return any(w.how == "as it is" and abs(w.angle) > 180.0 - ALONG_DEG for w in e.ways)
 
 
 def _exchanged(t: Track, by_name: dict[str, list[Driven]]) -> Finding | None:
@@ -133,7 +139,8 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     thrusts = actuators.thrust(t)
     if way is None or way.how != "as it is" or not thrusts:
         return None
-    if way.half > 15.0 or way.spread < LEAST_SPREAD or actuators.can_push_sideways(t):
+    straight = way.spread < LEAST_SPREAD and not way.sense
+    if way.half > 15.0 or straight or actuators.can_push_sideways(t):
         return None
     share = _driven_share(t, [part[0] for part in thrusts.values()])
     if way.ahead and way.fixed and share < -MOSTLY:

@@ -17,7 +17,9 @@ AS_GOOD = 1.5  # times what another formula leaves
 JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more, and they do not
 BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
-LEAST_MIRRORED = 0.1  # share that the heading as it is leaves, and less: it is not another one
+# Share that the heading as it is leaves, and less: it is not a mirrored one. One in radians, which
+# hardly changes, may leave less than that: then the way has to go ahead by it, too.
+LEAST_MIRRORED = 0.1
 ALONG_DEG = 45.0  # from the bow: the ship goes ahead
 NEAR_DEG = 8.0  # of 90 or 180 deg
 SURE_DEG = 12.0  # half interval of an angle that says anything
@@ -182,7 +184,10 @@ def _way(j: Joined) -> Way | None:
     best = min(left, key=lambda name: left[name])
     if left["as it is"] < BETTER * left[best]:
         best = "as it is"
-    if left[best] > JOINED or (best != "as it is" and left["as it is"] < LEAST_MIRRORED):
+    if left[best] > JOINED:
+        return None
+    in_radians = best == "in radians" and pairs.natural(j.fits[best])
+    if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not in_radians:
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
     _, angle, _, half = j.fits[best].polar()

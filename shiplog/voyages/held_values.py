@@ -20,6 +20,10 @@ from shiplog.voyages.resampling import STEP_NS, Samples
 
 STEP_S = STEP_NS * 1e-9
 DOUBT = 0.02  # of the 95 % quantile of a rate: bias and scale of one that a filter has smoothed
+ACCIDENT = 1e-3  # chance that noise makes anything in a whole record look held
+DRIFT_S, FEWEST_PIECES = 30.0, 6  # s: pieces over which a rate's bias is measured
+LONG_S = 5.0  # s: a stretch of repeats that may hide what the bias is
+SPREADS = 3.0  # standard deviations between pieces by which the bias may be another
 COURSE_S = 10.0  # s: a course is taken of the way in so many seconds
 COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little, 4 deg and more
 COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
@@ -48,7 +52,8 @@ def held(
     around = fault_detection.steps_around(samples.value, runs) if name in COUNTED else 0.0
     if name == "position" and profile.sensors.kind(name) == "geodetic":
         around = around * METRE
-    least = 3.0 * samples.noise + np.maximum(samples.resolution, around)
+    steps = np.maximum(samples.resolution, around)
+    least = _by_chance(runs, samples.noise, steps, len(samples.time)) + steps
 
     def kept(
         runs: list[tuple[int, int]],
@@ -64,7 +69,13 @@ def held(
     if name == "position":
         return kept(runs, gone, least, _bias(sampled["velocity"], speed))
     if name == "heading" and profile.sensors.yaw_rate is not None:
-        return kept(runs, turned, least, _bias(sampled["yaw_rate"], turning))
+        drift = _bias(sampled["yaw_rate"], turning)
+        off = _unwrapped(columns["heading"]) - turned[:, 0]
+        measured = _drift(off, kept(runs, None, 0.0))
+        if measured is not None:
+            bias, drift = measured[0], min(drift, measured[1])
+            turned = turned + bias * STEP_S * np.arange(len(turned))[:, None]
+        return kept(runs, turned, least, drift)
     position = np.stack([_filled(columns[c]) for c in ("x0", "y0")], axis=1)
     if name == "heading":
         noise = sampled["position"].noise
@@ -87,6 +98,48 @@ def held(
     unsure = [run for run in runs if run not in sure]
     shown = kept(unsure, off, 3.0 * other.noise + other.resolution, bias)
     return sorted(kept(sure, None, 0.0) + shown)
+
+
+def _by_chance(
+    runs: list[tuple[int, int]], sigma: float, steps: np.ndarray | float, count: int
+) -> np.ndarray:
+    """How far [runs] a channel may have gone while noise makes its samples repeat by accident.
+
+    Two samples with noise σ, counted in steps q, of a channel that goes by d between them are one
+    number with the chance p = q/(2σ√π) exp(-d²/(4σ²)). Of a record of N samples n repeats in a row
+    come about with less than ACCIDENT from
+
+        d = 2σ √(ln(N/ACCIDENT) + n ln min(1, q/(2σ√π)))
+
+    on. At least 3σ, also of numbers of so many digits that no two are the same.
+    """
+    if sigma <= 0.0 or count == 0:
+        return np.zeros(len(runs))
+    repeats = np.array([last - first + 1 for first, last in runs], float)
+    one = np.minimum(1.0, np.broadcast_to(steps, len(runs)) / (2.0 * sigma * math.sqrt(math.pi)))
+    with np.errstate(divide="ignore"):
+        chance = math.log(count / ACCIDENT) + repeats * np.log(one)
+    return np.maximum(3.0 * sigma, 2.0 * sigma * np.sqrt(chance.clip(min=0.0)))
+
+
+def _drift(off: np.ndarray, away: list[tuple[int, int]]) -> tuple[float, float] | None:
+    """Bias of a rate and how far it may be from that, from what it and its channel differ by.
+
+    off [m]: channel less the rate's integral; away: rows that are in doubt. Medians over pieces of
+    DRIFT_S, which have to be FEWEST_PIECES; None where too few are whole.
+    """
+    sound = np.ones(len(off), bool)
+    for first, last in away:
+        if (last - first) * STEP_S > LONG_S:
+            sound[first : last + 1] = False
+    rows = round(DRIFT_S / STEP_S)
+    firsts = np.arange(0, len(off) - rows, rows)
+    firsts = firsts[[bool(sound[a : a + rows].all()) for a in firsts]]
+    if len(firsts) < FEWEST_PIECES:
+        return None
+    slopes = (off[firsts + rows - 1] - off[firsts]) / DRIFT_S
+    bias = float(np.median(slopes))
+    return bias, SPREADS * 1.4826 * float(np.median(np.abs(slopes - bias)))
 
 
 def _bias(samples: Samples, rate: np.ndarray) -> float:

@@ -207,7 +207,8 @@ def _angles(rows: _Rows, profile: Profile) -> Iterator[Asked]:
         if len(angle) < LEAST_ROWS:
             continue
         yield Asked("rudder at all", math.degrees(np.quantile(angle, QUANTILE)), one.name, one.name)
-        if alone and turns.sum() >= LEAST_ROWS and angle.max() > 0.0:
+        moves = alone and rows.speed_quantile >= WAY and turns.sum() >= LEAST_ROWS
+        if moves and angle.max() > 0.0:
             most = math.degrees(angle.max())
             yield Asked("rudder hard over", most, one.name, one.name, TURN)
 
