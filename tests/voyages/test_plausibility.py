@@ -262,7 +262,7 @@ def test_a_mirrored_vane_turns_the_wind_with_the_ship():
     (found,) = wind_of(psi, speed, of, -angle)
     assert (found.kind, found.channel, found.reason) == ("contradiction", "wind", "sign")
     assert "positive to port" in found.sentence
-    assert "sign = [1.0, -1.0]` on [sensors.wind]" in found.sentence
+    assert "`sign = [1.0, -1.0] on [sensors.wind]`" in found.sentence
 
 
 def test_a_direction_from_north_is_named_as_such():

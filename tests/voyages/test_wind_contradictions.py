@@ -46,7 +46,7 @@ WRONG = {  # what was recorded, words of the sentence, reason
         sailed(gusts=0.3), {"angle": lambda a, row: -a}, "positive to port", "sign",
     ),
     "blows to, a fast ship": (
-        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi}, "offset = [0.0, 180.0]", "frame",
+        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi}, "offset = [0.0, 180]", "frame",
     ),
     "from north": (
         sailed(), {"angle": lambda a, row: a + row["heading"]}, "counted from north", "frame",
