@@ -99,6 +99,14 @@ CONVENTIONS = (
         lambda profile: f"{_sign(profile)}, and {_zero(profile)}", "frame",
     ),
     Convention(
+        "counted from the starboard side", _from_body(lambda angle: angle + 0.5 * math.pi),
+        lambda profile: _zero(profile, -90.0), "mounting",
+    ),
+    Convention(
+        "counted from the port side", _from_body(lambda angle: angle - 0.5 * math.pi),
+        lambda profile: _zero(profile, 90.0), "mounting",
+    ),
+    Convention(
         "in radians, read as degrees", _from_body(lambda angle: angle * 180.0 / math.pi),
         lambda profile: f"set `{unit_line(profile, 'wind', 'rad', 1)}`", "unit",
     ),
@@ -158,23 +166,23 @@ def _contradiction(
         return _left(air - velocity, heading) / max(_left(air - beta * velocity, heading), 1e-12)
 
     known = of.known
-    if known and gain(known) < LEAST_GAIN:
-        known = None  # something else turns with the ship
-    of_speed = _left(air - (known or 1.0) * velocity, heading)
+    beta = known or (np.exp(1j * of.turned) if of.turned else None)
+    if beta is not None and gain(beta) < LEAST_GAIN:
+        beta = None  # something else turns with the ship
     as_it_is, best = spreads[CONVENTIONS[0]], _best(spreads)
     after = spreads[best] if best else None
     turned = after is not None and as_it_is is not None and _better(as_it_is, after)
-    if known and turned and best:  # the one that leaves less, in m/s, of what turns with the ship
+    if beta is not None and turned and best:
+        # the one that leaves less, in m/s, of what turns with the ship
+        of_speed = _left(air - beta * velocity, heading)
         of_angle = _left(best.true_wind(speed, angle, heading, velocity))
         turned = of_angle * ALIKE < of_speed
     if turned and best and after is not None and as_it_is is not None:
         times = math.sqrt(as_it_is.mean() / max(float(after.mean()), 1e-12))
         return _of_angle(best, times, profile, table)
-    if known:
-        return _of_slope(of, known, profile, table)
-    if of.turned and gain(np.exp(1j * of.turned)) > LEAST_GAIN:
-        return _of_zero(of, profile, table)
-    return None
+    if beta is None:
+        return None
+    return _of_slope(of, known, profile, table) if known else _of_zero(of, profile, table)
 
 
 def _left(wind: np.ndarray, heading: np.ndarray | float = 0.0) -> float:
