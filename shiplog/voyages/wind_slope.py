@@ -119,5 +119,7 @@ def slope(speed: np.ndarray, angle: np.ndarray, heading: np.ndarray, velocity: n
     beta = complex(product.sum() / square.sum())
     left = product - beta * square
     scale = math.sqrt(len(square) / (len(square) - 1)) / float(square.sum())
-    errors = (scale * math.sqrt(float((part**2).sum())) for part in (left.real, left.imag))
-    return Slope(beta, *errors, len(square))
+    of_real, of_imag = (
+        scale * math.sqrt(float((part**2).sum())) for part in (left.real, left.imag)
+    )
+    return Slope(beta, of_real, of_imag, len(square))
