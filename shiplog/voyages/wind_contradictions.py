@@ -100,11 +100,11 @@ CONVENTIONS = (
     ),
     Convention(
         "counted from the starboard side", _from_body(lambda angle: angle + 0.5 * math.pi),
-        lambda profile: _zero(profile, -90.0), "mounting",
+        lambda profile: _zero(profile, -90.0), "frame",
     ),
     Convention(
         "counted from the port side", _from_body(lambda angle: angle - 0.5 * math.pi),
-        lambda profile: _zero(profile, 90.0), "mounting",
+        lambda profile: _zero(profile, 90.0), "frame",
     ),
     Convention(
         "in radians, read as degrees", _from_body(lambda angle: angle * 180.0 / math.pi),
@@ -235,7 +235,7 @@ def _of_zero(of: Slope, profile: Profile, table: pl.DataFrame) -> Finding:
     )
     return Finding(
         "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(value, 2),
-        low=round(value - half, 2), high=round(value + half, 2), unit="deg", reason="mounting",
+        low=round(value - half, 2), high=round(value + half, 2), unit="deg", reason="frame",
     )  # fmt: skip
 
 

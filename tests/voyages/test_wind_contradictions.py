@@ -56,7 +56,7 @@ WRONG = {  # what was recorded, words of the sentence, reason
         sailed(), {"angle": lambda a, row: np.radians(a)}, '"rad"', "unit",
     ),
     "zero to starboard, a fast ship": (
-        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi / 2}, "offset = [0.0, 90]", "mounting",
+        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi / 2}, "offset = [0.0, 90]", "frame",
     ),
     "knots, a fast ship in a light wind": (
         sailed(10.0, 4.0, gusts=0.03), {"speed": lambda s, row: s / KNOT}, "kn", "unit",
