@@ -127,7 +127,7 @@ def _decided(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTria
 def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTrial:
     run, store, names, profile = of.run, of.store, of.names, of.profile
     recorded, nominal, before_effect = of.recorded, of.nominal, of.before_effect
-    notes = []
+    notes = answer.read_otherwise(run, profile)
     if before_effect and nominal is None:
         notes.append(answer.without_nominal(run, store.path))
     if run.given:
@@ -136,14 +136,14 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
     before = _nominal_windows(of) if nominal is not None else None
     if cut is not None and before is not None:
         simulator = run.extended(run.config.seeds[0], recorded)
-        if why := sign_conventions.at_once(simulator, cut, before):
+        if why := sign_conventions.at_once(simulator, cut, before, profile):
             return DiagnosedTrial(
-                answer.other_convention(run, recorded, before_effect, why, of.against), out
+                answer.other_convention(run, recorded, before_effect, why, of.against, notes), out
             )
     lacking = baseline_check.lacking(run, store, profile) if nominal is not None else run.lacks
     barred = contradicted_causes.barred(contradicted.channels(of.against), profile)
     decided = trial_decision.decided(
-        run, nominal, recorded, cut, causes, lacking, reach, barred, before
+        run, nominal, recorded, cut, causes, lacking, reach, barred, before, profile
     )
     tried, judge = decided.trial, decided.judge
     decision, found, dropped = decided.decision, decided.gain, dict(decided.refuted)
@@ -162,7 +162,7 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
         network = network_base.Own(run, tried)
         if cut is not None:
             own = run.extended(run.config.seeds[0], recorded)
-            held = HeldOut(cut, own, tried, network, before)
+            held = HeldOut(cut, own, tried, network, before, profile)
             decision, found = held.simulated_with(decision)
     lost = held.lost(found) if held else ""
     if lost:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from shiplog.profile import Actuator, Profile
+from shiplog.profile import Actuator, Profile, Source
 
 SIZES = (
     "length_m", "breadth_m", "draught_m", "mass_kg", "x_g_m", "block_coefficient",
@@ -33,15 +33,24 @@ def differences(one: Profile, other: Profile) -> tuple[str, ...]:
 
 def readings(one: Profile, other: Profile) -> tuple[str, ...]:
     """Keys of sensors and actuators that both profiles read from the same fields, with another
-    unit, sign or zero: one of the two may be wrong."""
+    unit, sign or zero, or for another one of its kind: one of the two may be wrong."""
     mine = _sources(one)
-    return tuple(
-        key
-        for key, source in _sources(other).items()
-        if key in mine
-        and (mine[key].topic, mine[key].paths) == (source.topic, source.paths)
-        and mine[key].scale() != source.scale()
-    )
+    kept: dict[tuple, set[str]] = {}
+    for key, source in mine.items():
+        kept.setdefault(_fields(source), set()).add(key)
+    found = []
+    for key, source in _sources(other).items():
+        if key not in mine:
+            continue
+        same = _fields(mine[key]) == _fields(source)
+        scaled = same and mine[key].scale() != source.scale()
+        if scaled or key not in kept.get(_fields(source), {key}):
+            found.append(key)
+    return tuple(found)
+
+
+def _fields(source: Source) -> tuple:
+    return source.topic, tuple(source.paths)
 
 
 def _compared(one: Profile, other: Profile) -> Iterator[tuple[str, Value, Value]]:

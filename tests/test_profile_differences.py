@@ -71,3 +71,13 @@ def test_the_same_field_read_in_two_ways_is_named():
     assert readings(MINE, turned) == ("actuators.rudder",)
     other = with_text(("sign = -1.0", "sign = 1.0"), ('topic = "/rudder"', 'topic = "/helm"'))
     assert readings(MINE, other) == ()
+
+
+def test_two_sources_that_read_each_others_field_are_named():
+    crossed = with_text(
+        ('topic = "/rudder"', 'topic = "/other"'), ('field = "angle_deg"', 'field = "other"'),
+        ('topic = "/propeller"', 'topic = "/rudder"'),
+        ('field = "speed_rpm"', 'field = "angle_deg"'),
+        ('topic = "/other"', 'topic = "/propeller"'), ('field = "other"', 'field = "speed_rpm"'),
+    )  # fmt: skip
+    assert readings(MINE, crossed) == ("actuators.rudder", "actuators.propeller")

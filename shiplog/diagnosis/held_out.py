@@ -13,6 +13,7 @@ from shiplog.diagnosis.network_base import Own
 from shiplog.diagnosis.result import Decision, Named
 from shiplog.diagnosis.trial import Trial
 from shiplog.models.causes import constants_of
+from shiplog.profile import Profile
 from shiplog.simulation.error_reduction import RUNAWAY, Gain, diverged, gain, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator
 from shiplog.voyages.windows import Windows
@@ -72,11 +73,13 @@ class Rollouts:
 @dataclass(frozen=True)
 class HeldOut(Rollouts):
     """Windows and model, with the trial whose causes are judged on them. `own` is a network whose
-    causes were found on another model; `nominal` are the windows of the nominal voyages."""
+    causes were found on another model; `nominal` are the windows of the nominal voyages; `read_as`
+    is the profile through which the trial was read."""
 
     trial: Trial
     own: Own | None = None
     nominal: Windows | None = None
+    read_as: Profile | None = None
 
     def states_after(self, decision: Decision, absent: str = "") -> np.ndarray:
         """[N, I, 6] by the extended model, with numbers fitted without each window's voyage;
@@ -183,7 +186,7 @@ class HeldOut(Rollouts):
     @cached_property
     def _other(self) -> sign_conventions.Tried:
         counted = self.cut.pick(np.flatnonzero(self.counted))
-        return sign_conventions.tried(self.before, counted, self.nominal)
+        return sign_conventions.tried(self.before, counted, self.nominal, self.read_as)
 
     @cached_property
     def _level(self) -> float | None:

@@ -19,6 +19,7 @@ from shiplog.frames import axes
 from shiplog.profile import Profile
 from shiplog.simulation.error_reduction import RUNAWAY, parts
 from shiplog.simulation.extended_simulator import ExtendedSimulator, as_record
+from shiplog.voyages.contradictions_words import declared
 from shiplog.voyages.instruments import Sighted
 from shiplog.voyages.windows import Windows
 
@@ -44,8 +45,11 @@ TURNS = {
 # Ratio of L: where a known convention leaves no more than this many times what the velocity of the
 # positions leaves, it is the explanation, and not that the velocity is wrong in some way.
 NEARLY = 2.0
-
-
+# The same of a slip that is none of this profile, such as km/h called knots where it states m/s: a
+# recorder may have converted twice, but two units that differ by a twentieth err alike.
+UNSTATED = 1.5
+SPOKEN = {"kn": "knots", "rad": "radians", "deg": "degrees", "rpm": "per minute",
+          "rps": "per second", "rev/s": "per second"}  # fmt: skip
 # Share of the nominal error, below which the nominal voyages have a convention, too.
 THERE_TOO = 0.8
 INSTEAD = "the velocity replaced by that of the positions"
@@ -53,11 +57,15 @@ INSTEAD = "the velocity replaced by that of the positions"
 
 @dataclass(frozen=True)
 class Turned:
-    """A convention, in words; the windows under it; and the key of the profile to change."""
+    """A convention, in words; the windows under it; and the key of the profile to change.
+
+    stated   whether the profile states the unit that the slip is called; True of what is no unit
+    """
 
     words: str
     windows: Windows
     key: str
+    stated: bool = True
 
 
 @dataclass(frozen=True)
@@ -82,15 +90,23 @@ def best(simulator: ExtendedSimulator, cut: Windows) -> tuple[str, float]:
     return found.words, found.loss
 
 
-def tried(simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None) -> Tried:
+def tried(
+    simulator: ExtendedSimulator, cut: Windows, nominal: Windows | None = None,
+    read_as: Profile | None = None,
+) -> Tried:  # fmt: skip
     """As `best`. Where nominal windows are given, conventions that these show as well are left
-    out: their model has them, too."""
+    out: their model has them, too.
+
+    read_as   the profile through which the windows were read; None where it is not known
+    """
     still = _hold(cut)
-    found = []
-    for one in conventions(simulator.profile, cut):
+    found, handicap = [], {INSTEAD: NEARLY}
+    for one in conventions(simulator.profile, cut, read_as):
         loss = _mean(simulator, one.windows) * max(still / max(_hold(one.windows), 1e-12), 1.0)
         found.append(Tried(one.words, one.key, loss))
-    found.sort(key=lambda one: one.loss * (NEARLY if one.words == INSTEAD else 1.0))
+        if not one.stated:
+            handicap[one.words] = UNSTATED
+    found.sort(key=lambda one: one.loss * handicap.get(one.words, 1.0))
     if nominal is None:
         return found[0]
     before, there = _mean(simulator, nominal), {}
@@ -121,17 +137,29 @@ def other(profile: Profile, cut: Windows) -> Iterator[tuple[str, Windows]]:
         yield one.words, one.windows
 
 
-def conventions(profile: Profile, cut: Windows) -> Iterator[Turned]:
+def conventions(profile: Profile, cut: Windows, read_as: Profile | None = None) -> Iterator[Turned]:
     """Signs of actuators of a kind, twins exchanged, their units; the wind's direction and unit;
-    heading, yaw rate and velocity."""
-    yield from _of_actuators(profile, cut)
+    heading, yaw rate and velocity. read_as   as `tried` has it"""
+    yield from _of_actuators(profile, cut, read_as)
     if cut.wind.shape[-1]:
-        yield from _of_wind(cut)
+        yield from _of_wind(cut, read_as)
     if getattr(profile, "sensors", None) is not None:
-        yield from _of_motion(profile, cut)
+        yield from _of_motion(profile, cut, read_as)
 
 
-def _of_actuators(profile: Profile, cut: Windows) -> Iterator[Turned]:
+def _stated(words: str, read_as: Profile | None, name: str, kind: str = "") -> bool:
+    """Whether the profile calls a sensor's first field, or the actuators of a kind, by the unit
+    that a slip is called."""
+    if read_as is None:
+        return True
+    if kind:
+        units = {one.unit or one.si_unit for one in read_as.actuators if one.kind == kind}
+    else:
+        units = {declared(read_as, name)}
+    return any(words.endswith(f"called {SPOKEN.get(unit, unit)}") for unit in units)
+
+
+def _of_actuators(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     actuators = profile.actuators
     for kind in dict.fromkeys(a.kind for a in actuators):
         columns = [i for i, a in enumerate(actuators) if a.kind == kind]
@@ -155,10 +183,11 @@ def _of_actuators(profile: Profile, cut: Windows) -> Iterator[Turned]:
             yield Turned(
                 f"the {kind}'s values taken as {words}", scaled(1.0 / factor),
                 f"`unit` of each [[actuators]] of the kind {kind!r}",
+                _stated(words, read_as, "", kind),
             )  # fmt: skip
 
 
-def _of_wind(cut: Windows) -> Iterator[Turned]:
+def _of_wind(cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     key = "[sensors.wind]"
     yield Turned(
         "the wind direction as the one that it blows towards",
@@ -168,6 +197,11 @@ def _of_wind(cut: Windows) -> Iterator[Turned]:
         "the wind's angle mirrored, port for starboard",
         replace(cut, wind=cut.wind * np.array([1.0, -1.0])), f"`sign` of {key}",
     )  # fmt: skip
+    for side, quarter in (("starboard", 0.5 * math.pi), ("port", -0.5 * math.pi)):
+        yield Turned(
+            f"the wind's angle counted from {side}",
+            replace(cut, wind=cut.wind + np.array([0.0, quarter])), f"`offset` of {key}",
+        )  # fmt: skip
     from_north = cut.wind.copy()
     from_north[..., 1] -= cut.state[..., 4]
     yield Turned(
@@ -177,17 +211,20 @@ def _of_wind(cut: Windows) -> Iterator[Turned]:
         yield Turned(
             f"the wind speed taken as {words}",
             replace(cut, wind=cut.wind / np.array([factor, 1.0])), f"`units` of {key}",
+            _stated(words, read_as, "wind"),
         )  # fmt: skip
 
 
-def _of_motion(profile: Profile, cut: Windows) -> Iterator[Turned]:
+def _of_motion(profile: Profile, cut: Windows, read_as: Profile | None) -> Iterator[Turned]:
     record = as_record(cut, profile, {}, {})
     seen = record.sighted
 
-    def read(words: str, key: str, change: Callable[[Sighted], Sighted]) -> Turned:
+    def read(
+        words: str, key: str, change: Callable[[Sighted], Sighted], stated: bool = True
+    ) -> Turned:
         state = record.measured_as(change(seen)).state.reshape(cut.state.shape).copy()
         state[..., 4] = np.unwrap(state[..., 4], axis=1)
-        return Turned(words, replace(cut, state=state), key)
+        return Turned(words, replace(cut, state=state), key, stated)
 
     def headed(heading: np.ndarray) -> Sighted:
         return replace(seen, heading=heading, axes=axes(heading))
@@ -212,8 +249,9 @@ def _of_motion(profile: Profile, cut: Windows) -> Iterator[Turned]:
     for factor, words in ANGLES.items():
         heading = _aligned(psi / factor, seen, cut, over_ground)
         yield read(
-            f"the heading taken as {words}", f"`unit` of {key}", lambda _, h=heading: headed(h)
-        )
+            f"the heading taken as {words}", f"`unit` of {key}", lambda _, h=heading: headed(h),
+            _stated(words, read_as, "heading"),
+        )  # fmt: skip
     if profile.sensors.yaw_rate is not None:
         key = "[sensors.yaw_rate]"
         rate = seen.yaw_rate
@@ -225,12 +263,17 @@ def _of_motion(profile: Profile, cut: Windows) -> Iterator[Turned]:
             yield read(
                 f"the yaw rate taken as {words}", f"`unit` of {key}",
                 lambda s, f=factor: replace(s, yaw_rate=rate / f),
+                _stated(words, read_as, "yaw_rate"),
             )  # fmt: skip
-    yield from _of_velocity(profile, read, seen, cut, over_ground)
+    yield from _of_velocity(read, seen, cut, over_ground, read_as)
 
 
 def _of_velocity(
-    profile: Profile, read: Callable[..., Turned], seen: Sighted, cut: Windows, over_ground: bool
+    read: Callable[..., Turned],
+    seen: Sighted,
+    cut: Windows,
+    over_ground: bool,
+    read_as: Profile | None,
 ) -> Iterator[Turned]:
     key = "[sensors.velocity]"
     velocity = seen.velocity
@@ -238,6 +281,7 @@ def _of_velocity(
         yield read(
             f"the speed taken as {words}", f"`units` of {key}",
             lambda s, f=factor: replace(s, velocity=velocity / f),
+            _stated(words, read_as, "velocity"),
         )  # fmt: skip
     if not over_ground:
         yield read(
@@ -289,11 +333,13 @@ def _aligned(heading: np.ndarray, seen: Sighted, cut: Windows, over_ground: bool
     return (each + np.angle(along.sum(1))[:, None]).reshape(-1)
 
 
-def at_once(simulator: ExtendedSimulator, cut: Windows, nominal: Windows) -> str:
+def at_once(
+    simulator: ExtendedSimulator, cut: Windows, nominal: Windows, read_as: Profile | None = None
+) -> str:
     """What a convention explains so well that no search for causes is needed: it leaves next to
     nothing of what the trial has more than the nominal voyages. Empty where none does."""
     own, level = _mean(simulator, cut), _mean(simulator, nominal)
-    found = tried(simulator, cut, nominal)
+    found = tried(simulator, cut, nominal, read_as)
     if own - found.loss < thresholds.ALL_EXCESS * (own - level):
         return ""
     return sentence(found, own) if explains(found, own, own, _hold(cut), level) else ""

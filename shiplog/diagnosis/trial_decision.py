@@ -24,6 +24,7 @@ from shiplog.diagnosis.search import Search
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import listed
 from shiplog.models.causes import Cause
+from shiplog.profile import Profile
 from shiplog.simulation.error_reduction import Gain
 from shiplog.training.load_model import Run
 from shiplog.voyages.recording import Record
@@ -55,9 +56,10 @@ def decided(
     run: Run, nominal: Record | None, recorded: Record, cut: Windows | None,
     causes: Sequence[Cause], lacking: str, reach: Callable[[str], None] = lambda stage: None,
     barred: Mapping[str, str] | None = None, before: Windows | None = None,
+    read_as: Profile | None = None,
 ) -> Decided:  # fmt: skip
     """As `setup.trial_of`; `cut` are the voyages' windows, `before` those of the nominal voyages,
-    and `reach` is called at each stage."""
+    `read_as` the voyages' own profile, and `reach` is called at each stage."""
 
     def searched(numbers: Mapping[str, np.ndarray] | None = None) -> _Searched:
         made = setup.trial_of(run, nominal, recorded, causes, lacking, numbers, barred)
@@ -70,7 +72,7 @@ def decided(
     trial = found.trial
     judge = None
     if cut is not None:
-        judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, nominal=before)
+        judge = HeldOut(cut, trial_voyages.simulator(run, trial), trial, None, before, read_as)
     reach("held-out voyages")
     decision, _, gain, refuted = refutation.judged(found.search, judge)
     return Decided(trial, found.untested, found.point, judge, decision, gain, refuted)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
+from shiplog import profile_differences
 from shiplog.diagnosis import (
     contradicted_causes,
     intermittent,
@@ -20,7 +21,9 @@ from shiplog.diagnosis.linear_segments import Linear
 from shiplog.diagnosis.omitted_inputs import Dependence
 from shiplog.diagnosis.result import Decision
 from shiplog.diagnosis.trial import Trial
+from shiplog.exceptions import listed
 from shiplog.models.causes import CATALOGUE, Cause
+from shiplog.profile import Profile
 from shiplog.report import verdict as verdicts
 from shiplog.report.verdict import Verdict
 from shiplog.report.verdict_sentence import less, sentence
@@ -199,6 +202,17 @@ def tests_of_open(ranking: Mapping[str, float], causes: Sequence[Cause]) -> list
     ]
 
 
+def read_otherwise(run: Run, profile: Profile) -> list[str]:
+    """A note where these voyages were read otherwise than those of the model."""
+    if not (keys := profile_differences.readings(run.profile, profile)):
+        return []
+    return [
+        f"These voyages were read with another unit, sign, zero or order of {listed(keys)} than "
+        f"those of {run.name}, from the same fields. If no instrument was changed, one of the two "
+        "profiles is wrong, and a cause that is named may be no change of the ship."
+    ]
+
+
 def of_given(run: Run) -> str:
     """A note on a model that was fitted to no voyage."""
     return (
@@ -283,8 +297,9 @@ def contradicted(
 
 
 def other_convention(
-    run: Run, recorded: Record, before_effect: bool, why: str, found: Sequence[Contradicted] = ()
-) -> Verdict:
+    run: Run, recorded: Record, before_effect: bool, why: str, found: Sequence[Contradicted] = (),
+    notes: Sequence[str] = (),
+) -> Verdict:  # fmt: skip
     """The verdict where the profile reads these logs otherwise than those of the model: all that
     the trial has more than the nominal voyages goes with one sign, place or unit.
 
@@ -300,7 +315,7 @@ def other_convention(
     return Verdict(
         "unknown", said, run.name, before_effect, made_of(run, recorded), structure=structure,
         unavailable=verdicts.rejected_json({c.name: OTHERWISE for c in CATALOGUE}),
-        notes=(note,), contradictions=tuple(one.as_json() for one in found),
+        notes=(*notes, note), contradictions=tuple(one.as_json() for one in found),
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ by a delay, and a unit by a scale.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import polars as pl
@@ -17,6 +18,8 @@ from shiplog.voyages.contradictions import Contradictions
 from shiplog.voyages.sensor_findings import Estimate
 
 MOVING = frozenset({"position", "velocity", "heading"})  # in doubt, they say nothing of the wind
+# Of a channel: the one that its "held" and its "jump" are measured by, and are wrong with it.
+MEASURED_BY = {"heading": "yaw_rate", "position": "velocity"}
 AFTER = "the same comparison once the profile is corrected"
 
 
@@ -49,3 +52,14 @@ def compare(table: pl.DataFrame, profile: Profile) -> Comparison:
     left += wind.not_compared
     found = (*gross.findings, *wind.findings, *small)
     return Comparison(gross, fine.estimates, found, tuple(left))
+
+
+def beside(of_rows: Iterable[Finding], found: Iterable[Finding]) -> list[Finding]:
+    """What was found row by row, but for what a contradicted channel makes of another one: a yaw
+    rate that is 60 times too large holds the heading, and steps beside it."""
+    wrong = {one.channel for one in found if one.kind == "contradiction"}
+    return [
+        one
+        for one in of_rows
+        if one.kind not in ("held", "jump") or MEASURED_BY.get(one.channel) not in wrong
+    ]

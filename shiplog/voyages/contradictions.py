@@ -17,6 +17,7 @@ from shiplog.profile import Profile
 from shiplog.voyages import contradictions_drive as drive
 from shiplog.voyages import contradictions_places as places
 from shiplog.voyages import contradictions_turning as turning
+from shiplog.voyages import twins
 from shiplog.voyages.contradictions_actuators import ASTERN, Driven
 from shiplog.voyages.contradictions_evidence import Evidence, gather
 from shiplog.voyages.contradictions_track import Track, track
@@ -89,6 +90,7 @@ def _not_compared(t: Track, e: Evidence, counted: list[Driven]) -> Iterator[NotC
             "a position in latitude and longitude",
         )  # fmt: skip
     yield from _actuators(t, e, counted)
+    yield from twins.not_compared(t.profile, t.driven, counted)
 
 
 def _heading(t: Track, e: Evidence) -> Iterator[NotCompared]:

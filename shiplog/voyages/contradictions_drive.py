@@ -26,7 +26,7 @@ from shiplog.voyages.contradictions_track import Track
 from shiplog.voyages.contradictions_words import offset_line, sign_line
 
 DRIVES = 0.2  # of the largest thrust: the ship is driven
-MOSTLY = 0.8  # of the time under way
+MOSTLY = 0.75  # of the time under way; the ship coasts for the rest
 BEAM_DEG = (60.0, 120.0)
 
 
@@ -214,10 +214,11 @@ def _reversed(t: Track, way: Way, found: Sequence[Driven]) -> Finding:
 
 def _abeam(t: Track, way: Way) -> Finding:
     shown = -way.angle
+    quarter = math.copysign(90.0, shown)
     sentence = (
         f"The ship is driven ahead by {_names(t)} and goes sideways by its heading, "
         f"{abs(way.angle):.0f} deg off the bow (within {way.half:.0f}) on all courses. It is the "
-        f"heading, counted from another axis. Change: {_heading_line(t, shown)}."
+        f"heading, counted from another axis. Change: {_heading_line(t, quarter)}."
     )
     interval = shown, shown - way.half, shown + way.half
     return of_voyage(t, "heading", interval, "deg", "frame", sentence)

@@ -187,7 +187,8 @@ def _angle(e: Evidence, fit: Regression) -> Iterator[Finding]:
     else:
         magnetic = not e.t.body and abs(value) < MAGNETIC_DEG
         reason = "frame" if quarter or magnetic else "mounting"
-        lines = _turned_lines(e, culprit, value, magnetic, quarter)
+        turned = math.copysign(90.0, value) if quarter else value
+        lines = _turned_lines(e, culprit, turned, magnetic, quarter)
     e.faulty |= {culprit} if culprit else set(TWO)
     side = "" if reversed_ else f" to {'starboard' if value > 0 else 'port'}"
     sentence = (

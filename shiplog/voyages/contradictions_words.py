@@ -75,9 +75,8 @@ def converted_twice(
         return None
     sensor = sensor_of(profile, name)
     others = sensor.sign[index] if isinstance(sensor.sign, tuple) else sensor.sign
-    whole = name != "velocity" or profile.sensors.kind(name) != "sog_cog"
     text = f"{others / stored_over_true:.4g}"
-    factor = text if whole else _each(sensor, index, text, "1.0")
+    factor = text if _alike(profile, name) else _each(sensor, index, text, "1.0")
     return f"sign = {factor} on [sensors.{name}], the factor between {a} and {b}"
 
 
@@ -92,12 +91,17 @@ def unit_line(profile: Profile, name: str, unit: str, index: int = 0) -> str:
     if len(sensor.paths) == 1:
         return f'unit = "{unit}" {place}'
     listed = [declared(profile, name, i) for i in range(len(sensor.paths))]
-    both = name != "velocity" or profile.sensors.kind(name) != "sog_cog"
+    both = _alike(profile, name)
     listed = [unit if both or i == index else one for i, one in enumerate(listed)]
     if len(set(listed)) == 1:
         return f'unit = "{unit}" {place}'
     quoted = ", ".join(f'"{one}"' for one in listed)
     return f"units = [{quoted}] {place}"
+
+
+def _alike(profile: Profile, name: str) -> bool:
+    """Whether all fields of a sensor have one unit: not of a speed and its direction."""
+    return profile.sensors.kind(name) not in ("sog_cog", "from_bow")
 
 
 def _each(sensor: Sensor, index: int, value: str, others: str) -> str:
@@ -121,11 +125,19 @@ def sign_line(profile: Profile, name: str, index: int | None = None) -> str:
 
 
 def offset_line(profile: Profile, name: str, degrees: float, index: int | None = None) -> str:
-    """`offset = [0.0, 20.0] on [sensors.velocity]`: the raw value that stands for zero."""
-    unit = declared(profile, name, index or 0)
-    shown = math.radians(degrees) if unit == "rad" else degrees
-    sensor = sensor_of(profile, name)
-    text = _each(sensor, index or 0, f"{shown:.4g}", "0.0")
+    """`offset = [0.0, 20.0] on [sensors.velocity]`: the raw value that stands for zero, where the
+    channel as it is read stands `degrees` further on than it should. An offset and a sign that the
+    profile states already are part of it: with v = s (w - o), v - d = s (w - o - d/s)."""
+    sensor, at = sensor_of(profile, name), index or 0
+    offsets, signs = (
+        one if isinstance(one, tuple) else (one,) * len(sensor.paths)
+        for one in (sensor.offset, sensor.sign)
+    )
+    turn = 2.0 * math.pi if declared(profile, name, at) == "rad" else 360.0
+    found = offsets[at] + degrees * turn / 360.0 / signs[at]
+    found -= turn * math.ceil(found / turn - 0.5)
+    texts = [f"{found + 0.0:.4g}" if i == at else f"{one:.1f}" for i, one in enumerate(offsets)]
+    text = f"[{', '.join(texts)}]" if len(texts) > 1 else texts[0]
     return f"offset = {text} on [sensors.{name}]"
 
 

@@ -24,6 +24,8 @@ from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
     beside,
     clocks,
+    comparison,
+    datum,
     empty_course,
     orientation,
     plausible_measures,
@@ -52,7 +54,6 @@ LEAST_ROWS, MOST_ROWS = 1_000_000, 1_000
 FARTHEST_DEG = (90.0, 360.0)  # latitude and longitude, whichever way the latter is counted
 NO_FIX_DEG = (91.0, 181.0)  # what AIS sends of a position that it does not know
 LARGEST = 1e12  # as the profile has it: what is beyond, as the largest float of all, is no value
-NEAR_DEG = 1.0  # from the median position: (0, 0) before the first fix is further away than that
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +93,12 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *compared.findings),
+        findings=(
+            *reading.health.findings,
+            *aligned.left_out,
+            *comparison.beside(grid.findings, compared.findings),
+            *compared.findings,
+        ),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(
@@ -125,8 +131,15 @@ def consistency_of(reading: Reading, profile: Profile, sent: Mapping[str, Sender
 def _compared(aligned: _Aligned, profile: Profile) -> Comparison:
     """Sensors against each other, and then against what ships and winds can do."""
     compared = compare(aligned.table, profile)
+    known = {one.channel for one in compared.findings if one.kind == "contradiction"}
+    if aligned.misplaced is not None and not known & {"position", "velocity"}:
+        compared = replace(compared, findings=(*compared.findings, aligned.misplaced))
     implausible = plausible_measures.of_log(aligned.table, profile, compared.findings)
-    return replace(compared, findings=(*compared.findings, *implausible))
+    return replace(
+        compared,
+        findings=(*compared.findings, *implausible),
+        not_compared=(*compared.not_compared, *plausible_measures.not_compared(profile)),
+    )
 
 
 @dataclass(frozen=True)
@@ -137,7 +150,8 @@ class _Aligned:
     grid: VoyageGrid
     samples: list[tuple[str, resampling.Samples]]  # of each sensor and actuator
     left_out: list[Finding]
-    datum: tuple[float, float] | None
+    datum: datum.Place | None
+    misplaced: Finding | None  # a datum that lies elsewhere
 
 
 def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> _Aligned:
@@ -179,7 +193,7 @@ def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) ->
         )
     grid = VoyageGrid(resampling.grid(start, end), explained=screen.explained)
     grid.findings += screen.findings(start)
-    datum = _motion(grid, reading, profile, sampled)
+    origin, misplaced = _motion(grid, reading, profile, sampled)
     if profile.sensors.wind is not None:
         _wind(grid, profile.sensors.wind, sampled["wind"])
     for actuator in profile.actuators:
@@ -199,7 +213,7 @@ def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) ->
         pl.col(profile.columns).fill_nan(None),
     )
     found = [*shared, *moved, *mounting, *status.said(grid, refused)]
-    return _Aligned(table, grid, [*every.items()], found, datum)
+    return _Aligned(table, grid, [*every.items()], found, origin, misplaced)
 
 
 def _instrument(name: str, samples: resampling.Samples) -> Instrument:
@@ -319,8 +333,9 @@ def _metric(value: np.ndarray, kind: str) -> np.ndarray:
 
 def _motion(
     grid: VoyageGrid, reading: Reading, profile: Profile, sampled: dict[str, resampling.Samples]
-) -> tuple[float, float] | None:
-    """Position, heading, velocity and yaw rate at midship. Returns the datum, if geodetic."""
+) -> tuple[datum.Place | None, Finding | None]:
+    """Position, heading, velocity and yaw rate at midship. Returns the datum, if geodetic, and what
+    is to be said of it."""
     sensors, kind = profile.sensors, profile.sensors.kind
     heading = grid.place("heading", sampled["heading"])[:, 0]
     if sensors.yaw_rate is not None:
@@ -329,10 +344,10 @@ def _motion(
         turning = sample_faults.differentiated(sampled["heading"])
         yaw_rate = resampling.onto(grid.times, turning).value[:, 0]
     position = grid.place("position", sampled["position"])
-    datum = None
+    origin, said = None, None
     if kind("position") == "geodetic":
-        datum = _datum(reading, profile, sampled["position"])
-        position = frames.local_plane(position[:, 0], position[:, 1], datum)
+        origin, said = datum.of(reading, profile, sampled["position"])
+        position = frames.local_plane(position[:, 0], position[:, 1], origin)
     position = frames.position_at_midship(position, heading, sensors.position.lever_arm_m)
     velocity = grid.place("velocity", sampled["velocity"])
     if kind("velocity") != "body":
@@ -342,36 +357,7 @@ def _motion(
         "x0": position[:, 0], "y0": position[:, 1], "heading": frames.wrap(heading),
         "surge": velocity[:, 0], "sway": velocity[:, 1], "yaw_rate": yaw_rate,
     }  # fmt: skip
-    return datum
-
-
-def _datum(reading: Reading, profile: Profile, position: resampling.Samples) -> tuple[float, float]:
-    """The log's own datum, else the profile's, else the first fix that lies near the others."""
-    text = reading.contents.metadata.get("voyage", {}).get("datum", "")
-    try:
-        latitude, longitude = (float(part) for part in text.split(","))
-        return latitude, longitude
-    except ValueError:
-        pass
-    if profile.site.datum is not None:
-        return profile.site.datum
-    if len(position.value) == 0:
-        raise LogUnreadable(
-            f"{reading.contents.path.name} holds no usable position on "
-            f"{profile.sensors.position.topic}.",
-            hint="check topic and fields of the position in the profile; `shiplog profile LOG` "
-            "drafts one from the topics of the log.",
-        )
-    away = np.abs(position.value - np.median(position.value, axis=0)).max(axis=1)
-    first = int(np.argmax(away < NEAR_DEG))  # 0 where none is near
-    if first:
-        log.warning(
-            "%s: the datum is position %d, not the first, which lies %.0f degrees from the median "
-            "of all, as of a receiver before its first fix",
-            reading.contents.path.name, first + 1, away[0],
-        )  # fmt: skip
-    latitude, longitude = map(float, position.value[first])
-    return latitude, longitude - 360.0 * round(longitude / 360.0)
+    return origin, said
 
 
 def _wind(grid: VoyageGrid, sensor: Sensor, samples: resampling.Samples) -> None:

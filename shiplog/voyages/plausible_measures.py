@@ -13,8 +13,9 @@ import numpy as np
 import polars as pl
 
 from shiplog.channels import UNUSABLE
-from shiplog.logs.health_report import Finding
+from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Actuator, Profile
+from shiplog.voyages import twins
 from shiplog.voyages.plausibility import LEAST_BLOCK, SHIP, Asked, findings
 from shiplog.voyages.resampling import RATE_HZ
 
@@ -32,6 +33,10 @@ TURNS = 0.2  # r L/U from which a ship turns hard: a rudder of 5 to 10 deg
 K_T = 0.3  # thrust coefficient of a propeller at rest: 0.2 to 0.5 (Carlton, 2018)
 TURN = ("heading", "yaw_rate", "velocity")  # what a turning rate r L/U is made of
 APART = ("place", "rudder ahead")  # asked of each unit, said of the worst
+LENGTH_OPEN = NotCompared(
+    "the ship's length", "no channel shows it, and of mass, breadth, draught and block coefficient "
+    "the profile lacks some", "all four of them in the profile",
+)  # fmt: skip
 
 
 def of_log(table: pl.DataFrame, profile: Profile, found: Sequence[Finding] = ()) -> list[Finding]:
@@ -42,7 +47,14 @@ def of_log(table: pl.DataFrame, profile: Profile, found: Sequence[Finding] = ())
     """
     known = {one.channel for one in found if one.kind == "contradiction"}
     asked = [*of_profile(profile), *of_voyage(table, profile)]
-    return findings(one for one in asked if not known & {one.channel, *one.of})
+    of_ratios = findings(one for one in asked if not known & {one.channel, *one.of})
+    return [*of_ratios, *twins.by_limits(table, profile)]
+
+
+def not_compared(profile: Profile) -> tuple[NotCompared, ...]:
+    """What nothing of the profile bounds: a length in feet is 3.3 times that in metres, and is seen
+    by the displacement alone, m = ρ C_B L B T."""
+    return () if any(one.row == "floating" for one in _particulars(profile)) else (LENGTH_OPEN,)
 
 
 def of_profile(profile: Profile) -> list[Asked]:

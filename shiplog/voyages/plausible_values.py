@@ -50,12 +50,14 @@ SPEEDS = ("sog", "surge", "sway", "velocity_north", "velocity_east")
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a channel can be, SI, and why. `stated`: by the profile."""
+    """What a channel can be, SI, and why. `stated`: by the profile; also: another key of it that
+    they are made of."""
 
     least: float
     most: float
     why: str = ""
     stated: bool = False
+    also: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +210,7 @@ class Screen:
         else:
             why = limits.why
             way = f"if they are true, set `limits` of {section}; else look at its `unit` and `sign`"
+            way += limits.also
         self.left_out.append(LeftOut(
             "implausible", name, times[at],
             f"{name}: {at.sum()} of {len(at)} values are beyond {span} ({why}), at most "
@@ -290,7 +293,9 @@ def limits_of(
         found = Limits(-most, most, why)
     elif channel == "yaw_rate":
         most = FASTEST_GYRO if length is None else min(2.0 * ENDS_M_S / length, FASTEST_GYRO)
-        found = Limits(-most, most, f"its ends go athwart at less than {ENDS_M_S:g} m/s")
+        of = "" if length is None else f" of {length:g} m"
+        why = f"the ends of a ship{of} go athwart at less than {ENDS_M_S:g} m/s"
+        found = Limits(-most, most, why, also=", and at `length_m` of [ship]")
     elif channel == "wind_speed":
         found = Limits(*WIND, "no wind at sea was stronger")
     else:

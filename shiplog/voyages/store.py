@@ -215,8 +215,8 @@ class Store:
                 )
             elif other := readings(chosen, profile):
                 log.warning(
-                    "%s and %s were read with another unit, sign or zero of %s from the same "
-                    "fields: if no instrument was changed, ingest them again with one profile",
+                    "%s and %s were read with another unit, sign, zero or order of %s from the "
+                    "same fields: if no instrument was changed, ingest them again with one profile",
                     first, name, listed(other),
                 )  # fmt: skip
         if chosen is None:

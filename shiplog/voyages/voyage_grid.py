@@ -163,8 +163,10 @@ def _jumps(
 ) -> list[tuple[int, float]]:
     """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are; but for
     those that are a step in which the instrument counts there, of samples `scale` times as large.
+    An actuator beyond its limits says nothing of the motion.
     """
-    usable = (grid.marks & int(channels.UNUSABLE | Quality.HELD)) == 0
+    bad = (channels.UNUSABLE | Quality.HELD) & ~Quality.LIMITS
+    usable = (grid.marks & int(bad)) == 0
     every = max(round(samples.period_s / STEP_S), 1)
     if every > 1:
         usable &= samples.nearest_rows(grid.times)

@@ -13,10 +13,9 @@ is tried, and its spread compared with that of the record as it is:
     e_h = mean |W_h - W̄_h - Ẇ_h t|² / |W̄_h|²
 
 A convention is reported where e is less than a quarter of that of the record, in enough parts of
-the voyage that chance is excluded. The ship's own speed gives the unit: with R(ψ) a = W + β V, β
-is 1, or what the hull does to the flow; -1 where the vane says where the wind blows to, 1.944 of
-knots.
-Nothing is said of a voyage that hardly turns.
+the voyage that chance is excluded. The ship's own speed gives the unit and the vane's zero
+(`wind_slope`); what it does not exclude is listed as not compared. Nothing is said of a voyage that
+hardly turns.
 """
 
 from __future__ import annotations
@@ -31,7 +30,15 @@ import polars as pl
 from shiplog.channels import UNUSABLE, Quality
 from shiplog.logs.health_report import Finding, NotCompared
 from shiplog.profile import Profile
+from shiplog.voyages.contradictions_words import (
+    converted_twice,
+    offset_line,
+    other_unit,
+    sign_line,
+    unit_line,
+)
 from shiplog.voyages.resampling import RATE_HZ
+from shiplog.voyages.wind_slope import FLOW, SLOPES, Slope, slope
 
 SECOND_ROWS = round(RATE_HZ)  # rows of the 10 Hz table that are averaged: gusts, not noise
 BLOCKS = 12  # parts of a voyage that each vote
@@ -43,9 +50,6 @@ RATIO = 4.0  # times the spread must fall: gusts of a third of the wind do not m
 ALIKE = 1.5  # times the least spread, and still as good
 VOTES_T = 3.5  # Student's t of the parts' votes: chance of 1 in 400 with 12 of them
 GUSTS = 0.15  # of the wind: what turbulence at sea is in any case; less spread says no more
-# Measured over free speed at a mast: a fifth more above a bridge, and less in its lee (Moat,
-# Yelland and Molland, 2004). Whatever lies within is no other unit.
-FLOW = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
 WIND_MPS = 1.0  # mean true wind below which there is no direction to compare
 MOST_SPREAD = 0.35  # e of a convention that can be right: the wind's own turbulence is less
 
@@ -56,7 +60,7 @@ class Convention:
 
     name: str
     true_wind: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-    key: str
+    key: Callable[[Profile], str] | None
     reason: str
 
 
@@ -69,47 +73,57 @@ def _from_body(turn: Callable[[np.ndarray], np.ndarray]) -> Callable:
     return true_wind
 
 
-_SIGN = "set `sign = [1.0, -1.0]` on [sensors.wind]"
-_TOWARDS = "set `offset = [0.0, 180.0]` on [sensors.wind]"
+def _sign(profile: Profile) -> str:
+    return f"set `{sign_line(profile, 'wind', 1)}`"
+
+
+def _zero(profile: Profile, degrees: float = 180.0) -> str:
+    return f"set `{offset_line(profile, 'wind', degrees, 1)}`"
+
+
+def _unit(profile: Profile, known: float) -> str:
+    """Of a speed that is `known` times what it should be."""
+    if unit := other_unit(profile, "wind", known, known, known):
+        return f"set `{unit_line(profile, 'wind', unit)}`"
+    twice = converted_twice(profile, "wind", known, known, known)
+    return f"set `{twice}`" if twice else "correct the unit of the speed on [sensors.wind]"
+
+
 _NO_KIND = "shiplog takes the apparent wind from the bow: name its topic and fields"
 CONVENTIONS = (
-    Convention("as it is", _from_body(lambda angle: angle), "", "none known"),
-    Convention("positive to port", _from_body(lambda angle: -angle), _SIGN, "sign"),
-    Convention("where it blows to", _from_body(lambda angle: angle + math.pi), _TOWARDS, "frame"),
+    Convention("as it is", _from_body(lambda angle: angle), None, "none known"),
+    Convention("positive to port", _from_body(lambda angle: -angle), _sign, "sign"),
+    Convention("where it blows to", _from_body(lambda angle: angle + math.pi), _zero, "frame"),
     Convention(
         "where it blows to, positive to port", _from_body(lambda angle: math.pi - angle),
-        f"{_SIGN}, and `offset = [0.0, 180.0]`", "frame",
+        lambda profile: f"{_sign(profile)}, and {_zero(profile)}", "frame",
+    ),
+    Convention(
+        "counted from the starboard side", _from_body(lambda angle: angle + 0.5 * math.pi),
+        lambda profile: _zero(profile, -90.0), "frame",
+    ),
+    Convention(
+        "counted from the port side", _from_body(lambda angle: angle - 0.5 * math.pi),
+        lambda profile: _zero(profile, 90.0), "frame",
     ),
     Convention(
         "in radians, read as degrees", _from_body(lambda angle: angle * 180.0 / math.pi),
-        'set the unit of the angle to "rad" on [sensors.wind]', "unit",
+        lambda profile: f"set `{unit_line(profile, 'wind', 'rad', 1)}`", "unit",
     ),
     Convention(
         "counted from north",
-        lambda s, g, psi, v: s * np.exp(1j * g) - v * np.exp(1j * psi), _NO_KIND, "frame",
+        lambda s, g, psi, v: s * np.exp(1j * g) - v * np.exp(1j * psi), None, "frame",
     ),
     Convention(
-        "the true wind, from the bow", lambda s, g, psi, v: s * np.exp(1j * (g + psi)), _NO_KIND,
+        "the true wind, from the bow", lambda s, g, psi, v: s * np.exp(1j * (g + psi)), None,
         "frame",
     ),
     Convention(
-        "the true wind, from north", lambda s, g, psi, v: s * np.exp(1j * g) + 0.0 * v, _NO_KIND,
+        "the true wind, from north", lambda s, g, psi, v: s * np.exp(1j * g) + 0.0 * v, None,
         "frame",
     ),
 )  # fmt: skip
-SLOPES = {  # β of each reading of the speed, and what to write
-    -1.0: ("where it blows to", _TOWARDS, "frame"),
-    3600 / 1852: ("in knots", 'set the unit of the speed to "kn" on [sensors.wind]', "unit"),
-    3.6: ("in km/h", 'set the unit of the speed to "km/h" on [sensors.wind]', "unit"),
-    1852 / 3600: ("in m/s, and not in knots", "correct the unit of the speed", "unit"),
-    1 / 3.6: ("in m/s, and not in km/h", "correct the unit of the speed", "unit"),
-}
-SLOPE_BLOCK_S = 100  # s over which the wind's slow change is taken out of β
-SLOPE_BLOCKS = 5  # fewer give β no standard error
-HALF_90 = 1.645  # standard errors of a 90 % interval
 LEAST_GAIN = 2.0  # times by which another unit lessens what varies of the wind
-NEAR_SLOPE = 0.15  # share by which β may be off a known one: the hull's flow, and gusts
-SURE_ERRORS = 4.0  # standard errors between β and any flow past a hull
 
 
 @dataclass(frozen=True)
@@ -123,10 +137,6 @@ class WindComparison:
 HARDLY_TURNS = WindComparison(not_compared=(
     NotCompared("wind", "the ship hardly turns", "turns to both sides, for minutes"),
 ))  # fmt: skip
-TOO_SLOW = NotCompared(
-    "the wind's unit, and whether it blows from or to", "the ship is slow beside the gusts",
-    "changes of a higher speed, or less wind",
-)  # fmt: skip
 
 
 def compare(table: pl.DataFrame, profile: Profile) -> WindComparison:
@@ -136,37 +146,43 @@ def compare(table: pl.DataFrame, profile: Profile) -> WindComparison:
     seconds = _seconds(table)
     if seconds is None:
         return HARDLY_TURNS
-    speed, angle, heading, velocity = seconds
-    if len(speed) < LEAST_S or 1.0 - abs(np.exp(1j * heading).mean()) < LEAST_TURNING:
+    heading = seconds[2]
+    if len(heading) < LEAST_S or 1.0 - abs(np.exp(1j * heading).mean()) < LEAST_TURNING:
         return HARDLY_TURNS
-    beta, error = _slope(speed, angle, heading, velocity)
-    found = _contradiction(seconds, beta, error, table)
-    if found:
-        return WindComparison((found,))
-    slow = max(FLOW) + SURE_ERRORS * error > 3600 / 1852
-    return WindComparison(not_compared=(TOO_SLOW,) if slow else ())
+    of = slope(*seconds)
+    found = _contradiction(seconds, of, profile, table)
+    return WindComparison((found,)) if found else WindComparison(not_compared=of.open_)
 
 
 def _contradiction(
-    seconds: tuple[np.ndarray, ...], beta: float, error: float, table: pl.DataFrame
+    seconds: tuple[np.ndarray, ...], of: Slope, profile: Profile, table: pl.DataFrame
 ) -> Finding | None:
     speed, angle, heading, velocity = seconds
     spreads = {c: _least_spread(c, speed, angle, heading, velocity) for c in CONVENTIONS}
-    known = _known_slope(beta, error)
     air = speed * np.exp(1j * angle)
-    of_speed = _left(air - (known or 1.0) * velocity, heading)
-    if known and _left(air - velocity, heading) < LEAST_GAIN * of_speed:
-        known = None  # something else turns with the ship
+
+    def gain(beta: complex) -> float:
+        """Times by which this β lessens what varies of the wind."""
+        return _left(air - velocity, heading) / max(_left(air - beta * velocity, heading), 1e-12)
+
+    known = of.known
+    beta = known or (np.exp(1j * of.turned) if of.turned else None)
+    if beta is not None and gain(beta) < LEAST_GAIN:
+        beta = None  # something else turns with the ship
     as_it_is, best = spreads[CONVENTIONS[0]], _best(spreads)
     after = spreads[best] if best else None
     turned = after is not None and as_it_is is not None and _better(as_it_is, after)
-    if known and turned and best:  # the one that leaves less, in m/s, of what turns with the ship
+    if beta is not None and turned and best:
+        # the one that leaves less, in m/s, of what turns with the ship
+        of_speed = _left(air - beta * velocity, heading)
         of_angle = _left(best.true_wind(speed, angle, heading, velocity))
         turned = of_angle * ALIKE < of_speed
     if turned and best and after is not None and as_it_is is not None:
         times = math.sqrt(as_it_is.mean() / max(float(after.mean()), 1e-12))
-        return _of_angle(best, times, table)
-    return _of_slope(known, beta, error, table) if known else None
+        return _of_angle(best, times, profile, table)
+    if beta is None:
+        return None
+    return _of_slope(of, known, profile, table) if known else _of_zero(of, profile, table)
 
 
 def _left(wind: np.ndarray, heading: np.ndarray | float = 0.0) -> float:
@@ -192,37 +208,11 @@ def _better(before: np.ndarray, after: np.ndarray) -> bool:
     return bool(votes.mean() > VOTES_T * votes.std(ddof=1) / math.sqrt(BLOCKS))
 
 
-def _slope(speed, angle, heading, velocity) -> tuple[float, float]:
-    """β of R(ψ) a = W + β V by least squares, W free in each block; its standard error between
-    the blocks (Liang and Zeger, 1986); infinite where too little is known."""
-    air = speed * np.exp(1j * (angle + heading))
-    moved = velocity * np.exp(1j * heading)
-    products, squares = [], []
-    for begin in range(0, len(air) - SLOPE_BLOCK_S + 1, SLOPE_BLOCK_S):
-        rows = slice(begin, begin + SLOPE_BLOCK_S)
-        along = moved[rows] - moved[rows].mean()
-        products.append(float((air[rows] * along.conj()).real.sum()))
-        squares.append(float((np.abs(along) ** 2).sum()))
-    if len(squares) < SLOPE_BLOCKS or sum(squares) == 0.0:
-        return 1.0, math.inf
-    product, square = np.array(products), np.array(squares)
-    beta = float(product.sum() / square.sum())
-    error = math.sqrt(float(((product - beta * square) ** 2).sum())) / square.sum()
-    return beta, error * math.sqrt(len(square) / (len(square) - 1))
-
-
-def _known_slope(beta: float, error: float) -> float | None:
-    """The reading of the speed that β is near to, where it is far from all that a hull does."""
-    low, high = min(FLOW) - SURE_ERRORS * error, max(FLOW) + SURE_ERRORS * error
-    if not math.isfinite(error) or low < beta < high:
-        return None
-    known = min(SLOPES, key=lambda slope: abs(beta / slope - 1.0))
-    return known if abs(beta / known - 1.0) <= NEAR_SLOPE else None
-
-
-def _of_slope(known: float, beta: float, error: float, table: pl.DataFrame) -> Finding:
-    words, key, reason = SLOPES[known]
-    low, high = beta - HALF_90 * error, beta + HALF_90 * error
+def _of_slope(of: Slope, known: float, profile: Profile, table: pl.DataFrame) -> Finding:
+    words, reason = SLOPES[known]
+    key = _zero(profile) if known < 0.0 else _unit(profile, known)
+    beta, half = of.value.real, of.half(of.error)
+    low, high = beta - half, beta + half
     sentence = (
         f"wind contradicts the ship's own motion: the apparent wind grows by {beta:.2f} m/s for "
         f"each m/s of the ship's velocity ({low:.2f} to {high:.2f}), and not by 1, as if it were "
@@ -230,7 +220,22 @@ def _of_slope(known: float, beta: float, error: float, table: pl.DataFrame) -> F
     )
     return Finding(
         "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(beta, 3),
-        low=round(float(low), 3), high=round(float(high), 3), unit="1", reason=reason,
+        low=round(low, 3), high=round(high, 3), unit="1", reason=reason,
+    )  # fmt: skip
+
+
+def _of_zero(of: Slope, profile: Profile, table: pl.DataFrame) -> Finding:
+    value = math.degrees(of.turned)
+    half = math.degrees(of.half(max(of.error, of.error_aside)) / abs(of.value))
+    side = "starboard" if value > 0 else "port"
+    sentence = (
+        "wind contradicts the ship's own motion: the ship's headway comes from "
+        f"{abs(value):.0f} deg ({abs(value) - half:.0f} to {abs(value) + half:.0f}) to {side}, and "
+        f"not from ahead. Look at the vane's zero; if so, {_zero(profile, round(value))}."
+    )
+    return Finding(
+        "contradiction", "wind", sentence, start_s=0.0, end_s=_end(table), value=round(value, 2),
+        low=round(value - half, 2), high=round(value + half, 2), unit="deg", reason="frame",
     )  # fmt: skip
 
 
@@ -278,14 +283,17 @@ def _spread(true_wind: np.ndarray) -> np.ndarray | None:
     return np.abs(true_wind - mean - trend * t) ** 2 / abs(mean) ** 2
 
 
-def _of_angle(convention: Convention, times: float, table: pl.DataFrame) -> Finding:
+def _of_angle(
+    convention: Convention, times: float, profile: Profile, table: pl.DataFrame
+) -> Finding:
+    key = convention.key(profile) if convention.key else _NO_KIND
     sentence = (
         f"wind contradicts the ship's own motion: the true wind turns with the ship, {times:.1f} "
         f"times as much as it would if the recorded angle is {convention.name}. Look at the "
-        f"anemometer; if so, {convention.key}."
+        f"anemometer; if so, {key}."
     )
     # A vane that is stuck looks like one that counts from north: then it is a question.
-    kind = "implausible" if convention.key == _NO_KIND else "contradiction"
+    kind = "contradiction" if convention.key else "implausible"
     return Finding(
         kind, "wind", sentence, start_s=0.0, end_s=_end(table), value=round(times, 3), unit="1",
         reason=convention.reason,

@@ -162,6 +162,9 @@ SLIPS = {
     "the wind speed taken as m/s that are called knots": lambda: blown(
         lambda w: w * np.array([KNOTS, 1.0])
     ),
+    "the wind's angle counted from starboard": lambda: blown(
+        lambda w: w - np.array([0.0, 0.5 * np.pi])
+    ),
     "the rudder's values taken as radians that are called degrees": lambda: scaled(
         0, np.pi / 180.0
     ),
@@ -196,6 +199,17 @@ def test_a_sound_trial_has_no_convention_that_explains_it():
     own = float(np.mean(model.losses(cut)))
     found = sign_conventions.tried(model, cut, sailed())
     assert not sign_conventions.explains(found, own, own, sign_conventions._hold(cut), 1.0)
+
+
+@pytest.mark.parametrize("unit", ["kn", "km/h"])
+def test_of_two_units_that_err_alike_the_one_that_the_profile_states_is_said(unit):
+    """km/h called knots and m/s called knots differ by 5 %: the profile says knots, or not."""
+    spoken = {"kn": "knots", "km/h": "km/h"}[unit]
+    text = sailing.PROFILE.replace('units = ["m/s", "deg"]', f'units = ["{unit}", "deg"]')
+    between = 0.97 * {"kn": KNOTS, "km/h": 1.0 / 3.6}[unit]
+    cut = blown(lambda w: w * np.array([between, 1.0]))
+    found = sign_conventions.tried(as_sailed(), cut, sailed(), sailing.profile(text))
+    assert found.words == f"the wind speed taken as m/s that are called {spoken}"
 
 
 def test_a_convention_that_the_nominal_voyages_have_too_is_left_out():

@@ -262,7 +262,7 @@ def test_a_mirrored_vane_turns_the_wind_with_the_ship():
     (found,) = wind_of(psi, speed, of, -angle)
     assert (found.kind, found.channel, found.reason) == ("contradiction", "wind", "sign")
     assert "positive to port" in found.sentence
-    assert "sign = [1.0, -1.0]` on [sensors.wind]" in found.sentence
+    assert "`sign = [1.0, -1.0] on [sensors.wind]`" in found.sentence
 
 
 def test_a_direction_from_north_is_named_as_such():
@@ -316,3 +316,13 @@ def test_the_page_has_every_row_with_its_limits():
         for number in (*limit.usual, *limit.possible):
             if math.isfinite(number) and number > 0.0:
                 assert f"{number:g}" in words, (name, number)
+
+
+def test_a_length_that_no_displacement_bounds_is_listed():
+    """m = rho C_B L B T: without one of them a length in feet is as good."""
+    whole = profiles.load("esso-vectwin")
+    assert plausible_measures.not_compared(whole) == ()
+    for key in ("block_coefficient", "mass_kg", "breadth_m", "draught_m"):
+        lacks = whole.model_copy(update={"ship": whole.ship.model_copy(update={key: None})})
+        (left,) = plausible_measures.not_compared(lacks)
+        assert left.what == "the ship's length" and left.reason and left.would_show

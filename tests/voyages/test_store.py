@@ -394,7 +394,8 @@ def test_a_field_that_two_voyages_read_otherwise_is_said(tmp_path, voyage, caplo
     store.add(voyage(name="two", text=sailing.PROFILE.replace("sign = -1.0", "sign = 1.0")))
     store.profile(["one", "two"])
     assert (
-        "one and two were read with another unit, sign or zero of actuators.rudder" in caplog.text
+        "one and two were read with another unit, sign, zero or order of actuators.rudder"
+        in caplog.text
     )
     caplog.clear()
     store.profile(["two", "two"])

@@ -1,6 +1,7 @@
 """A true wind that stands still, seen from a ship that turns: worked out here by components."""
 
 import math
+from importlib import resources
 
 import numpy as np
 import polars as pl
@@ -46,13 +47,16 @@ WRONG = {  # what was recorded, words of the sentence, reason
         sailed(gusts=0.3), {"angle": lambda a, row: -a}, "positive to port", "sign",
     ),
     "blows to, a fast ship": (
-        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi}, "offset = [0.0, 180.0]", "frame",
+        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi}, "offset = [0.0, 180]", "frame",
     ),
     "from north": (
         sailed(), {"angle": lambda a, row: a + row["heading"]}, "counted from north", "frame",
     ),
     "radians as degrees": (
         sailed(), {"angle": lambda a, row: np.radians(a)}, '"rad"', "unit",
+    ),
+    "zero to starboard, a fast ship": (
+        sailed(6.0, 6.0), {"angle": lambda a, row: a + np.pi / 2}, "offset = [0.0, 90]", "frame",
     ),
     "knots, a fast ship in a light wind": (
         sailed(10.0, 4.0, gusts=0.03), {"speed": lambda s, row: s / KNOT}, "kn", "unit",
@@ -100,3 +104,43 @@ def test_without_a_wind_sensor_nothing_is_compared():
     calm = PROFILE.model_copy(update={"sensors": PROFILE.sensors.model_copy(update={"wind": None})})
     table, changed, _, _ = WRONG["mirrored"]
     assert compare(recorded(table, **changed), calm).findings == ()
+
+
+OTHER = {  # what is wrong in the profile, what is recorded is right → the key
+    "unit": ('units = ["m/s", "deg"]', 'units = ["kn", "deg"]', {"speed": lambda s, row: KNOT * s},
+             'units = ["m/s", "deg"] on [sensors.wind]'),
+    "sign": ("sigma = [0.1, 2.0]", "sigma = [0.1, 2.0]\nsign = [1.0, -1.0]",
+             {"angle": lambda a, row: -a}, "sign = 1.0 on [sensors.wind]"),
+    "zero": ("sigma = [0.1, 2.0]", "sigma = [0.1, 2.0]\noffset = [0.0, 180.0]",
+             {"angle": lambda a, row: a - np.pi}, "offset = [0.0, 0] on [sensors.wind]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OTHER)
+def test_the_key_builds_on_what_the_profile_says_already(case):
+    """What the user set wrong is to be taken back, and not to be set once more."""
+    old, new, changed, key = OTHER[case]
+    shipped = resources.files("shiplog") / "profiles" / "esso-vectwin.toml"
+    text = shipped.read_text("utf-8")
+    head, wind = text.split("[sensors.wind]")
+    assert old in wind
+    wrong = profiles.parse(f"{head}[sensors.wind]{wind.replace(old, new, 1)}", "wrong.toml")
+    table = sailed(10.0, 4.0, gusts=0.03)
+    (finding,) = compare(recorded(table, **changed), wrong).findings
+    assert key in finding.sentence
+
+
+@pytest.mark.parametrize(
+    ("table", "open_"),
+    [
+        (sailed(10.0, 4.0, gusts=0.03), set()),
+        (sailed(0.1, 2.0, gusts=0.3), {"the wind's unit", "whether the wind blows from or to, and "
+                                       "the vane's zero"}),
+        (sailed(swing=8.0), {"wind"}),
+    ],
+    ids=["fast", "slow", "hardly turns"],
+)  # fmt: skip
+def test_what_the_motion_does_not_exclude_is_listed(table, open_):
+    left = compare(table, PROFILE).not_compared
+    assert {one.what for one in left} == open_
+    assert all(one.reason and one.would_show for one in left)

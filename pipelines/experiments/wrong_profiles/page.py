@@ -1,0 +1,100 @@
+"""The page of all wrong profiles: what is said of each, by `ingest` and by `diagnose`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from pipelines.experiments.wrong_profiles.diagnosed import Diagnosed
+from pipelines.experiments.wrong_profiles.profiles import Wrong
+from pipelines.experiments.wrong_profiles.seen import NAMED, WAYS, Seen, of_way
+from shiplog.report.text_table import table
+
+HEAD = """# Profiles with one thing wrong
+
+    python -m pipelines.experiments.wrong_profiles --diagnose --markdown docs/wrong_profiles.md
+
+Each of these profiles of the sample ship has one wrong unit, sign or place. The sample logs are read
+through it in three ways: both campaigns (voyages 1 and 3, season 3), the trial only (season 3, in
+which nothing is hidden), one voyage (voyage 2). Each belongs to one of three classes:
+
+- *sensors*: the sensors contradict each other, whatever the ship.
+- *plausibility*: the profile contradicts itself, the log, or what ships are.
+- *undetermined*: the record is as likely with it as without. `ingest` lists it as "could not be
+  compared", with the reason and what would show it, and blames no other part. Each has its proof, a
+  copy: another ship or world whose record, read through the right profile, is this record read
+  through the wrong one (`tests/experiments/test_wrong_profiles.py`).
+
+The first two are named before any model is trained, with the key of the profile to change. The
+class depends on the voyage: a ship that is fast beside the gusts shows the unit of its wind, the
+model ship of the sample logs does not.
+"""
+INGESTED = """
+## What ingest says
+
+{right}
+
+{seen}
+
+The undetermined ones:
+
+{left}
+"""
+DIAGNOSED = """
+## What diagnose says
+
+Season 3 is read through the wrong profile and judged by a model of the right one, identified from
+voyages 1 to 4. `refused` is exit 1: voyages and model have two profiles of one ship that differ in
+a size, a place or a lever arm.
+
+{verdicts}
+"""
+LONG = 240  # characters of a sentence that a row has
+
+
+def page(
+    chosen: Sequence[Wrong], found: Mapping[str, Mapping[str, Seen]],
+    verdicts: Mapping[str, Diagnosed],
+) -> str:  # fmt: skip
+    rows, left, right, named = [], [], 0, 0
+    for wrong in chosen:
+        of = found[wrong.name]
+        classes = [of_way([of[voyage] for voyage in names]) for names in WAYS.values()]
+        right += all(one == wrong.seen_by for one in classes)
+        named += wrong.seen_by in NAMED and all(one in NAMED for one in classes)
+        first = next(iter(of.values()))
+        others = dict.fromkeys(other for one in of.values() for other in one.others)
+        said = _short(first.said)
+        rows.append((wrong.name, wrong.seen_by, *_alike(classes, wrong.seen_by), said,
+                     first.key or "-", "; ".join(others) or "-"))  # fmt: skip
+        if wrong.seen_by == "undetermined":
+            left.append((wrong.name, first.said, wrong.copy))
+    visible = sum(wrong.seen_by in NAMED for wrong in chosen)
+    counted = (
+        f"{right} of {len(chosen)} are in the class expected in all three ways. Of the {visible} "
+        f"that can be seen, {named} are named in every voyage."
+    )
+    head = ("wrong", "class", *WAYS, "what is said first", "key to change", "of other channels")
+    text = HEAD + INGESTED.format(
+        right=counted, seen=table(head, rows),
+        left=table(("wrong", "could not be compared", "the copy"), left),
+    )  # fmt: skip
+    if verdicts:
+        text += DIAGNOSED.format(verdicts=_verdicts(chosen, verdicts))
+    return text
+
+
+def _verdicts(chosen: Sequence[Wrong], verdicts: Mapping[str, Diagnosed]) -> str:
+    rows = []
+    for wrong in chosen:
+        if one := verdicts.get(wrong.name):
+            rows.append((wrong.name, wrong.seen_by, one.verdict, ", ".join(one.causes) or "-",
+                         _short(one.sentence)))  # fmt: skip
+    return table(("wrong", "class", "verdict", "causes named", "first words"), rows)
+
+
+def _alike(classes: Sequence[str], expected: str) -> list[str]:
+    return ["yes" if one == expected else one for one in classes]
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LONG else f"{text[:LONG].rsplit(' ', 1)[0]} ..."
