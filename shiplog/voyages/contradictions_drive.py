@@ -16,17 +16,23 @@ from shiplog.voyages import contradictions_actuators as actuators
 from shiplog.voyages.contradictions_actuators import ASTERN, Driven
 from shiplog.voyages.contradictions_evidence import (
     ALONG_DEG,
+    JOINED,
     LEAST_SPREAD,
     SPREAD,
     Evidence,
     Way,
+    angle_heading,
     of_voyage,
 )
+from shiplog.voyages.contradictions_pairs import GRAVITY
 from shiplog.voyages.contradictions_track import Track
-from shiplog.voyages.contradictions_words import offset_line, sign_line
+from shiplog.voyages.contradictions_words import declared, offset_line, sign_line, unit_line
 
 DRIVES = 0.2  # of the largest thrust: the ship is driven
 MOSTLY = 0.75  # of the time under way; the ship coasts for the rest
+FAST_FROUDE = 0.15  # U/√(g L): a ship that goes so fast goes where its bow points, or astern
+APART_WAY = 0.8  # share of the way that a heading leaves unexplained: they have nothing in common
+FEWEST_WINDOWS = 20
 BEAM_DEG = (60.0, 120.0)
 
 
@@ -47,7 +53,7 @@ def findings(t: Track, e: Evidence, found: Sequence[Driven]) -> Iterator[Finding
     """One a fault: of an actuator's sign, of two exchanged, or of the heading's zero."""
     if e.faulty & {"heading", "velocity", "position"}:
         return
-    astern = _bow(t, e, found)
+    astern = _bow(t, e, found) or _nowhere(t, e)
     if astern is not None:
         yield astern
         return
@@ -152,6 +158,34 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
     if BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1] and way.spread > SPREAD:
         return _abeam(t, way)
     return None
+
+
+def _nowhere(t: Track, e: Evidence) -> Finding | None:
+    """A ship that is driven ahead at speed, and whose heading has nothing to do with where it goes.
+    A slow one may be turned by its rudders and pushed sideways by them."""
+    parts = [part[0] for part in actuators.thrust(t).values()]
+    if e.moved is None or not parts or actuators.can_push_sideways(t):
+        return None
+    speed = float(np.median(np.abs(e.moved.by_velocity))) / e.moved.windows.seconds
+    fast = speed > FAST_FROUDE * math.sqrt(GRAVITY * t.profile.ship.length_m)
+    together = e.joined is not None and e.joined.left.get("as it is", 1.0) < JOINED
+    if not (fast and together and min(e.apart, default=0.0) > APART_WAY):
+        return None
+    if _driven_share(t, parts) < MOSTLY or len(e.moved.by_velocity) < FEWEST_WINDOWS:
+        return None
+    e.faulty.add("heading")
+    lines = "Look at topic, field, unit and sign of [sensors.heading]."
+    reason = "none known"
+    if angle_heading(t.profile) and declared(t.profile, "heading") == "rad":
+        reason, line = "unit", unit_line(t.profile, "heading", "deg")
+        lines = f"Change: {line}, if degrees are read as radians."
+    left = min(e.apart)
+    sentence = (
+        f"The heading has nothing in common with the way over ground of a ship that {_names(t)} "
+        f"drives ahead at {speed:.2g} m/s: it leaves {100 * left:.0f} % of the way unexplained, "
+        f"and position and velocity agree. {lines}"
+    )
+    return of_voyage(t, "heading", (left, None, None), "1", reason, sentence)
 
 
 def _driven_share(t: Track, forces: list[np.ndarray]) -> float:

@@ -16,6 +16,7 @@ from shiplog.voyages.contradictions_words import offset_line, sign_line, words
 AS_GOOD = 1.5  # times what another formula leaves
 JOINED, APART = 0.4, 0.65  # unexplained share: less, and two go together; more, and they do not
 BETTER, CLEARLY = 3.0, 0.02  # another formula leaves so many times less, and so much less
+BETTER_OFF = 2.0  # the same where it goes ahead by the other formula, and athwart by this one
 GUARD = 1.5  # half 90 % intervals between an estimate and what is no contradiction
 # Share that the heading as it is leaves, and less: it is not a mirrored one. One in radians, which
 # hardly changes, may leave less than that: then the way has to go ahead by it, too.
@@ -61,8 +62,9 @@ class Way:
 @dataclass
 class Evidence:
     """joined: position and velocity; turned: heading and yaw rate; by_position, by_velocity: the
-    heading and the way of either; bent_by_rate, bent_by_heading: the way's turning over theirs;
-    faulty: channels that are, or may be, at fault."""
+    heading and the way of either; apart: the least share that any formula leaves of each way;
+    bent_by_rate, bent_by_heading: the way's turning over theirs; faulty: channels that are, or may
+    be, at fault."""
 
     t: Track
     moved: UnderWay | None
@@ -70,6 +72,7 @@ class Evidence:
     turned: Joined | None
     by_position: Way | None
     by_velocity: Way | None
+    apart: tuple[float, ...]
     bent_by_rate: Interval | None
     bent_by_heading: Interval | None
     faulty: set[str] = field(default_factory=set)
@@ -161,9 +164,10 @@ def gather(t: Track) -> Evidence:
     """All pairs of one voyage."""
     turned, moved = pairs.heading_and_yaw_rate(t), pairs.under_way(t)
     if moved is None:
-        return Evidence(t, None, None, turned, None, None, None, None)
+        return Evidence(t, None, None, turned, None, None, (), None, None)
     by_rate = t.profile.sensors.yaw_rate is not None
-    ways = [_way(one) for one in pairs.heading_and_way(t, moved)]
+    joined = list(pairs.heading_and_way(t, moved))
+    ways = [_way(one) for one in joined]
     return Evidence(
         t,
         moved,
@@ -171,6 +175,7 @@ def gather(t: Track) -> Evidence:
         turned,
         ways[0],
         None if t.body else ways[1],
+        tuple(_apart(one) for one in joined),
         pairs.bend(t, moved, t.turned_by_rate) if by_rate else None,
         pairs.bend(t, moved, t.turned),
     )
@@ -182,11 +187,12 @@ def _way(j: Joined) -> Way | None:
         return None
     left = j.left
     best = min(left, key=lambda name: left[name])
-    if left["as it is"] < BETTER * left[best]:
+    in_radians = best == "in radians" and pairs.natural(j.fits[best])
+    off = in_radians and not pairs.natural(j.fits["as it is"])
+    if left["as it is"] < (BETTER_OFF if off else BETTER) * left[best]:
         best = "as it is"
     if left[best] > JOINED:
         return None
-    in_radians = best == "in radians" and pairs.natural(j.fits[best])
     if best != "as it is" and left["as it is"] < LEAST_MIRRORED and not in_radians:
         return None
     sense = left.get("mirrored", 1.0) > BETTER * left[best] if best != "mirrored" else True
@@ -199,6 +205,12 @@ def _way(j: Joined) -> Way | None:
     return Way(
         best, degrees(angle), degrees(half), sense, j.spread, left[best], j.windows, drift, fixed
     )
+
+
+def _apart(j: Joined) -> float:
+    """The share that the best formula leaves; radians count where the ship goes ahead by them."""
+    left = [fit.left for name, fit in j.fits.items() if name != "in radians" or pairs.natural(fit)]
+    return min(left, default=0.0)
 
 
 def angle_heading(profile: Profile) -> bool:

@@ -25,6 +25,9 @@ DRIFT_S, FEWEST_PIECES = 30.0, 6  # s: pieces over which a rate's bias is measur
 LONG_S = 5.0  # s: a stretch of repeats that may hide what the bias is
 SPREADS = 3.0  # standard deviations between pieces by which the bias may be another
 COURSE_S = 10.0  # s: a course is taken of the way in so many seconds
+LEAST_COURSE_S = 5.0  # s: of a shorter stretch such a course says nothing
+KNOWN_S = 60.0  # s: a heading that moves for less does not show how a course swings about it
+SWINGS = 1.5  # times what it swings elsewhere: more, and the heading should have moved
 COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little, 4 deg and more
 COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
 UNDER_WAY = 0.3  # of the 90 % quantile of the way: at a berth the wind and a current turn a course
@@ -83,7 +86,12 @@ def held(
         for first, last in kept(runs, None, 0.0):  # what may be frozen is not compared
             keel[first : last + 1] = np.nan
         course = _course(position, keel, noise, profile.ship.length_m)
-        return [] if course is None else kept(runs, course[:, None], least + SWING)
+        if course is None:
+            return []
+        long = [last - first + 1 >= LEAST_COURSE_S / samples.period_s for first, last in runs]
+        least = least[long] + min(SWING, _swing(course, keel))
+        return kept([run for run, kept_ in zip(runs, long, strict=True) if kept_],
+                    course[:, None], least)  # fmt: skip
     runs = fault_detection.improbable(runs, len(samples.time))
     rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
     moving = [run for run in runs if not rest[run[0]]]
@@ -167,6 +175,18 @@ def _course(
         return None
     last = np.searchsorted(at + half, np.arange(count), side="right") - 1
     return np.unwrap(course[at])[last.clip(0)]
+
+
+def _swing(course: np.ndarray, keel: np.ndarray) -> float:
+    """How far the course swings about the keel [m] where the heading is known to move, rad: nearly
+    all of the angle between them; all round where that is seldom."""
+    known = np.isfinite(keel)
+    if known.sum() * STEP_S < KNOWN_S:
+        return math.pi
+    off = np.exp(1j * (course[known] - keel[known]))
+    off = np.angle(off * np.mean(off).conj())
+    low, high = np.quantile(off, (0.005, 0.995))
+    return SWINGS * float(high - low)
 
 
 def _filled(column: np.ndarray) -> np.ndarray:

@@ -151,7 +151,7 @@ TABLE: dict[str, Limit] = {
         ("sensors.velocity.units", "ship.length_m"), "planing begins at about 1 (Faltinsen, 2005)",
     ),
     "advance ratio": Limit(
-        "advance ratio U/(n D) in steady motion ahead", "1", (0.1, 3.0), (0.02, 15.0),
+        "advance ratio U/(n D) in steady motion", "1", (0.1, 3.0), (0.02, 15.0),
         ("actuators.{name}.unit", "actuators.{name}.diameter_m"),
         "0.3 to 1.5 of open-water diagrams (Carlton, 2018)", REVOLUTIONS,
     ),

@@ -248,8 +248,9 @@ def _turning(rows: _Rows, profile: Profile) -> Iterator[Asked]:
 
 
 def _propellers(rows: _Rows, profile: Profile) -> Iterator[Asked]:
-    ahead = rows.under_way & (rows.columns["surge"] >= WORKING * rows.speed_quantile)
-    steady = ahead & _steady(rows.columns["surge"], rows.speed_quantile)
+    surge = rows.columns["surge"]
+    fast_enough = rows.under_way & (np.abs(surge) >= WORKING * rows.speed_quantile)
+    steady = fast_enough & _steady(surge, rows.speed_quantile)
     mass, rho = profile.ship.mass_kg, density(profile)
     for one in profile.actuators:
         if one.kind != "propeller" or one.si_unit != "rev/s" or not one.diameter_m:
@@ -263,7 +264,7 @@ def _propellers(rows: _Rows, profile: Profile) -> Iterator[Asked]:
             yield Asked("thrust", thrust / (mass * GRAVITY), one.name, one.name)
         kept = steady & (turns > WORKING * fast) & _steady(turns, fast)
         if kept.sum() >= LEAST_ROWS:
-            ratio = rows.columns["surge"][kept] / (turns[kept] * one.diameter_m)
+            ratio = np.abs(surge[kept]) / (turns[kept] * one.diameter_m)
             yield Asked("advance ratio", float(np.median(ratio)), one.name, one.name, ("velocity",))
 
 

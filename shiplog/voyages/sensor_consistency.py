@@ -17,8 +17,8 @@ velocity are not of one antenna. What ingest did with the heading is undone firs
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
@@ -34,24 +34,18 @@ from shiplog.voyages.robust_regression import (
     Problem,
     RobustFit,
     bins,
-    fit,
-    rough,
     shifted,
-    spread_over,
 )
 from shiplog.voyages.sensor_findings import (
-    AT_LIMIT,
-    DELAY_SHARE,
-    MARGINS_S,
     MOST_SCALE,
     SURE_HALF_INTERVALS,
     Estimate,
 )
 from shiplog.voyages.sensor_findings import findings as findings
+from shiplog.voyages.sensor_solution import solved
 
 STEP_S = 1.0 / RATE_HZ
 VOYAGE_ROWS = 36_000  # of a long voyage the liveliest hour says it all
-ROUGH_ROWS = 6_000
 CHUNK_ROWS = 1_200  # rows that are kept or left out together
 HELD_ROWS = 3  # an instrument that repeats itself this often breaks a stretch
 POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, or neither
@@ -59,8 +53,8 @@ POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, o
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
 ANTENNA_M, ANTENNA_LENGTHS = 0.03, 0.01
-SLOW_S = 32  # s: over which the two sides are compared with and without a delay
-WORSE = 1.05  # times the difference without it: more, and there is no delay
+# Over which the two sides are compared with and without a delay, s. A gyro drifts in two minutes.
+RATE_SLOW_S, WAY_SLOW_S = (32,), (32, 128)
 CANCEL, TOGETHER = 0.3, 0.9  # a delay and an antenna that undo each other: share left, correlation
 
 TAU_R, RATE_SCALE, RATE_BIAS = range(3)
@@ -216,7 +210,7 @@ def _of_yaw_rate(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCom
             limit=np.array([margin, MOST_SCALE, 10.0]), other_side=other_side,
         )  # fmt: skip
 
-    found = _solved(motion, problem, (TAU_R,), RATE_SCALE)
+    found = solved(motion, problem, (TAU_R,), RATE_SCALE, RATE_SLOW_S)
     if isinstance(found, str):
         yield _unfound("yaw rate and heading", found)
         return
@@ -269,7 +263,7 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCom
             other_side=other_side,
         )  # fmt: skip
 
-    found = _solved(motion, problem, (TAU_P, TAU_V), SPEED_SCALE)
+    found = solved(motion, problem, (TAU_P, TAU_V), SPEED_SCALE, WAY_SLOW_S)
     if isinstance(found, str):
         yield _unfound("position and velocity", found)
         return
@@ -351,27 +345,6 @@ def _gnss_clocks(found: RobustFit, profile: Profile) -> Iterator[Estimate]:
         yield _later_of_two(late, late - apart, late + apart)
 
 
-def _in_the_way(problem: Problem, found: RobustFit, clocks: tuple[int, ...]) -> bool:
-    """Whether what the two sides differ by over SLOW_S is no more with the delays than without.
-
-    A fit of changes from second to second looks at the noise as much as at the manoeuvre. A delay τ
-    of a velocity moves the way by τ ΔV as well, over any time: without it the others are fitted
-    anew, and the way must not agree better.
-    """
-    ends = [found.interval(clock) for clock in clocks]
-    if not any(abs(v) > max(CLOCK_S, SURE_HALF_INTERVALS * 0.5 * (b - a)) for v, a, b in ends):
-        return True
-    prior = problem.prior.copy()
-    prior[list(clocks)] = 0.0
-    without = fit(replace(problem, prior=prior), np.where(prior > 0.0, found.value, 0.0))
-    if without is None:
-        return True
-    late, punctual = (
-        spread_over(problem.model(one.value), problem.grid, SLOW_S) for one in (found, without)
-    )
-    return late <= WORSE * punctual
-
-
 def _later_of_two(late: float, low: float, high: float) -> Estimate:
     """Of position and velocity, from how late the velocity is against the position."""
     if late >= 0:
@@ -387,37 +360,3 @@ def _scale(kind: str, channel: str, beyond: tuple[float, float, float]) -> Estim
 
 def _clock(channel: str, value: float, low: float, high: float, rival: str = "") -> Estimate:
     return Estimate("clock_offset", channel, value, low, high, 0.0, CLOCK_S, "s", rival)
-
-
-def _solved(
-    motion: Motion, problem: Callable[[Motion, float], Problem], clocks: tuple[int, ...], scale: int
-) -> RobustFit | str:
-    """Fit with delays up to the small margin, and again with the large one if that binds.
-
-    It starts from what the first ten minutes say, tried from several delays. What ends at a
-    limit was not found: the answer is then why.
-    """
-    beginning = motion.beginning(ROUGH_ROWS)
-    late = 0.0
-    for margin in MARGINS_S:
-        coarse = problem(beginning, margin)
-        starts = [np.zeros(len(coarse.prior))]
-        for clock in set(clocks) & set(coarse.free):
-            for delay in (-0.5 * margin, 0.5 * margin):
-                starts.append(np.where(np.arange(len(coarse.prior)) == clock, delay, 0.0))
-        try:
-            found = fit(problem(motion, margin), rough(coarse, starts))
-        except np.linalg.LinAlgError:  # a ship at rest, or a log that never turns
-            found = None
-        if found is None:
-            return "the manoeuvres are too few, or show one error only together with another"
-        if abs(found.value[scale]) > AT_LIMIT * MOST_SCALE:
-            return (
-                f"the search ends at its limit: they differ by more than {100 * MOST_SCALE:.0f} %"
-            )
-        late = float(np.max(np.abs(found.value[list(clocks)])))
-        if late < DELAY_SHARE * margin:
-            if _in_the_way(problem(motion, margin), found, clocks):
-                return found
-            return "a delay would explain what changes in a second, and not what does in a minute"
-    return f"the search ends at its limit: a delay of more than {DELAY_SHARE * margin:.1f} s"
