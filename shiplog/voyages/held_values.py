@@ -15,7 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from shiplog.profile import Profile
-from shiplog.voyages import fault_detection
+from shiplog.voyages import course_over_ground, fault_detection
 from shiplog.voyages.resampling import STEP_NS, Samples
 
 STEP_S = STEP_NS * 1e-9
@@ -24,17 +24,8 @@ ACCIDENT = 1e-3  # chance that noise makes anything in a whole record look held
 DRIFT_S, FEWEST_PIECES = 30.0, 6  # s: pieces over which a rate's bias is measured
 LONG_S = 5.0  # s: a stretch of repeats that may hide what the bias is
 SPREADS = 3.0  # standard deviations between pieces by which the bias may be another
-COURSE_S = 10.0  # s: a course is taken of the way in so many seconds
-LEAST_COURSE_S = 5.0  # s: of a shorter stretch such a course says nothing
-KNOWN_S = 60.0  # s: a heading that moves for less does not show how a course swings about it
-SWINGS = 1.5  # times what it swings elsewhere: more, and the heading should have moved
-COURSE_NOISES = 20.0  # of the position: on a shorter way the course says little, 4 deg and more
-COURSE_LENGTHS = 0.05  # of the ship: likewise, of a ship that is kept in its place
-UNDER_WAY = 0.3  # of the 90 % quantile of the way: at a berth the wind and a current turn a course
-ALONG = 0.7  # sine of the angle between course and keel, in the middle: a ship that makes way
 METRE = 111_320.0  # m, a degree of latitude
 COUNTED = ("position", "heading")  # whose steps may be others where their numbers are larger
-SWING = math.radians(30.0)  # of the course beyond which a heading turns, too: drift of a hard turn
 
 
 def held(
@@ -81,17 +72,16 @@ def held(
         return kept(runs, turned, least, drift)
     position = np.stack([_filled(columns[c]) for c in ("x0", "y0")], axis=1)
     if name == "heading":
-        noise = sampled["position"].noise
         keel = columns["heading"].copy()
         for first, last in kept(runs, None, 0.0):  # what may be frozen is not compared
             keel[first : last + 1] = np.nan
-        course = _course(position, keel, noise, profile.ship.length_m)
+        course = course_over_ground.course(sampled, speed, position, keel, profile)
         if course is None:
             return []
-        long = [last - first + 1 >= LEAST_COURSE_S / samples.period_s for first, last in runs]
-        least = least[long] + min(SWING, _swing(course, keel))
-        return kept([run for run, kept_ in zip(runs, long, strict=True) if kept_],
-                    course[:, None], least)  # fmt: skip
+        shortest = 0.5 * course.seconds / samples.period_s
+        long = np.array([last - first + 1 >= shortest for first, last in runs], bool)
+        runs = [run for run, is_long in zip(runs, long, strict=True) if is_long]
+        return kept(runs, course.angle[:, None], least[long] + course.swing)
     runs = fault_detection.improbable(runs, len(samples.time))
     rest = np.all(np.abs(samples.value) <= samples.resolution, axis=1)
     moving = [run for run in runs if not rest[run[0]]]
@@ -153,40 +143,6 @@ def _drift(off: np.ndarray, away: list[tuple[int, int]]) -> tuple[float, float] 
 def _bias(samples: Samples, rate: np.ndarray) -> float:
     """How fast a rate that is 0 may be said to move, in its unit."""
     return max(samples.noise, DOUBT * float(np.quantile(np.linalg.norm(rate, axis=1), 0.95)))
-
-
-def _course(
-    position: np.ndarray, heading: np.ndarray, noise: float, length: float
-) -> np.ndarray | None:
-    """Unwrapped course [m], rad, of the way over COURSE_S, as it was last where the ship hardly
-    moves; None of a ship that does not mostly go along its keel, ahead or astern."""
-    half = max(round(0.5 * COURSE_S / STEP_S), 1)
-    count = len(position)
-    if count <= 2 * half:
-        return None
-    way = position[2 * half :] - position[: -2 * half]
-    far = np.linalg.norm(way, axis=1)
-    least = max(COURSE_NOISES * noise, COURSE_LENGTHS * length)
-    known = far > max(least, UNDER_WAY * float(np.quantile(far, 0.9)))
-    course, keel = np.arctan2(way[:, 1], way[:, 0]), heading[half:-half]
-    across = np.abs(np.sin(course - keel))[known & np.isfinite(keel)]
-    at = np.flatnonzero(known)
-    if len(at) < 2 or (len(across) and float(np.median(across)) > ALONG):
-        return None
-    last = np.searchsorted(at + half, np.arange(count), side="right") - 1
-    return np.unwrap(course[at])[last.clip(0)]
-
-
-def _swing(course: np.ndarray, keel: np.ndarray) -> float:
-    """How far the course swings about the keel [m] where the heading is known to move, rad: nearly
-    all of the angle between them; all round where that is seldom."""
-    known = np.isfinite(keel)
-    if known.sum() * STEP_S < KNOWN_S:
-        return math.pi
-    off = np.exp(1j * (course[known] - keel[known]))
-    off = np.angle(off * np.mean(off).conj())
-    low, high = np.quantile(off, (0.005, 0.995))
-    return SWINGS * float(high - low)
 
 
 def _filled(column: np.ndarray) -> np.ndarray:
