@@ -42,6 +42,43 @@ def test_what_is_changed_is_stored_right_or_named(change, recorder):
     assert not done.wrong_and_unsaid, (done.wrong, done.findings)
 
 
+# Voyages that were once stored wrong without a word, or alarmed, and why; one of each kind.
+FOUND = {
+    5135: "a heading reversed on a nearly straight course was blamed on the propeller",
+    5170: "a heading in radians on a nearly straight course hardly changes",
+    7023: "the same of a large ship at dead slow, beside a position of 1e-6 deg",
+    7046: "revolutions per minute of a ferry that sails stern first",
+    7067: "latitude and longitude exchanged, far from the profile's datum",
+    7218: "degrees read as radians of a fast boat at 2 Hz are no heading at all",
+    7219: "a heading frozen for 200 s, and the way swings by 20 deg",
+    5033: "sound: a noisy heading in 0.1 deg comes to the same number twice",
+    7070: "sound: the same without a gyro, beside a noisy position",
+    5049: "sound: a delay of 4 s explained the noise of a second, and no way of a minute",
+    7096: "sound: the same of a position at 1 Hz",
+}
+
+
+@pytest.mark.parametrize("seed", FOUND, ids=lambda seed: FOUND[seed])
+def test_what_was_once_wrong_stays_right(seed):
+    done = judge.outcome_of(seed)
+    assert not done.wrong_and_unsaid, (done.wrong, done.findings)
+    assert not done.wrongly_alarmed, done.findings
+
+
+def test_a_frozen_heading_is_found_beside_a_gyro_that_is_biased():
+    """Turning by 8 deg in a stretch of 200 s is seen beside 0.15 deg/s of noise, whose bias is
+    measured where the heading moves."""
+    one = drawn("coaster", "mcap", "heading frozen for 200 s")
+    one.seen.columns["yaw_rate"] = one.seen.columns["yaw_rate"] + 0.05
+    assert any(text.startswith("held heading") for text in judge.judged(one).findings)
+
+
+def test_a_rudder_to_port_is_named_on_a_large_ship_at_dead_slow():
+    """Its yaw rate changes in minutes by less than a gyro's noise in a second."""
+    one = drawn("vlcc at dead slow", "csv", "rudder to port", seed=21)
+    assert judge.judged(one).named
+
+
 @pytest.mark.parametrize("datum", [(54.0, 10.0), (-33.0, 170.0), (0.5, -0.2)])
 def test_degrees_are_those_of_the_ellipsoid(datum):
     sailed = motion.sail(motion.KINDS["usv"], np.random.default_rng(0))
