@@ -17,6 +17,7 @@ from shiplog.diagnosis import (
     baseline_check,
     contradicted_causes,
     error_location,
+    exchanged_twins,
     network_base,
     segments,
     sign_conventions,
@@ -165,6 +166,9 @@ def _diagnosed(of: Campaigns, out: Path, causes: Sequence[Cause]) -> DiagnosedTr
             held = HeldOut(cut, own, tried, network, before, profile)
             decision, found = held.simulated_with(decision)
     lost = held.lost(found) if held else ""
+    if not lost and decision.verdict in answer.OPEN:
+        numbers = run.extension_numbers()
+        lost = exchanged_twins.explains(tried, decided.point, decision, numbers, profile)
     if lost:
         dropped |= {n.cause.label: answer.none_named(lost) for n in decision.named}
         decision, found = decisions.untold(decision), None

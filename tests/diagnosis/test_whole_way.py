@@ -17,6 +17,7 @@ from pipelines import diagnose as pipeline
 from pipelines.prepare import ingest_logs
 from shiplog.diagnosis import (
     evidence,
+    exchanged_twins,
     next_manoeuvre,
     setup,
     sign_conventions,
@@ -27,6 +28,7 @@ from shiplog.diagnosis.relinearisation import converge
 from shiplog.diagnosis.remainder import Remainder
 from shiplog.diagnosis.trial import Trial
 from shiplog.exceptions import RunError
+from shiplog.voyages import twins
 from shiplog.voyages.store import Store
 
 
@@ -151,6 +153,22 @@ def test_a_sign_that_is_the_other_way_round_is_found(sea, words):
     if "sign" in words:  # the others do not double the error of so short a trial
         assert words in why and f"L is {loss:.0f}" in why
     assert HeldOut(cut, model, sea.done.trial).lost(None) == ""
+
+
+def test_two_rudders_exchanged_are_told_by_the_evidence_of_both_orders(sea):
+    """Read the other way round, what is lost by one exchange is won by the next."""
+    (pair,) = twins.pairs(PROFILE)
+    campaign, record = sea.done.trial.campaign, sea.done.trial.record
+    known = {one.cause.label: one.numbers for one in sea.done.decision.named}
+
+    def gained(observed):
+        trial, at = evidence.begin(Trial.of(campaign, observed, [*known]), known)
+        return exchanged_twins.gain(trial, at, known, pair)
+
+    lost = gained(record)
+    assert lost < -exchanged_twins.LEAST_NATS
+    swapped = replace(record, actuator=record.actuator[:, [1, 0, 2]])
+    assert gained(swapped) == pytest.approx(-lost, rel=0.2)
 
 
 def test_whole_voyages_are_left_out_and_of_one_alone_its_halves(sea):

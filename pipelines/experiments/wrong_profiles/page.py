@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from pipelines.experiments.wrong_profiles.diagnosed import Diagnosed
 from pipelines.experiments.wrong_profiles.profiles import Wrong
@@ -13,12 +16,13 @@ HEAD = """# Profiles with one thing wrong
 
     python -m pipelines.experiments.wrong_profiles --diagnose --markdown docs/wrong_profiles.md
 
-Each of these profiles of the sample ship has one wrong unit, sign or place. The sample logs are read
-through it in three ways: both campaigns (voyages 1 and 3, season 3), the trial only (season 3, in
-which nothing is hidden), one voyage (voyage 2). Each belongs to one of three classes:
+Each of these {count} profiles of the sample ship has one wrong unit, sign or place; the first 22
+are those that a new user tried. The sample logs are read through it in three ways: both campaigns
+(voyages 1 and 3, season 3), the trial only (season 3, in which nothing is hidden), one voyage
+(voyage 2). Each belongs to one of three classes:
 
 - *sensors*: the sensors contradict each other, whatever the ship.
-- *plausibility*: the profile contradicts itself, the log, or what ships are.
+- *plausibility*: the profile contradicts itself or the log, or no ship is like that.
 - *undetermined*: the record is as likely with it as without. `ingest` lists it as "could not be
   compared", with the reason and what would show it, and blames no other part. Each has its proof, a
   copy: another ship or world whose record, read through the right profile, is this record read
@@ -26,7 +30,7 @@ which nothing is hidden), one voyage (voyage 2). Each belongs to one of three cl
 
 The first two are named before any model is trained, with the key of the profile to change. The
 class depends on the voyage: a ship that is fast beside the gusts shows the unit of its wind, the
-model ship of the sample logs does not.
+model ship of the sample logs does not. The machine: {cores} cores ({machine}).
 """
 INGESTED = """
 ## What ingest says
@@ -64,7 +68,7 @@ def page(
         first = next(iter(of.values()))
         others = dict.fromkeys(other for one in of.values() for other in one.others)
         said = _short(first.said)
-        rows.append((wrong.name, wrong.seen_by, *_alike(classes, wrong.seen_by), said,
+        rows.append((wrong.name, *_against(classes, wrong.seen_by), said,
                      first.key or "-", "; ".join(others) or "-"))  # fmt: skip
         if wrong.seen_by == "undetermined":
             left.append((wrong.name, first.said, wrong.copy))
@@ -73,8 +77,9 @@ def page(
         f"{right} of {len(chosen)} are in the class expected in all three ways. Of the {visible} "
         f"that can be seen, {named} are named in every voyage."
     )
-    head = ("wrong", "class", *WAYS, "what is said first", "key to change", "of other channels")
-    text = HEAD + INGESTED.format(
+    head = ("wrong", *WAYS, "what is said first", "key to change", "of other channels")
+    text = HEAD.format(count=len(chosen), cores=os.cpu_count(), machine=_machine())
+    text += INGESTED.format(
         right=counted, seen=table(head, rows),
         left=table(("wrong", "could not be compared", "the copy"), left),
     )  # fmt: skip
@@ -92,8 +97,19 @@ def _verdicts(chosen: Sequence[Wrong], verdicts: Mapping[str, Diagnosed]) -> str
     return table(("wrong", "class", "verdict", "causes named", "first words"), rows)
 
 
-def _alike(classes: Sequence[str], expected: str) -> list[str]:
-    return ["yes" if one == expected else one for one in classes]
+def _against(classes: Sequence[str], expected: str) -> list[str]:
+    """The class in each way, with the one expected where it is another one."""
+    return [one if one == expected else f"{one} (expected: {expected})" for one in classes]
+
+
+def _machine() -> str:
+    """Type of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
 
 
 def _short(text: str) -> str:

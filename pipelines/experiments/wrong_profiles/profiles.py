@@ -69,8 +69,9 @@ def _at_the_bow(profile: dict[str, Any]) -> None:
 @dataclass(frozen=True)
 class Wrong:
     """seen_by   "sensors", "plausibility" or "undetermined"
-    channel   a finding, or what could not be compared, has to name it
+    channel   a finding has to name it
     copy      of an undetermined one: another ship or world with the very same record
+    listed    the words by which it is listed as not compared; the channel where empty
     """
 
     name: str
@@ -78,6 +79,7 @@ class Wrong:
     seen_by: str
     channel: str
     copy: str = ""
+    listed: str = ""
 
 
 WRONG = (
@@ -94,8 +96,9 @@ WRONG = (
     Wrong("course: deg as rad", _sensor("velocity", units=["m/s", "rad"]), "sensors", "velocity"),
     Wrong("speed: m/s as knots", _sensor("velocity", units=["kn", "deg"]), "sensors", "velocity"),
     Wrong("lever arm turned round", _both(_sensor("position", lever_arm_m=[-0.3, 0.0]),
-          _sensor("velocity", lever_arm_m=[-0.3, 0.0])), "undetermined", "antenna",
-          "a ship whose midship lies 0.6 m further ahead: position and velocity share the antenna"),
+          _sensor("velocity", lever_arm_m=[-0.3, 0.0])), "undetermined", "position",
+          "a ship whose midship lies 0.6 m further ahead: position and velocity share the antenna",
+          "place of the antenna"),
     Wrong("rudders to port", _actuators(*RUDDERS, sign=-1.0, **NO_LIMITS), "sensors", "rudder"),
     Wrong("rudders: deg as rad", _actuators(*RUDDERS, unit="rad", **NO_LIMITS), "plausibility",
           "rudder"),
@@ -103,10 +106,11 @@ WRONG = (
     Wrong("shaft: rps as rpm", _actuators("propeller", unit="rpm", **NO_LIMITS), "plausibility",
           "propeller"),
     Wrong("wind: where it blows to", _sensor("wind", offset=[0.0, 180.0]), "undetermined", "wind",
-          "a wind from the other side: the ship is too slow for its own motion to tell"),
+          "a wind from the other side: the ship is too slow for its own motion to tell",
+          "blows from or to"),
     Wrong("wind mirrored", _sensor("wind", sign=[1.0, -1.0]), "sensors", "wind"),
     Wrong("wind: m/s as knots", _sensor("wind", units=["kn", "deg"]), "undetermined", "wind",
-          "half the wind: the ship is too slow for its own motion to tell"),
+          "half the wind: the ship is too slow for its own motion to tell", "wind's unit"),
     Wrong("length 30 m", _ship(length_m=30.0), "plausibility", "length"),
     Wrong("length 300 m", _ship(length_m=300.0), "plausibility", "length"),
     Wrong("mass in tonnes", _ship(mass_kg=0.2446), "plausibility", "mass"),
@@ -134,7 +138,8 @@ WRONG = (
     Wrong("shaft: rps times 60", _actuators("propeller", sign=60.0, **NO_LIMITS), "plausibility",
           "propeller"),
     Wrong("wind angle + 90", _sensor("wind", offset=[0.0, -90.0]), "undetermined", "wind",
-          "a wind from another quarter: the ship is too slow for its own motion to tell"),
+          "a wind from another quarter: the ship is too slow for its own motion to tell",
+          "vane's zero"),
     Wrong("draught of 2.01 m", _ship(draught_m=2.01), "plausibility", "draught"),
     Wrong("rudder of 103 m²", _actuators(*RUDDERS, area_m2=103.0), "plausibility", "rudder"),
     Wrong("propeller of 1 m", _actuators("propeller", diameter_m=1.0), "plausibility",

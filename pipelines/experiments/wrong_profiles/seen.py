@@ -40,13 +40,13 @@ def seen(wrong: Wrong, voyage: str) -> Seen:
     except ShiplogError as error:
         return Seen("plausibility", error.message, _key(str(error)), ())
     fresh = [f for f in report.findings if (f.kind, f.channel, f.start_s) not in _usual(voyage)]
-    named = [f for f in fresh if _names(wrong, f"{f.channel} {f.sentence}")]
+    named = [f for f in fresh if _names(wrong.channel, f"{f.channel} {f.sentence}")]
     others = tuple(f"{f.kind} {f.channel}" for f in fresh if f not in named)
     named.sort(key=lambda f: f.kind != "contradiction")
     if named:
         by = "sensors" if _of_sensors(named[0]) else "plausibility"
         return Seen(by, named[0].sentence, _key(named[0].sentence), others)
-    left = [n for n in report.not_compared if _names(wrong, n.what)]
+    left = [n for n in report.not_compared if _names(wrong.listed or wrong.channel, n.what)]
     if left:
         return Seen("undetermined", _text(left[0]), "", others)
     return Seen("unsaid", "nothing", "", others)
@@ -72,11 +72,11 @@ def _usual(voyage: str) -> frozenset:
     return frozenset((f.kind, f.channel, f.start_s) for f in report.findings)
 
 
-def _names(wrong: Wrong, text: str) -> bool:
+def _names(channel: str, text: str) -> bool:
     def plain(words: str) -> str:
         return words.lower().replace("_", " ")
 
-    return plain(wrong.channel) in plain(text)
+    return plain(channel) in plain(text)
 
 
 def _of_sensors(finding: Finding) -> bool:
