@@ -120,16 +120,24 @@ def test_a_recorder_whose_clock_is_set_twice(tmp_path, apart):
     assert [f.kind for f in found.findings] == ["jump"]
 
 
-def test_latency_that_scatters_is_latency(tmp_path):
-    rng = np.random.default_rng(1)
-    lines = []
+SLOWER = {  # s, of the latency in the course of the log; whether it is long enough to be said
+    "scatters": (lambda t, rng: rng.uniform(0.2, 0.9), True),
+    "becomes longer": (lambda t, rng: 0.2 if t < 60 else 0.9, False),
+    "becomes shorter": (lambda t, rng: 1.2 if t < 60 else rng.uniform(0.55, 0.6), True),
+}
+
+
+@pytest.mark.parametrize("which", SLOWER)
+def test_latency_that_varies_is_latency(tmp_path, which):
+    rng, lines = np.random.default_rng(1), []
+    of, said = SLOWER[which]
     for t in range(120):
-        late_by = rng.uniform(0.2, 0.9)
+        late_by = of(t, rng)
         lines += [(t + late_by, gga(t)), (t + late_by + 0.07, rmc(t))]
         lines += [(t + 0.02, hdt(t)), (t + 0.52, hdt(t + 0.5))]
     topics, found = read(tmp_path, [f"{iso(t)} {body}" for t, body in sorted(lines)])
     assert late(topics["/gyro"], heading, "heading_deg") < 2 * np.pi * 0.03
-    assert [f.kind for f in found.findings] == ["clock_offset"]
+    assert [f.kind for f in found.findings] == ["clock_offset"] * said
 
 
 @pytest.mark.parametrize("offset", [7200.0, -3600.0, 19_800.0])
