@@ -19,7 +19,7 @@ from shiplog.logs.read import contents, read
 from shiplog.profile import Profile
 from shiplog.report import tables
 from shiplog.unexpected import unexpected
-from shiplog.voyages import beside, two_sources
+from shiplog.voyages import fields_read, two_sources
 from shiplog.voyages.fitting_profile import fitting_profile
 from shiplog.voyages.ingest import consistency_of, ingest
 from shiplog.voyages.sensor_correction import corrected
@@ -155,7 +155,7 @@ def _checked(path: Path, chosen: Profile | None) -> VoyageReport:
     except ShiplogError as error:
         why = error
     sent = two_sources.several(path, profile) if profile else {}
-    reading = read(path, beside.wanted(profile, sent) if profile else {}, others=True)
+    reading = read(path, fields_read.wanted(profile, sent) if profile else {}, others=True)
     report = health_of(reading)
     findings: tuple[Finding, ...] = ()
     not_compared: tuple[NotCompared, ...] = ()

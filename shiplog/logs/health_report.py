@@ -20,7 +20,7 @@ class Finding:
     low: float | None = None
     high: float | None = None
     unit: str = ""
-    reason: str = ""  # of a contradiction, or of two sources between which the profile is to choose
+    reason: str = ""  # one of REASONS: of a contradiction, or of two sources to choose between
 
     @property
     def serious(self) -> bool:

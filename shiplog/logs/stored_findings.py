@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 
-from shiplog.logs.health_report import FINDING_KINDS, Finding
+from shiplog.logs.health_report import FINDING_KINDS, REASONS, Finding
 
 RECORD = "findings"  # the metadata record's name
 MOST = 1000  # of a log that is not ours, too
@@ -35,6 +35,7 @@ def of_record(metadata: Mapping[str, Mapping[str, str]]) -> list[Finding]:
             finding = Finding(**{k: v for k, v in content.items() if k in KNOWN})
         except (ValueError, TypeError, AttributeError):
             continue
-        if finding.kind in FINDING_KINDS and isinstance(finding.sentence, str):
+        known = finding.kind in FINDING_KINDS and finding.reason in ("", *REASONS)
+        if known and isinstance(finding.sentence, str):
             found.append(finding)
     return found

@@ -16,14 +16,14 @@ import polars as pl
 
 from shiplog.exceptions import listed
 from shiplog.logs import dates, leap_seconds
-from shiplog.logs.conversion.receive_clock import EARLY_S, HOUR_S, LATEST_S
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile
 from shiplog.units import SECOND_NS
 from shiplog.voyages import clocks
-from shiplog.voyages.clocks import RECORDER, Clock
+from shiplog.voyages.clocks import EARLY_S, LATEST_S, RECORDER, Clock
 
+HOUR_S = 3600.0
 PACE = 0.1  # of a voyage's length: a recorder whose clock ran otherwise wrote a replay
 
 

@@ -16,15 +16,19 @@ import polars as pl
 
 from shiplog.exceptions import LogUnreadable, listed
 from shiplog.logs import dates
-from shiplog.logs.conversion.receive_clock import STEP_S, is_latency, steps_of
 from shiplog.logs.conversion.steps_back import COUNTERS
 from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile
 from shiplog.units import SECOND_NS
 from shiplog.voyages import clocks
-from shiplog.voyages.clocks import RECORDER
+from shiplog.voyages.clocks import RECORDER, is_latency
 
+STEP_S = 0.25  # the least step of a clock that is looked for: NTP sets one from 0.128 s on
+STEP_NOISES = 8.0  # of the scatter of L about its running median
+SIDES = 5  # values on either side of a step, of which three must agree
+AROUND = 20  # values on either side that have to stay
+STEADY = 0.5  # of the step, between their 10 % and their 90 % points
 OWN = 0.3  # of a step: how far what one clock shows of it may be off
 FEWEST = 20  # messages that show a step
 LEAST_COUNT_NS = 60 * SECOND_NS  # a shorter count cannot be told from a clock that was set
@@ -102,6 +106,37 @@ def _stood_twice(frame: pl.DataFrame, column: str) -> bool:
     times = frame[column].drop_nulls().to_numpy()
     late = (frame[RECORDER] - frame[column]).drop_nulls().to_numpy() / SECOND_NS
     return len(times) > 0 and float(np.subtract(*np.quantile(late, (0.9, 0.1)))) < STEP_S
+
+
+def steps_of(late: np.ndarray) -> list[tuple[int, float]]:
+    """Where differences of two clocks [m] s step for good: the first value after each step, and its
+    size [s]. Medians on either side decide; single values do not, nor a delay that comes and
+    goes."""
+    if len(late) < 2 * SIDES:
+        return []
+    padded = np.concatenate((np.full(SIDES - 1, late[0]), late, np.full(SIDES - 1, late[-1])))
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(padded, SIDES), axis=1)
+    before, after = medians[: len(late) - 1], medians[SIDES : SIDES + len(late) - 1]
+    centre = medians[SIDES // 2 : SIDES // 2 + len(late)]
+    least = max(STEP_S, STEP_NOISES * 1.4826 * float(np.median(np.abs(late - centre))))
+    large = np.flatnonzero(np.abs(after - before) > least)
+    step = np.abs(np.diff(late))
+    found: list[tuple[int, float]] = []
+    for group in np.split(large, np.flatnonzero(np.diff(large) > 1) + 1) if len(large) else ():
+        cut = int(group[np.argmax(step[group])]) + 1
+        size = float(after[cut - 1] - before[cut - 1])
+        sides = late[max(cut - AROUND, 0) : cut], late[cut : cut + AROUND]
+        if all(_steady(side, size) for side in sides):
+            found.append((cut, size))
+    return found
+
+
+def _steady(late: np.ndarray, size: float) -> bool:
+    """Whether differences on one side of a step [s] stay: after a delay they go back to nothing."""
+    if len(late) < SIDES // 2 + 1:
+        return False
+    low, high = np.quantile(late, (0.1, 0.9))
+    return float(high - low) <= STEADY * abs(size)
 
 
 def _steps(topic: str, frame: pl.DataFrame) -> tuple[Steps | None, Steps | None]:

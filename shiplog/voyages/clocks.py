@@ -29,6 +29,13 @@ COLUMNS = {  # of a source: the column of its clock, and the one that it is held
 # Topics of one clock are recorded with delays that differ by less; and a clock whose distance from
 # the recorder's scatters by more says nothing of another clock's.
 ONE_CLOCK_NS = 1.0 * SECOND_NS
+LATEST_S = 1.5  # of a receiver's latency; 1.06 s have been measured (PCOD of R/V Palmer)
+EARLY_S = 0.05  # as much before 0 is rounding of the stamps, not a clock
+
+
+def is_latency(late: float) -> bool:
+    """Whether a message that is logged so long [s] after its stamp may simply have come late."""
+    return -EARLY_S <= late <= LATEST_S
 
 
 def of(frame: pl.DataFrame, source: Source) -> tuple[str, str]:

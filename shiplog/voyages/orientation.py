@@ -55,9 +55,9 @@ class Orientation:
     whole: bool
 
 
-def beside(paths: tuple[str, ...]) -> tuple[str, str] | None:
-    """What x and y are called beside the fields of z and w: `q.x` and `q.y`, or `q[0]` and `q[1]`.
-    None where these are all four, or have no such names."""
+def x_and_y(paths: tuple[str, ...]) -> tuple[str, str] | None:
+    """What x and y are called where these are the fields of z and w: `q.x` and `q.y`, or `q[0]` and
+    `q[1]`. None where these are all four, or have no such names."""
     if len(paths) != 2:
         return None
     z, w = paths
@@ -71,11 +71,11 @@ def beside(paths: tuple[str, ...]) -> tuple[str, str] | None:
 
 
 def whole(reading: Reading, sensor: Sensor) -> Sensor:
-    """The sensor with all four fields, where the log has x and y beside z and w.
+    """The sensor with all four fields, where the log has x and y as well as z and w.
 
     A factor on z alone mirrors the turn; on x it is the same one, and on y there is none.
     """
-    others, frame = beside(sensor.paths), reading.frames.get(sensor.topic)
+    others, frame = x_and_y(sensor.paths), reading.frames.get(sensor.topic)
     if others is None or frame is None or not set(others) <= set(frame.columns):
         return sensor
     if any(frame[path].null_count() == frame.height for path in others):

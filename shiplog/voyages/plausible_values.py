@@ -16,11 +16,11 @@ import polars as pl
 
 from shiplog import units
 from shiplog.channels import DEGREE
-from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Actuator, Profile, Source
 from shiplog.profile_channels import TABLE_CHANNELS
 from shiplog.voyages import clocks, not_available
+from shiplog.voyages.left_out import LeftOut
 
 # Kinds of ship by their length [m], the first that is long enough; the last one's are the rest.
 SMALL, BOAT = 3.0, 30.0
@@ -58,29 +58,6 @@ class Limits:
     why: str = ""
     stated: bool = False
     also: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """Values of one source that are blank: their times [ns], and what to say of them."""
-
-    kind: str
-    name: str
-    times: np.ndarray
-    sentence: str  # with {first} for the second of the first one
-    value: float
-    unit: str
-    low: float | None = None
-    high: float | None = None
-
-    def finding(self, start: int) -> Finding:
-        """As a finding of a voyage whose first row is at `start` [ns]."""
-        first, last = ((int(t) - start) * 1e-9 for t in (self.times.min(), self.times.max()))
-        said = self.sentence.format(first=f"{first:.1f} s")
-        return Finding(
-            self.kind, self.name, said, round(first, 3), round(last, 3), self.value, self.low,
-            self.high, self.unit,
-        )  # fmt: skip
 
 
 def screened(reading: Reading, profile: Profile) -> tuple[Reading, Screen]:
@@ -143,18 +120,6 @@ class Screen:
         if name == "position":
             self._places(times, si, raw)
         return np.where(np.isfinite(si), raw, np.nan)
-
-    def findings(self, start: int) -> list[Finding]:
-        """One a channel and kind, of a voyage whose first row is at `start` [ns]."""
-        return [one.finding(start) for one in self.left_out if len(one.times)]
-
-    @property
-    def explained(self) -> dict[str, np.ndarray]:
-        """Times [ns] of each source at which a value was left out, in order."""
-        named: dict[str, list[np.ndarray]] = {}
-        for one in self.left_out:
-            named.setdefault(one.name, []).append(one.times)
-        return {name: np.unique(np.concatenate(times)) for name, times in named.items()}
 
     def _mark(
         self, name: str, channel: str, mark: not_available.Mark, times: np.ndarray, si: np.ndarray,
@@ -356,17 +321,3 @@ def _metres(place: np.ndarray, known: np.ndarray) -> np.ndarray:
     turned = (place[:, 1] - east + 180.0) % 360.0 - 180.0
     narrow = math.cos(math.radians(float(np.median(place[known, 0]))))
     return METRE_PER_DEG * np.stack((place[:, 0], turned * narrow), axis=1)
-
-
-def rows_explained(times: np.ndarray, known: np.ndarray, left_out: np.ndarray) -> np.ndarray:
-    """Grid rows [m] bool between whose neighbouring samples a value was left out.
-
-    times [m] ns; known [n] ns: the samples that are left; left_out [k] ns, in order
-    """
-    if not len(left_out):
-        return np.zeros(len(times), bool)
-    after = np.searchsorted(known, times, side="left")
-    ends = np.concatenate((known, [np.iinfo(np.int64).max]))
-    begins = np.concatenate(([np.iinfo(np.int64).min], known))
-    low = np.searchsorted(left_out, begins[after], side="right")
-    return np.searchsorted(left_out, ends[after], side="left") > low

@@ -49,7 +49,7 @@ class Samples:
     step_s      s, in which the stamps count, where that is coarse against the period; else 0
     resolution  the step in which the instrument counts, SI (position in m); 0 where none shows
     burst       what was spread of samples that bore one stamp
-    dropped     samples that are not used, since another one has their stamp; of them `beside` are
+    dropped     samples that are not used, since another one has their stamp; of them `foreign` are
                 another instrument's
     taken_for_order  its samples show that it is sent when it changes
     noise       standard deviation of one sample, its resolution included, SI (position in m)
@@ -72,7 +72,7 @@ class Samples:
     step_s: float = 0.0
     burst: bursts.Spread | None = None
     dropped: int = 0
-    beside: int = 0
+    foreign: int = 0
     taken_for_order: bool = False
 
     @property
@@ -174,7 +174,7 @@ def ordered(
     spread = bursts.spread(time, value)
     order = np.argsort(spread.time, kind="stable")
     time, value = spread.time[order], value[order]
-    own = ~(spread.again | spread.beside)[order]
+    own = ~(spread.again | spread.foreign)[order]
     own[1:] &= np.diff(time) > 0
     dropped = len(time) - int(own.sum()) - int(spread.again.sum())
     time, value = time[own], value[own]
@@ -190,7 +190,7 @@ def ordered(
     return Samples(
         time, value, none, whole, blank, period, tolerance, hold=hold, longest_s=longest,
         step_s=step, burst=spread if spread.bursts else None, dropped=dropped,
-        beside=int(spread.beside.sum()),
+        foreign=int(spread.foreign.sum()),
     )  # fmt: skip
 
 

@@ -139,11 +139,11 @@ def _coarse(names: list[str], every: Mapping[str, Samples]) -> Finding:
 
 
 def _dropped(name: str, samples: Samples) -> Finding:
-    beside = samples.beside
+    foreign = samples.foreign
     why = (
-        "they are beside others of the same stamps, as of two instruments under one name: look for "
+        "they have the stamps of others, as of two instruments under one name: look for "
         "a talker, a frame or a status that tells them apart"
-        if beside
+        if foreign
         else "another one has the same time"
     )
     sentence = f"{samples.dropped} samples of {name} are not used: {why}."

@@ -19,19 +19,15 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import LogUnreadable, listed
-from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile, Source
 from shiplog.profile_channels import NEEDED
-from shiplog.voyages import clocks, fault_detection
-from shiplog.voyages.voyage_grid import VoyageGrid
+from shiplog.voyages import clocks
+from shiplog.voyages.left_out import LeftOut
 
 GNSS = ("position", "velocity")
 SENSORS = (*GNSS, "heading", "yaw_rate", "wind")
 ALL = (*SENSORS, "actuator")
-ALIKE_NS = (
-    200_000_000  # two rows of the grid: how near a blank row is to the message that blanks it
-)
 FLAG = {0.0, 1.0}
 MOST_REASONS = 3  # that a sentence names
 
@@ -118,23 +114,6 @@ RULES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Of one channel: the messages that are not valid by their own word; times [n] ns."""
-
-    channel: str
-    source: Source
-    times: np.ndarray
-    messages: int
-    reasons: Counter[str]
-
-    @property
-    def why(self) -> str:
-        named = [reason for reason, _ in self.reasons.most_common(MOST_REASONS)]
-        more = len(self.reasons) - len(named)
-        return "; ".join(named) + (f"; and {more} other reasons" if more else "")
-
-
 def sources(profile: Profile) -> list[tuple[str, Source]]:
     """The sensors under their names, and the actuators."""
     return [*profile.sensors.items(), *(("actuator", one) for one in profile.actuators)]
@@ -150,7 +129,7 @@ def paths(name: str, source: Source) -> set[str]:
     }  # fmt: skip
 
 
-def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[Refused]]:
+def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[LeftOut]]:
     """The log with no value where its own message says that it is not valid; and which.
 
     Raises LogUnreadable where no message of a sensor that is needed is valid.
@@ -168,19 +147,11 @@ def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[Refused]]:
         nothing = [pl.when(pl.lit(~bad)).then(pl.col(path)).alias(path) for path in there]
         frames[source.topic] = frame.with_columns(nothing)
         times = frame[clocks.of(frame, source)[0]].filter(bad).drop_nulls().to_numpy()
-        one = Refused(channel, source, times, frame.height, reasons)
+        why = _why(reasons)
         if bad.all() and name in NEEDED:
-            raise _none_valid(one, reading.contents.path.name)
-        refused.append(one)
+            raise _none_valid(channel, source, frame.height, why, reading.contents.path.name)
+        refused.append(_left_out(channel, source, times, frame.height, why))
     return replace(reading, frames=frames), refused
-
-
-def said(grid: VoyageGrid, refused: list[Refused]) -> list[Finding]:
-    """One finding a channel. The grid's own that these rows are blank are taken out of it: they
-    are the same thing."""
-    for one in refused:
-        grid.findings = [f for f in grid.findings if not _same(f, one, grid)]
-    return [_finding(one, grid) for one in refused]
 
 
 def _rules(name: str, source: Source) -> list[Rule]:
@@ -244,34 +215,27 @@ def _met(column: pl.Series, rule: Rule) -> list[tuple[str, str, pl.Series]]:
     return words + [(f"{v:g}", w, (column == v).fill_null(False)) for v, w in numbers]
 
 
-def _finding(one: Refused, grid: VoyageGrid) -> Finding:
-    start, end = ((float(t) - float(grid.times[0])) * 1e-9 for t in (one.times[[0, -1]]))
-    sentence = (
-        f"{one.channel}: {len(one.times)} of {one.messages} messages on {one.source.topic} are not "
-        f"valid by their own word ({one.why}), from {start:.1f} s to {end:.1f} s; left out. If "
-        'that word is wrong, set status = "ignore" there in the profile.'
-    )
-    return Finding(
-        "status", one.channel, sentence, round(start, 3), round(end, 3), float(len(one.times)),
-        unit="messages",
+def _left_out(channel: str, source: Source, times: np.ndarray, count: int, why: str) -> LeftOut:
+    """What of a channel is not valid; times [n] ns, of `count` messages."""
+    return LeftOut(
+        "status", channel, times,
+        f"{channel}: {len(times)} of {count} messages on {source.topic} are not valid by their own "
+        f"word ({why}), from {{first}} to {{last}}; left out. If that word is wrong, set status = "
+        '"ignore" there in the profile.',
+        float(len(times)), "messages",
     )  # fmt: skip
 
 
-def _same(found: Finding, one: Refused, grid: VoyageGrid) -> bool:
-    """Whether a stretch of blank rows is one of messages that are not valid."""
-    if found.kind != "blank" or found.channel != one.channel:
-        return False
-    if found.start_s is None or found.end_s is None:
-        return len(one.times) > fault_detection.LISTED  # what is summed up
-    first = grid.times[0] + int(found.start_s * 1e9) - ALIKE_NS
-    last = grid.times[0] + int(found.end_s * 1e9) + ALIKE_NS
-    return bool(((one.times >= first) & (one.times <= last)).any())
+def _why(reasons: Counter[str]) -> str:
+    named = [reason for reason, _ in reasons.most_common(MOST_REASONS)]
+    more = len(reasons) - len(named)
+    return "; ".join(named) + (f"; and {more} other reasons" if more else "")
 
 
-def _none_valid(one: Refused, log: str) -> LogUnreadable:
+def _none_valid(channel: str, source: Source, count: int, why: str, log: str) -> LogUnreadable:
     return LogUnreadable(
-        f"{log}: none of the {one.messages} messages on {one.source.topic} holds a {one.channel} "
-        f"that is valid by its own word ({one.why}). Fields read: {listed(one.source.paths)}.",
+        f"{log}: none of the {count} messages on {source.topic} holds a {channel} that is valid by "
+        f"its own word ({why}). Fields read: {listed(source.paths)}.",
         hint="name another topic in the profile. If the values are right all the same, set "
-        f'status = "ignore" in [sensors.{one.channel}].',
+        f'status = "ignore" in [sensors.{channel}].',
     )

@@ -15,7 +15,8 @@ from shiplog import channels, frames
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
-from shiplog.voyages import fault_detection, held_values, plausible_values, resampling
+from shiplog.voyages import fault_detection, held_values, resampling
+from shiplog.voyages.left_out import rows_explained
 
 STEP_S = resampling.STEP_NS * 1e-9
 
@@ -53,7 +54,7 @@ class VoyageGrid:
         too slow throughout, `sampling_findings` says so once."""
         placed = resampling.onto(self.times, samples)
         left_out = self.explained.get(name, self.times[:0])
-        said = plausible_values.rows_explained(self.times, samples.time, left_out)
+        said = rows_explained(self.times, samples.time, left_out)
         self.marks[said & (placed.blank | placed.gap)] |= int(Quality.BLANK)
         stood = f", having stood still {_far(name, samples.elsewhere)} away,"
         why = stood if samples.elsewhere else ""

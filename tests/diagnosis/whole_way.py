@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+import pytest
+
 from pipelines.experiments.simulated_ship import Laws, cases, sensors
 from shiplog import profile_file as profiles
 from shiplog.diagnosis import (
@@ -49,11 +51,16 @@ def log(case: cases.Case, leg: cases.Leg, folder):
     return path
 
 
-def judged(campaign, observed):
-    """A trial of a record, and the decision before anything was held out."""
+def judged(campaign, observed, sets=5):
+    """A trial of a record, and the decision before anything was held out.
+
+    sets  that are searched: here one cause acts at most, and what is behind is tested elsewhere
+    """
     trial, point = evidence.begin(Trial.of(campaign, observed), {})
-    found = search.Search(trial, point, placebo.placebos(campaign))
-    found.run()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(search, "MOST_SETS", sets)
+        found = search.Search(trial, point, placebo.placebos(campaign))
+        found.run()
     return trial, decide(found)[0]
 
 

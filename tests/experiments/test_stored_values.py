@@ -1,5 +1,7 @@
 """Voyages of known motion through every reader: a few of the thousand of the experiment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pymap3d
 import pytest
@@ -8,11 +10,12 @@ from pipelines.experiments.stored_values import changes, instruments, judge, mot
 from pipelines.experiments.stored_values.judge import Draw
 
 USUAL = instruments.SETS["usual"]
+SECONDS = 240.0  # instead of 600
 
 
 def drawn(kind, recorder, change=None, seed=3):
     rng = np.random.default_rng(seed)
-    sailed = motion.sail(motion.KINDS[kind], rng)
+    sailed = motion.sail(replace(motion.KINDS[kind], seconds=SECONDS), rng)
     seen, hz = instruments.recorded(sailed, USUAL, rng)
     how = {}
     chosen = next((c for c in changes.CHANGES if c.name == change), None)
@@ -94,7 +97,7 @@ def test_a_ship_goes_as_fast_as_it_says():
     sailed = motion.sail(motion.KINDS["coaster"], np.random.default_rng(1))
     gone = np.gradient(sailed.x0, sailed.t), np.gradient(sailed.y0, sailed.t)
     speed = np.hypot(sailed.surge, sailed.sway)
-    assert np.hypot(*gone)[5:-5] == pytest.approx(speed[5:-5], rel=1e-3)
+    assert np.abs(np.hypot(*gone) / speed - 1.0)[5:-5].max() < 1e-3
 
 
 def test_there_are_thirty_kinds_of_changes():

@@ -26,7 +26,7 @@ def test_a_burst_is_spread_over_the_time_since_the_one_before(every):
     assert found.time * 1e-9 - START * 1e-9 == pytest.approx(T + 0.01, abs=1e-6)
     assert (found.bursts, found.each_s) == (600 // every, pytest.approx(every / 10))
     assert found.unsure_s == pytest.approx(0.1)  # the last one may have waited for as long
-    assert not found.again.any() and not found.beside.any()
+    assert not found.again.any() and not found.foreign.any()
 
 
 def test_ten_samples_within_twenty_milliseconds_are_a_burst():
@@ -92,7 +92,7 @@ def test_two_instruments_under_one_name_are_no_burst():
     """Positions of two antennas 12 m apart, on one ship of 2 m/s."""
     at = np.repeat(2.0 * T, 2) + np.tile([0.0, 12.0], 600)
     found = spread(ns(np.repeat(T, 2)), at)
-    assert (found.beside.sum(), found.moved) == (600, 0)
+    assert (found.foreign.sum(), found.moved) == (600, 0)
 
 
 def test_orders_that_come_in_flurries_are_no_bursts():

@@ -78,12 +78,13 @@ def test_different_sentences_of_one_burst_keep_the_epoch_of_its_utc(tmp_path):
     assert kinds(found) == []
 
 
-def serial(offset, latency=0.1, period=1.0, headings=0.5, seconds=120.0):
-    """Lines as they come over a wire, stamped by a clock that is `offset(t)` ahead."""
+def serial(offset, latency=0.1, period=1.0, headings=0.5, seconds=120.0, apart=0.07):
+    """Lines as they come over a wire, stamped by a clock that is `offset(t)` ahead; RMC comes
+    `apart` after GGA [s]."""
     lines = []
     for t in np.arange(0.0, seconds, 0.1).round(3).tolist():
         if round(t / 0.1) % round(period / 0.1) == 0:
-            lines += [(t + latency, gga(t)), (t + latency + 0.07, rmc(t))]
+            lines += [(t + latency, gga(t)), (t + latency + apart, rmc(t))]
         if round(t / 0.1) % round(headings / 0.1) == 0:
             lines += [(t + 0.02, hdt(t)), (t + 0.05, rsa(t))]
     return [f"{iso(t + offset(t))} {body}" for t, body in sorted(lines)]
@@ -111,6 +112,34 @@ def test_the_latency_of_a_receiver_is_not_the_recorder_s(tmp_path, latency, head
     assert all(f.value == pytest.approx(latency, abs=0.05) for f in said)
 
 
+@pytest.mark.parametrize("apart", [0.07, 0.6])  # each sentence has a latency of its own
+def test_a_recorder_whose_clock_is_set_twice(tmp_path, apart):
+    offset = serial(lambda t: -4.0 if t < 30 else 0.0 if t < 80 else 5.0, apart=apart)
+    topics, found = read(tmp_path, offset)
+    assert late(topics["/gyro"], heading, "heading_deg") < 2 * np.pi * 0.15
+    assert [f.kind for f in found.findings] == ["jump"]
+
+
+SLOWER = {  # s, of the latency in the course of the log; whether it is long enough to be said
+    "scatters": (lambda t, rng: rng.uniform(0.2, 0.9), True),
+    "becomes longer": (lambda t, rng: 0.2 if t < 60 else 0.9, False),
+    "becomes shorter": (lambda t, rng: 1.2 if t < 60 else rng.uniform(0.55, 0.6), True),
+}
+
+
+@pytest.mark.parametrize("which", SLOWER)
+def test_latency_that_varies_is_latency(tmp_path, which):
+    rng, lines = np.random.default_rng(1), []
+    of, said = SLOWER[which]
+    for t in range(120):
+        late_by = of(t, rng)
+        lines += [(t + late_by, gga(t)), (t + late_by + 0.07, rmc(t))]
+        lines += [(t + 0.02, hdt(t)), (t + 0.52, hdt(t + 0.5))]
+    topics, found = read(tmp_path, [f"{iso(t)} {body}" for t, body in sorted(lines)])
+    assert late(topics["/gyro"], heading, "heading_deg") < 2 * np.pi * 0.03
+    assert [f.kind for f in found.findings] == ["clock_offset"] * said
+
+
 @pytest.mark.parametrize("offset", [7200.0, -3600.0, 19_800.0])
 def test_a_recorder_that_keeps_the_time_of_a_zone(tmp_path, offset):
     topics, found = read(tmp_path, serial(lambda t: offset, latency=0.7))
@@ -118,7 +147,7 @@ def test_a_recorder_that_keeps_the_time_of_a_zone(tmp_path, offset):
     assert f"{offset:+.2f} s" in " ".join(f.sentence for f in found.findings)
 
 
-@pytest.mark.parametrize("offset", [-0.9, 4.0, -30.0, 11.4])
+@pytest.mark.parametrize("offset", [-0.9, 4.0, -30.0, 11.4, 86_400.0 * 30 + 5])
 def test_a_recorder_that_is_off_by_more_than_a_latency(tmp_path, offset):
     topics, _ = read(tmp_path, serial(lambda t: offset))
     assert late(topics["/gyro"], heading, "heading_deg") < 2 * np.pi * 0.15

@@ -41,6 +41,20 @@ def experiment(store, tmp_path_factory):
     return out, text, json.loads((out.parent / "answer.json").read_text(encoding="utf-8"))
 
 
+@pytest.fixture
+def undrawn(experiment, monkeypatch):
+    """The figures of `experiment` in place of further ones: they take the longest."""
+    drawn = experiment[0] / "figures"
+
+    def copied(*given):
+        to = given[-1]
+        if to.parent != drawn:
+            shutil.copyfile(drawn / f"{to.name}.png", to.with_suffix(".png"))
+
+    for name in ("histograms", "wind", "validation", "test", "inputs", "states"):
+        monkeypatch.setattr(figures, name, copied)
+
+
 def test_every_table_and_figure_is_there(experiment):
     out, _, answer = experiment
     losses = pl.read_parquet(out / "tables" / "test_losses.parquet")
@@ -78,10 +92,8 @@ def test_seeds_begin_alike_in_every_set_and_are_scaled_by_the_reference_set(expe
         assert own["validation"].n_unique() == 1  # the same weights and scales, before any update
 
 
-def test_given_again_it_trains_nothing_and_says_the_same(experiment, store, monkeypatch):
+def test_given_again_it_trains_nothing_and_says_the_same(experiment, store, undrawn):
     out, text, _ = experiment
-    for name in ("histograms", "wind", "validation", "test", "inputs", "states"):
-        monkeypatch.setattr(figures, name, lambda *_: None)  # they are there, and take the longest
     weights = out / "runs" / "ref" / "seed0" / "model.safetensors"
     before = weights.stat().st_mtime_ns
     options = [word for name in DATA for word in ("--data", name)]
@@ -95,7 +107,7 @@ def by_paper(store, out, *options):
                 "--data", "ref", "--data", "jit2", *options)  # fmt: skip
 
 
-def test_a_gpu_trains_the_same_networks(store, tmp_path, monkeypatch):
+def test_a_gpu_trains_the_same_networks(store, tmp_path, monkeypatch, undrawn):
     """The processor in its place: all but the CUDA graph, which has a test where there is a GPU.
     In 32 bits Adam's first steps, which are as long for any slope, differ by rounding."""
     monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
@@ -111,7 +123,7 @@ def test_a_gpu_trains_the_same_networks(store, tmp_path, monkeypatch):
     assert not list((tmp_path / "there").rglob("checkpoint*"))
 
 
-def test_a_gpu_goes_on_from_checkpoints(store, tmp_path, monkeypatch):
+def test_a_gpu_goes_on_from_checkpoints(store, tmp_path, monkeypatch, undrawn):
     monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
     monkeypatch.setattr(on_gpu, "CHECKPOINT_EPOCHS", 1)
     save, after = network_files.save_checkpoint, []
@@ -215,7 +227,7 @@ def test_the_first_half_is_half_of_what_can_be_used():
     assert _halved("a[600:3600]", elapsed) == "a[600:3100]"
 
 
-def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path):
+def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path, undrawn):
     """Its parts train, validate and test; the reference set is half of the training part."""
     store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
     code, _, output = call("paper", "--store", store.path, "--out", tmp_path / "out", *FEW,

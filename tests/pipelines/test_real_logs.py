@@ -97,7 +97,7 @@ def test_a_quick_training_beats_a_quadratic_regression_on_the_published_split(tr
     assert answer["loss"] < answer["floors"]["least_squares"] < 3188
 
 
-def other_ship(data, profile, tables, tmp_path, window):
+def other_ship(profile, tables, tmp_path, window, epochs):
     """Any ship through convert, ingest, train and evaluate."""
     store = ("--store", tmp_path / "store")
     code, _, reported = call("convert", *tables, "--profile", profile, "--out", tmp_path / "logs")
@@ -105,7 +105,7 @@ def other_ship(data, profile, tables, tmp_path, window):
     code, _, reported = call("ingest", tmp_path / "logs", "--profile", profile, *store)
     assert code == 0, reported
     code, _, reported = call("train", *store, "--out", tmp_path / "run", "--window", window,
-                             "--width", 32, "--epochs", 60)  # fmt: skip
+                             "--width", 32, "--epochs", epochs)  # fmt: skip
     assert code == 0, reported
     code, _, reported = call("evaluate", tmp_path / "run", *store, "--json", tmp_path / "e")
     assert code == 0, reported
@@ -114,13 +114,13 @@ def other_ship(data, profile, tables, tmp_path, window):
 
 def test_two_thrusters_and_no_wind_sensor(shared_data, tmp_path):
     source = shared_data / "blueboat_ntnu" / "blueboat_10hz.parquet"
-    answer = other_ship(shared_data, "blueboat", [source], tmp_path, 40)
+    answer = other_ship("blueboat", [source], tmp_path, 40, 60)
     assert answer["loss"] < 0.5 * answer["floors"]["hold"]
 
 
 def test_a_tanker_in_a_tank_whose_rudder_counts_the_other_way(shared_data, tmp_path):
     source = shared_data / "kvlcc2_simman" / "hsva_cpmc_zigzag_20hz_model.parquet"
-    answer = other_ship(shared_data, "kvlcc2", [source], tmp_path, 50)
+    answer = other_ship("kvlcc2", [source], tmp_path, 50, 15)
     assert answer["loss"] < 0.5 * answer["floors"]["hold"]
     store = Store(tmp_path / "store")
     name = "HSVA_CPMC_KVLCC2_Z_20_10_S"

@@ -14,7 +14,7 @@ from shiplog.voyages import ingest as ingesting
 from shiplog.voyages.ingest import ingest
 
 SECOND = 1_000_000_000
-GNSS = ("/position", "/velocity")
+GNSS, GYRO = ("/position", "/velocity"), ("/gyro",)
 LATENCY = 20_000_000  # ns, from a stamp to its log time
 
 
@@ -38,14 +38,24 @@ def moved(seconds, topics, latency=LATENCY, late=None):
     }
 
 
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    """The circle on one clock, ingested; nobody changes it."""
+    folder = tmp_path_factory.mktemp("clean")
+    return ingest(sailing.write(folder / "turn.mcap", sailing.series()), sailing.profile())
+
+
 def usable(table):
     return (table["quality"].to_numpy() & int(UNUSABLE)) == 0
 
 
-@pytest.mark.parametrize("seconds", [18.0, -18.0, 37.0, -37.0, 19.0, 17.9, 18.2])
-@pytest.mark.parametrize("topics", [GNSS, ("/gyro",)], ids=["gnss", "gyro"])
-def test_the_time_of_gps_and_tai_are_taken_out_and_named(voyage, seconds, topics):
-    clean, done = voyage(sailing.series()), voyage(moved(seconds, topics))
+@pytest.mark.parametrize(
+    ("seconds", "topics"),
+    [(18.0, GNSS), (-18.0, GNSS), (18.0, GYRO), (37.0, GNSS), (-37.0, GYRO), (19.0, GNSS),
+     (17.9, GYRO), (18.2, GNSS)],
+)  # fmt: skip
+def test_the_time_of_gps_and_tai_are_taken_out_and_named(voyage, clean, seconds, topics):
+    done = voyage(moved(seconds, topics))
     known = float(np.copysign(round(abs(seconds)), seconds))
     (finding,) = [f for f in done.report.findings if "put onto the others' scale" in f.sentence]
     assert (finding.kind, finding.value) == ("clock_offset", known)
@@ -77,8 +87,8 @@ def test_another_difference_contradicts_and_no_row_is_usable(voyage, seconds, wo
 
 
 @pytest.mark.parametrize("late", [0.3, 0.8, 1.06, 1.4])
-def test_messages_that_come_late_are_of_the_same_clock(voyage, late):
-    clean, done = voyage(sailing.series()), voyage(moved(0.0, GNSS, late=int(late * SECOND)))
+def test_messages_that_come_late_are_of_the_same_clock(voyage, clean, late):
+    done = voyage(moved(0.0, GNSS, late=int(late * SECOND)))
     assert done.table.equals(clean.table)
     assert not done.report.contradictions
 
@@ -124,10 +134,15 @@ def after(one, at_s, by_s, what):
     return replace(one, log_time=one.time + LATENCY + add)
 
 
-@pytest.mark.parametrize("by", [2.5, -2.5, -0.6, 7.0, 600.0, -3600.0, 2**32 * 1e-6])
-@pytest.mark.parametrize("topic", ["/gyro", "/position"])
-def test_a_sensor_whose_clock_is_set_meanwhile_is_held_against_the_recorder(voyage, topic, by):
-    clean = voyage(sailing.series())
+@pytest.mark.parametrize(
+    ("topic", "by"),
+    [("/gyro", 2.5), ("/position", 2.5), ("/gyro", -2.5), ("/position", -0.6), ("/gyro", 7.0),
+     ("/position", 600.0), ("/gyro", -3600.0), ("/gyro", 2**32 * 1e-6),
+     ("/position", 2**32 * 1e-6)],
+)  # fmt: skip
+def test_a_sensor_whose_clock_is_set_meanwhile_is_held_against_the_recorder(
+    voyage, clean, topic, by
+):
     parts = moved(0.0, ())
     parts[topic] = after(sailing.series()[topic], 20.0, by, "stamps")
     done = voyage(parts)
@@ -156,8 +171,7 @@ def test_a_recorder_whose_clock_is_set_on_meanwhile_is_put_right_by_the_stamps(t
     assert (~usable(done.table)).sum() < 5  # where the clock was set
 
 
-def test_a_delay_that_steps_moves_no_stamp(voyage):
-    clean = voyage(sailing.series())
+def test_a_delay_that_steps_moves_no_stamp(voyage, clean):
     parts = moved(0.0, ())
     one = sailing.series()["/gyro"]
     late = np.where(one.time - sailing.START > 20 * SECOND, 900_000_000, LATENCY)
@@ -215,9 +229,8 @@ def unsorted_log(path, parts):
 
 
 @pytest.mark.parametrize("most", [0.9, 3.0])
-def test_a_delay_that_comes_and_goes_moves_no_stamp(voyage, most):
+def test_a_delay_that_comes_and_goes_moves_no_stamp(voyage, clean, most):
     """A computer that hangs for seconds, and catches up, as on milliAmpere."""
-    clean = voyage(sailing.series())
     parts = moved(0.0, ())
     one = sailing.series()["/position"]
     t = (one.time - sailing.START) * 1e-9

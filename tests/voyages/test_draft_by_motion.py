@@ -104,12 +104,14 @@ def test_a_stated_unit_stays_and_is_to_be_checked_where_the_position_says_anothe
     assert "CHECK" not in line["sog_mps"]
 
 
-@pytest.mark.parametrize(("middle", "swing"), [(190.0, 120.0), (40.0, 15.0), (350.0, 60.0)])
+DEG, RAD, CDEG = ("deg", 180.0 / math.pi, 1.0), ("rad", 1.0, 1.0), ("deg", 18_000.0 / math.pi, 0.01)
+
+
 @pytest.mark.parametrize(
-    ("unit", "factor", "sign"),
-    [("deg", 180.0 / math.pi, 1.0), ("rad", 1.0, 1.0), ("deg", 18_000.0 / math.pi, 0.01)],
-    ids=["deg", "rad", "cdeg"],
-)
+    ("middle", "swing", "unit", "factor", "sign"),
+    [(190.0, 120.0, *DEG), (40.0, 15.0, *DEG), (40.0, 15.0, *RAD), (350.0, 60.0, *RAD),
+     (350.0, 60.0, *CDEG), (190.0, 120.0, *CDEG)],
+)  # fmt: skip
 def test_an_angle_has_the_unit_in_which_it_points_along_the_way(
     tmp_path, middle, swing, unit, factor, sign
 ):
@@ -130,10 +132,11 @@ def test_an_angle_has_the_unit_in_which_it_points_along_the_way(
     assert np.abs(voyage.table["sway"].to_numpy()[20:-20]).max() < 0.05
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
-    ("unit", "factor"), [("rad/s", 1.0), ("deg/s", 180 / math.pi), ("deg/min", 10_800 / math.pi)]
-)
+    ("unit", "factor", "sign"),
+    [("rad/s", 1.0, 1.0), ("rad/s", 1.0, -1.0), ("deg/s", 180 / math.pi, 1.0),
+     ("deg/min", 10_800 / math.pi, -1.0)],
+)  # fmt: skip
 def test_a_rate_has_the_unit_and_the_sign_of_the_turn(tmp_path, unit, factor, sign):
     rate = sign * SHIP["rate"] * factor + NOISE.normal(0.0, 1e-3 * factor, len(T))
     line, profile, _ = drafted(tmp_path, yaw_rate=rate)
@@ -271,8 +274,11 @@ def boat(gain, neutral, rng):
     })  # fmt: skip
 
 
-@pytest.mark.parametrize("gain", [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)], ids=str)
-@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize(
+    ("gain", "stated"),
+    [((1.0, 1.0), True), ((-1.0, 1.0), True), ((-1.0, 1.0), False), ((1.0, -1.0), False)],
+    ids=str,
+)
 def test_polarity_and_neutral_pulse_are_what_the_data_say(tmp_path, gain, stated):
     frame = boat(gain, 1511.0, np.random.default_rng(3))
     if stated:

@@ -14,6 +14,7 @@ from shiplog.logs.write import Series
 from shiplog.voyages.ingest import ingest
 
 GYRO = '[sensors.heading]\ntopic = "/gyro"\nfield = "heading_deg"\nunit = "deg"\nsigma = 0.05'
+ENU, NED = "quaternion_enu", "quaternion_ned"
 FOUR = '["q_x", "q_y", "q_z", "q_w"]'
 TWO = '["q_z", "q_w"]'
 T = np.arange(0.0, 60.0, 0.1)
@@ -59,11 +60,12 @@ def mounting(done) -> list:
     return [f for f in done.report.findings if f.kind == "contradiction"]
 
 
-@pytest.mark.parametrize("kind", ["quaternion_enu", "quaternion_ned"])
-@pytest.mark.parametrize("fields", [FOUR, TWO])  # z and w alone: x and y stand beside them
 @pytest.mark.parametrize(
-    ("roll", "pitch"), [(0.0, 0.0), (25.0, 8.0 * WAVE), (-35.0 + 5 * WAVE, 6.0), (12.0, -15.0)]
-)
+    ("kind", "fields", "roll", "pitch"),  # z and w alone: the message has x and y as well
+    [(ENU, FOUR, 0.0, 0.0), (NED, TWO, 0.0, 0.0), (ENU, FOUR, 25.0, 8.0 * WAVE),
+     (ENU, TWO, 25.0, 8.0 * WAVE), (NED, FOUR, -35.0 + 5 * WAVE, 6.0),
+     (NED, TWO, -35.0 + 5 * WAVE, 6.0), (ENU, TWO, 12.0, -15.0), (NED, FOUR, 12.0, -15.0)],
+)  # fmt: skip
 def test_a_heeled_ship_has_the_heading_of_its_bow(voyage, kind, fields, roll, pitch):
     done = voyage(attitude(kind, roll, pitch), kind, fields)
     assert off(done).max() < 0.02  # interpolated between samples that pitch
@@ -71,8 +73,11 @@ def test_a_heeled_ship_has_the_heading_of_its_bow(voyage, kind, fields, roll, pi
     assert (done.table["quality"] == 0).all()
 
 
-@pytest.mark.parametrize("kind", ["quaternion_enu", "quaternion_ned"])
-@pytest.mark.parametrize("mounted", [(180.0, 0.0, 0.0), (90.0, 0.0, 0.0), (-120.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("kind", "mounted"),
+    [(ENU, (180.0, 0.0, 0.0)), (NED, (180.0, 0.0, 0.0)), (ENU, (90.0, 0.0, 0.0)),
+     (NED, (-120.0, 0.0, 0.0))],
+)  # fmt: skip
 def test_a_sensor_that_is_turned_over_is_said(voyage, kind, mounted):
     done = voyage(attitude(kind, 2.0 * WAVE, 1.5, mounted), kind)
     (finding,) = mounting(done)
@@ -83,10 +88,11 @@ def test_a_sensor_that_is_turned_over_is_said(voyage, kind, mounted):
     assert off(done).max() < 0.05  # x points ahead all the same
 
 
-@pytest.mark.parametrize("kind", ["quaternion_enu", "quaternion_ned"])
 @pytest.mark.parametrize(
-    "mounted", [(180.0, 0.0, 0.0), (0.0, 90.0, 0.0), (10.0, -20.0, 130.0), (0.0, 180.0, 0.0)]
-)
+    ("kind", "mounted"),
+    [(ENU, (180.0, 0.0, 0.0)), (NED, (0.0, 90.0, 0.0)), (ENU, (10.0, -20.0, 130.0)),
+     (NED, (10.0, -20.0, 130.0)), (NED, (0.0, 180.0, 0.0))],
+)  # fmt: skip
 def test_a_mounting_that_the_profile_states_is_taken_out(voyage, kind, mounted):
     stated = f"mounting_deg = {list(mounted)}"
     done = voyage(attitude(kind, 20.0 + 2.0 * WAVE, 1.5 * WAVE, mounted), kind, more=stated)
@@ -99,8 +105,9 @@ def test_a_sensor_whose_x_axis_points_up_has_no_heading(voyage):
         voyage(attitude("quaternion_ned", 0.0, 0.0, (0.0, 90.0, 0.0)), "quaternion_ned")
 
 
-@pytest.mark.parametrize("fields", [FOUR, TWO])
-@pytest.mark.parametrize("length", [0.0, 0.3, 1.4, np.nan])
+@pytest.mark.parametrize(
+    ("fields", "length"), [(FOUR, 0.0), (FOUR, 1.4), (FOUR, np.nan), (TWO, 0.3), (TWO, np.nan)]
+)
 def test_what_is_not_of_unit_length_is_no_rotation(voyage, fields, length):
     columns = attitude("quaternion_enu", 10.0, 3.0)
     for values in columns.values():

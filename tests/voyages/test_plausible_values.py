@@ -11,10 +11,10 @@ GEODETIC = sailing.PROFILE.replace(
     'kind = "local"\ntopic = "/position"\nfields = ["x_m", "y_m"]\nunit = "m"',
     'kind = "geodetic"\ntopic = "/fix"\nfields = ["lat", "lon"]\nunit = "deg"',
 )
-ROWS = [100, 101, 102, 103, 104, 300]  # of 600 samples at 10 Hz
+ROWS = [100, 101, 102, 103, 104, 300]  # of 320 samples at 10 Hz
 
 
-def voyage(tmp_path, topic, field, change, text=sailing.PROFILE, seconds=60.0):
+def voyage(tmp_path, topic, field, change, text=sailing.PROFILE, seconds=32.0):
     """The circle with the values [n] of one field changed, ingested."""
     parts = sailing.series(seconds)
     if "/fix" in text:

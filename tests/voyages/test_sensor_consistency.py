@@ -89,7 +89,7 @@ def found(table):
     }
 
 
-@pytest.mark.parametrize("number", range(1, 7))
+@pytest.mark.parametrize("number", [1, 4])  # all of them: test_demo
 def test_a_clean_sample_log_has_nothing_to_say(number):
     assert reported(ingest(SAMPLES / f"voyage_{number}.mcap", VECTWIN).report) == {}
 
@@ -196,7 +196,7 @@ def test_nine_of_ten_intervals_hold_the_truth(tmp_path):
     truth = {"clock_offset": 0.4, "yaw_rate_scale": 1.0, "yaw_rate_bias": 0.0}
     late, inside = Effects(clock_offset={"yaw_rate": 0.4}), []
     for seed in range(70, 82):
-        voyage = sail(500.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
+        voyage = sail(300.0, seed=seed, wind=Wind(2.0, 1.0), effects=late)
         write_voyage(tmp_path / "a.mcap", voyage, seed=seed, start=datetime(2026, 1, 1, tzinfo=UTC))
         for e in ingest(tmp_path / "a.mcap", VECTWIN).estimates:
             if e.channel == "yaw_rate":
@@ -246,7 +246,7 @@ def test_bias_and_scale_in_closed_form():
 def test_a_ship_that_hardly_turns_shows_no_scale_and_no_delay():
     """Its turning is a tenth of what either instrument adds as noise."""
     rng = np.random.default_rng(4)
-    for _ in range(20):
+    for _ in range(10):
         table = slalom(seconds=1500.0, swing=2e-3)
         noisy = table.with_columns(
             heading=table["heading"] + rng.normal(0, 0.1 * DEGREE, table.height),

@@ -45,7 +45,7 @@ class Spread:
 
     time     [n]  ns, in the order in which the stamps were given
     again    [n]  samples that came before with the same stamp and value: they are no others
-    beside   [n]  samples of another instrument under one name: of each stamp, all but the first
+    foreign  [n]  samples of another instrument under one name: of each stamp, all but the first
     moved         samples whose time is another than their stamp
     bursts        stamps, or groups of stamps, that bore several samples
     each_s        s, time from one burst to the next, in the median
@@ -55,7 +55,7 @@ class Spread:
 
     time: np.ndarray
     again: np.ndarray
-    beside: np.ndarray
+    foreign: np.ndarray
     moved: int = 0
     bursts: int = 0
     each_s: float = 0.0
@@ -82,18 +82,18 @@ def spread(stamps: np.ndarray, values: np.ndarray | None = None) -> Spread:
     if len(time) and not _may_be_bursty(time):
         return Spread(stamps, none, none)
     value = None if values is None else np.asarray(values, float).reshape(len(time), -1)[order]
-    again, beside = none.copy(), none.copy()
+    again, foreign = none.copy(), none.copy()
     same = np.concatenate(([False], np.diff(time) == 0))
     if value is not None and same.any():
-        again[order], beside[order] = _not_of_their_own(same, value)
-    keep = ~(again | beside)[order]
+        again[order], foreign[order] = _not_of_their_own(same, value)
+    keep = ~(again | foreign)[order]
     made = time.copy()
     made[keep], facts = _spread(time[keep])
     if not keep.all():  # what is no sample of its own goes with the one before
         made = made[np.maximum.accumulate(np.where(keep, np.arange(len(time)), 0))]
     out = np.empty_like(stamps)
     out[order] = made
-    return Spread(out, again, beside, **facts)
+    return Spread(out, again, foreign, **facts)
 
 
 def period_ns(time: np.ndarray) -> float:

@@ -27,11 +27,10 @@ STEP_NS = SECOND_NS // 4  # of the recorder's clock, that is told from jitter of
 DRIFT_NS = SECOND_NS // 4  # over the log: a clock that nothing sets
 ZONE_NS = 900 * SECOND_NS  # offsets of time zones are whole quarters of an hour
 AROUND = 5  # UTC times on either side that say whether the clock was set between them
+NEAR, SHOWN = 50, 0.7  # lines around in which a clock that is set shows so much of its step
+LASTS = 10  # UTC times: so many at least before and after a receiver becomes slower
 SMOOTHED = 31  # of them, for a clock that drifts
-BITS_PER_S, BITS_A_CHARACTER = (
-    115_200,
-    10,
-)  # the fastest serial line; what comes faster was buffered
+BITS_PER_S, BITS_A_CHARACTER = 115_200, 10  # the fastest serial line; what is faster was buffered
 QUANTA_NS = (SECOND_NS, SECOND_NS // 10)  # steps in which coarse stamps count
 RIDES = 0.8  # share of the bursts with a UTC that hold a sentence which belongs to that epoch
 SHARED = 0.2  # share of an instrument's sentences that bear another one's stamp, of a buffer
@@ -140,8 +139,8 @@ def clock_of(
             reference = reference + weeks * 7 * DAY_NS
     burst = _bursts(received, length)
     spread = _spread(received, burst, instruments, recorder)
-    late = _late(spread, received, at, reference)
-    offset = _offset(late, spread, received, at, reference, resolved, utc, recorder)
+    late, slower = _late(spread, received, at, reference)
+    offset = _offset(late - slower, spread, received, at, reference, resolved, utc, recorder)
     return Clock(utc, received, at, reference, spread - offset, late, burst, spread, recorder)
 
 
@@ -259,16 +258,18 @@ def _spread(
     return spread
 
 
-def _late(spread: np.ndarray, received: np.ndarray, at: np.ndarray, utc: np.ndarray) -> np.ndarray:
+def _late(
+    spread: np.ndarray, received: np.ndarray, at: np.ndarray, utc: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Stamp minus UTC [n] ns at each sentence: the median of the UTC times around it, on its side
-    of a step of the recorder's clock."""
-    late = np.zeros(len(spread), np.int64)
+    of a step. And how much of it [n] ns is of a receiver that takes longer than it did at best."""
+    late, slower = np.zeros(len(spread), np.int64), np.zeros(len(spread), np.int64)
     stamped = received[at] >= 0
     if not stamped.any():
-        return late
+        return late, slower
     at, each = at[stamped], (spread[at] - utc)[stamped]
     begins = _steps(each, at, received)
-    edges = [*begins, len(each)]
+    edges, longer, before = [*begins, len(each)], 0, each[:0]
     for begin, end in zip(begins, edges[1:], strict=True):
         part = each[begin:end]
         smooth = _running_median(part, SMOOTHED)
@@ -281,7 +282,15 @@ def _late(spread: np.ndarray, received: np.ndarray, at: np.ndarray, utc: np.ndar
         late[left:right] = base + np.rint(
             np.interp(inside, at[begin:end], (level - base).astype(float))
         ).astype(np.int64)
-    return late
+        middle = int(np.median(part))
+        if begin and len(before) >= LASTS <= len(part):
+            lines = received[max(at[begin - 1] - NEAR, 0) : at[begin] + NEAR]
+            there = received[at[begin - 1] : at[begin] + 1]
+            if _of_latency(int(np.median(before)), middle, there, lines):
+                longer += middle - int(np.median(before))
+        before = part
+        slower[left:right] = longer
+    return late, slower - slower.min()
 
 
 def _steps(late: np.ndarray, at: np.ndarray, received: np.ndarray) -> list[int]:
@@ -303,6 +312,21 @@ def _steps(late: np.ndarray, at: np.ndarray, received: np.ndarray) -> list[int]:
         if abs(step) > max(STEP_NS, 6.0 * jitter) and abs(late[i] - late[i - 1]) > 0.5 * abs(step):
             begins.append(i)
     return begins
+
+
+def _of_latency(before: int, after: int, there: np.ndarray, lines: np.ndarray) -> bool:
+    """Whether stamp minus UTC [ns] steps since the receiver takes longer, or less long: it may be a
+    latency on either side, and the stamps `there` [k] ns, of all lines from the UTC before to that
+    after, show no step among `lines` [n] ns, as those of a clock do that is set."""
+    step = after - before
+    if (
+        abs(step) < STEP_NS
+        or not EARLY_NS <= min(before, after) <= max(before, after) <= LATENCY_NS
+    ):
+        return False
+    gaps, usual = np.diff(there), float(np.quantile(np.diff(lines), 0.9))
+    most = -float(gaps.min()) if step < 0 else float(gaps.max()) - usual
+    return most < SHOWN * abs(step)
 
 
 def _where_set(left: int, right: int, received: np.ndarray) -> int:

@@ -149,9 +149,11 @@ def _receivers(
         where, kinds = {}, {}
         for kind in FIXES:
             rows = gathered.rows.get((kind, sender))
-            for i, place in enumerate(rows.place if rows else ()):
-                if i not in rows.why_not:  # type: ignore[union-attr]
-                    where[place] = rows.values[i][:2]  # type: ignore[union-attr]
+            if rows is None:
+                continue
+            for i, place in enumerate(rows.place):
+                if i not in rows.why_not:
+                    where[place] = rows.values[i][:2]
                 kinds[place] = kind
         if not where:
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -75,10 +75,11 @@ def topics_of(values: Values) -> tuple[list[Series], list[Finding]]:
     series, findings = _fixes(values)
     for topic, (schema, fields) in PAIRS.items():
         series += _paired(values, topic, schema, fields)
-    for path in sorted(p for p in values.paths if ENGINE.match(p)):
-        name = ENGINE.match(path)[1]  # type: ignore[index]
-        field_of = (("speed_rps", path, 1.0, ""),)
-        series += _paired(values, f"/propeller/{_plain(name)}", "shiplog.Propeller", field_of)
+    for path in sorted(values.paths):
+        if engine := ENGINE.match(path):
+            field_of = (("speed_rps", path, 1.0, ""),)
+            topic = f"/propeller/{_plain(engine[1])}"
+            series += _paired(values, topic, "shiplog.Propeller", field_of)
     there = {one.topic for one in series}
     made = _compasses(values, "/gyro" if "/gyro" not in there else "/gyro/compass", series)
     return series + made[0], findings + made[1]
@@ -167,8 +168,7 @@ def _compasses(values: Values, topic: str, series: list[Series]) -> tuple[list[S
             found.append(_series(name, "shiplog.Compass", time, received, columns, source))
         else:
             one = _series(name, "shiplog.Gyro", time, received, {"heading_deg": made[0]}, source)
-            one.metadata.update(made[1].metadata)  # type: ignore[attr-defined]
-            found.append(one)
+            found.append(replace(one, metadata={**one.metadata, **made[1].metadata}))
     return found, findings
 
 

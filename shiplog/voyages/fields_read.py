@@ -1,4 +1,4 @@
-"""Fields that are read beside those that a profile names, where a message has them."""
+"""Fields that are read in addition to those that a profile names, where a message has them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def wanted(profile: Profile, found: Mapping[str, Senders]) -> dict[str, set[str]
     """
     asked = profile.wanted()
     for name, source in status.sources(profile):
-        asked[source.topic] |= set(orientation.beside(source.paths) or ())
+        asked[source.topic] |= set(orientation.x_and_y(source.paths) or ())
         asked[source.topic] |= status.paths(name, source)
     for topic, paths in two_sources.wanted(found).items():
         asked[topic] |= paths
