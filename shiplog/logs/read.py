@@ -197,10 +197,11 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     twice = salvage.repeated(found.path, suspects) if suspects else {}
     for topic, frame in frames.items():
         findings += faults.repeats(topic, frame, tally.first or 0, twice.get(topic, []))
-    findings += faults.clocks(frames)
+    told = stored_findings.of_record(found.metadata)
+    findings += faults.clocks(frames, told)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
     findings += dates.impossible(frames, noted)
-    findings += stored_findings.of_record(found.metadata)
+    findings += told
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,

@@ -23,6 +23,7 @@ from shiplog.logs.senders import Senders
 from shiplog.profile import Actuator, Profile, Sensor, Source
 from shiplog.voyages import (
     beside,
+    clock_contradictions,
     clocks,
     empty_course,
     orientation,
@@ -92,7 +93,12 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         messages_lost=reading.health.messages_lost,
         rows=table.height,
         seconds=round(grid.seconds, 3),
-        findings=(*reading.health.findings, *aligned.left_out, *grid.findings, *compared.findings),
+        findings=(
+            *clock_contradictions.untold(reading.health.findings, aligned.left_out),
+            *aligned.left_out,
+            *grid.findings,
+            *compared.findings,
+        ),
         usable_s=usable_s,
         windows=windows,
         instruments=tuple(
@@ -189,6 +195,8 @@ def _aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) ->
     mark_jumps(grid, profile, sampled)
     if timed.contradicted:
         grid.marks |= int(Quality.BLANK)
+        grid.findings = [f for f in grid.findings if f.kind not in ("gap", "blank")]
+    grid.findings = status.untold(grid, reading.health.findings, profile)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}

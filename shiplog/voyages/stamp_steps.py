@@ -26,16 +26,19 @@ EVEN = 2.0  # 90 % point over 10 % point of the distances between the rarer step
 COARSE = 0.05  # of the period: finer steps are no more than jitter
 
 
-def period_and_step(time: np.ndarray) -> tuple[float, float]:
+def period_and_step(time: np.ndarray, blank: np.ndarray | None = None) -> tuple[float, float]:
     """Period and step of the stamps [s] of samples at strictly increasing times [n] ns: 0, 0 where
     there are less than two, and a step of 0 where the stamps are fine.
 
-    The period is the median time between samples; the mean, where the stamps are coarse.
+    The period is the median time between samples; the mean, where the stamps are coarse. Between
+    two samples with a `blank` message [m] ns between them no stamp is coarse: a value is missing.
     """
     if len(time) < 2:
         return 0.0, 0.0
     steps = np.diff(time)
     median = float(np.median(steps)) * 1e-9
+    if blank is not None and len(blank):
+        steps = steps[np.searchsorted(blank, time[:-1]) == np.searchsorted(blank, time[1:])]
     coarse = _coarse(steps)
     if not coarse:
         return median, 0.0

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,6 +31,9 @@ SENSORS = (*GNSS, "heading", "yaw_rate", "wind")
 ALL = (*SENSORS, "actuator")
 ALIKE_NS = (
     200_000_000  # two rows of the grid: how near a blank row is to the message that blanks it
+)
+START_S = (
+    2.0  # between a log's first message and its voyage's first row, and a message and the next
 )
 FLAG = {0.0, 1.0}
 MOST_REASONS = 3  # that a sentence names
@@ -181,6 +184,26 @@ def said(grid: VoyageGrid, refused: list[Refused]) -> list[Finding]:
     for one in refused:
         grid.findings = [f for f in grid.findings if not _same(f, one, grid)]
     return [_finding(one, grid) for one in refused]
+
+
+def untold(grid: VoyageGrid, told: Sequence[Finding], profile: Profile) -> list[Finding]:
+    """The grid's findings without the blank stretches that the log's conversion told of, topic by
+    topic, as what the instrument itself calls no measurement."""
+    stretches: dict[str, list[tuple[float, float]]] = {}
+    for one in told:
+        if one.kind == "status" and one.start_s is not None and one.end_s is not None:
+            stretches.setdefault(one.channel, []).append((one.start_s, one.end_s))
+    topics = {getattr(source, "name", name): source.topic for name, source in sources(profile)}
+
+    def known(found: Finding) -> bool:
+        inside = stretches.get(topics.get(found.channel, ""), ())
+        if found.kind != "blank" or not inside:
+            return False
+        if found.start_s is None or found.end_s is None:
+            return True  # what is summed up
+        return any(a - START_S <= found.start_s and found.end_s <= b + START_S for a, b in inside)
+
+    return [found for found in grid.findings if not known(found)]
 
 
 def _rules(name: str, source: Source) -> list[Rule]:
