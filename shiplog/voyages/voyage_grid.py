@@ -182,7 +182,7 @@ def _jumps(
     if every > 1:
         usable &= samples.nearest_rows(grid.times)
     found = fault_detection.jumps(gone, rate, usable, samples.noise, every, period, lively=True)
-    found = [one for one in found if one[1] > _unseen(one[0], usable, rate)]
+    found = _not_unseen(found, usable, rate)
     at = np.searchsorted(samples.time, grid.times[[row for row, _ in found]])
     counted = fault_detection.steps_around(samples.value, [(int(i), int(i)) for i in at])
     return [
@@ -190,14 +190,23 @@ def _jumps(
     ]
 
 
-def _unseen(row: int, usable: np.ndarray, rate: np.ndarray) -> float:
-    """How far a channel can have gone from the last usable row [m] to `row`, that no rate says: it
-    was interpolated, and over UNSEEN_S a ship can go to any side as fast as it mostly does."""
-    before = np.flatnonzero(usable[:row])
-    gap = (row - before[-1]) * STEP_S if len(before) else 0.0
-    if gap <= UNSEEN_S:
-        return 0.0
-    return 2.0 * gap * float(np.quantile(np.linalg.norm(rate[usable], axis=1), 0.95))
+def _not_unseen(
+    found: list[tuple[int, float]], usable: np.ndarray, rate: np.ndarray
+) -> list[tuple[int, float]]:
+    """The steps without those that a ship can have gone since the last usable row [m]: over
+    UNSEEN_S its rate was interpolated, and it can have gone to any side as fast as it mostly does.
+    """
+    if not found:
+        return found
+    rows = np.flatnonzero(usable)
+    mostly = float(np.quantile(np.linalg.norm(rate[usable], axis=1), 0.95))
+    kept = []
+    for row, step in found:
+        before = rows[np.searchsorted(rows, row) - 1] if len(rows) and rows[0] < row else row
+        gap = (row - before) * STEP_S
+        if gap <= UNSEEN_S or step > 2.0 * gap * mostly:
+            kept.append((row, step))
+    return kept
 
 
 def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, float]]:
