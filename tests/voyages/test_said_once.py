@@ -36,7 +36,8 @@ def test_what_is_blank_for_a_while_is_one_stretch(tmp_path, each):
     found = voyage.report.findings
     assert {(f.kind, f.channel) for f in found} == {("blank", "velocity")}
     assert len(found) == {1: 1, 2: 20 + 1}[each]  # between two that are, each one is measured
-    ends = min(f.start_s for f in found if f.end_s), max(f.end_s for f in found if f.end_s)
+    listed = [f for f in found if f.start_s and f.end_s]
+    ends = min(f.start_s or 0.0 for f in listed), max(f.end_s or 0.0 for f in listed)
     assert ends == pytest.approx((99.0, 141.0), abs=0.11)
     marks = voyage.table["quality"].to_numpy()
     assert not (marks & int(Quality.GAP)).any()
