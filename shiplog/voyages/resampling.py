@@ -179,6 +179,8 @@ def ordered(
     dropped = len(time) - int(own.sum()) - int(spread.again.sum())
     time, value = time[own], value[own]
     period, step = stamp_steps.period_and_step(time, blank)
+    if step and stamp_steps.goes_on(time, value):
+        period, step = float(np.median(np.diff(time))) * 1e-9, 0.0
     period = period or 1.0 / RATE_HZ
     tolerance = tolerance_s or max(1.5 * period, LEAST_TOLERANCE_S, period + step)
     if tolerance_s is None:
