@@ -26,6 +26,13 @@ CLOCK_PAIRS = (
     # where the publish times are of the writing of the file, and no clock of the publishers
     ("log_time", "stamp", "The recorder's clock", "the messages' own stamps"),
 )
+LATE_WORDS = {  # of a topic that came late, while others did not
+    ("log_time", "publish_time"): "recorded {} after they were published",
+    ("publish_time", "stamp"): "published {} after the time that they bear",
+    ("log_time", "stamp"): "recorded {} after the time that they bear",
+}
+LATEST_S = 1.5  # of a receiver's latency; 1.06 s have been measured
+ALIKE = 0.25  # of an offset: what another one differs by, and is the same one
 PACE = 0.1  # of the recorder's: publish times that run otherwise are of the writing of a file
 LATE_PUBLISH_NS = 60 * SECOND_NS  # nothing is published so long after it was recorded
 
@@ -163,12 +170,20 @@ def repeats(topic: str, frame: pl.DataFrame, first: int, again: list[int]) -> li
     return findings
 
 
-def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
-    """Steady offsets between the recorder's, the publishers' and the messages' own clocks."""
+def clocks(frames: Mapping[str, pl.DataFrame], told: Iterable[Finding] = ()) -> list[Finding]:
+    """Steady offsets between the recorder's, the publishers' and the messages' own clocks.
+
+    A clock is that of all its topics. Where some are late by no more than a receiver's latency and
+    others are not, it is said of their messages and of no clock.
+
+    told  what is known of the log's clocks already: an offset of that size is not said again
+    """
     findings = []
+    known = [f.value for f in told if f.kind == "clock_offset" and f.value is not None]
     written = {topic for topic, frame in frames.items() if not of_publishers(frame)}
     for ahead, behind, one, other in CLOCK_PAIRS:
         steady: dict[str, float] = {}
+        punctual = False
         for topic, frame in frames.items():
             if (topic in written) != ({ahead, behind} == {"log_time", "stamp"}):
                 continue
@@ -177,9 +192,10 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
             median, low, high = spread(frame, ahead, behind)
             if median is not None and abs(median) > OFFSET and high - low <= abs(median):
                 steady[topic] = median
+            punctual |= median is not None and max(abs(low), abs(high)) <= OFFSET
         for topics in _alike(steady, frames, ahead, behind):
             median, low, high = _pooled(topics, frames, ahead, behind)
-            if median is None:
+            if median is None or any(_same(median, value) for value in known):
                 continue
             side = "ahead of" if median > 0 else "behind"
             channel = topics[0] if len(topics) == 1 else "log"
@@ -188,10 +204,20 @@ def clocks(frames: Mapping[str, pl.DataFrame]) -> list[Finding]:
             _, scale = leap_seconds.known_difference(median, when)
             sentence = f"{one} is {far} {side} {other} on {_topics(topics)}"
             sentence += f": {scale}." if scale else "."
+            if punctual and 0.0 < median <= LATEST_S:
+                sentence = (
+                    f"The messages on {_topics(topics)} were "
+                    f"{LATE_WORDS[ahead, behind].format(far)}, and those on other topics were not: "
+                    "they came late, or it is another clock that they were stamped by."
+                )
             findings.append(
                 Finding("clock_offset", channel, sentence, None, None, median, low, high, "s")
             )
     return findings
+
+
+def _same(offset: float, other: float) -> bool:
+    return abs(offset - other) <= max(OFFSET, ALIKE * abs(other))
 
 
 def of_publishers(frame: pl.DataFrame) -> bool:
@@ -238,16 +264,19 @@ def _pooled(
 def _alike(
     medians: dict[str, float], frames: Mapping[str, pl.DataFrame], ahead: str, behind: str
 ) -> list[list[str]]:
-    """Topics that share one offset: all of them if they are steady together, else in groups."""
+    """Topics that share one offset: all of them if they are steady together, and not far steadier
+    each by itself; else in groups."""
     if not medians:
         return []
     median, low, high = _pooled(list(medians), frames, ahead, behind)
     if median is not None and high - low <= abs(median):
-        return [list(medians)]
+        alone = [spread(frames[topic], ahead, behind) for topic in medians]
+        if high - low <= max(2.0 * max(b - a for _, a, b in alone), OFFSET):
+            return [list(medians)]
     groups: list[list[str]] = []
     start = 0.0
     for topic, offset in sorted(medians.items(), key=lambda item: (item[1], item[0])):
-        if not groups or offset - start > max(OFFSET, 0.25 * abs(start)):
+        if not groups or not _same(offset, start):
             groups.append([])
             start = offset
         groups[-1].append(topic)

@@ -77,7 +77,9 @@ def hash_of(path: Path, size: int | None = None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What could be read. `messages_lost` is None when the log does not say how many it had."""
+    """What could be read: messages that are whole in the file. Lost are those that are not, and
+    those that are, but whose bytes do not fit their schema; None when the log does not say how many
+    it had."""
 
     route: str  # "fast": all of it, and every byte vouched for; else "salvage"
     messages_read: int
@@ -180,13 +182,15 @@ def _merged(one: Topic, other: Topic) -> Topic:
 
 def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) -> Health:
     found, broken = tables.found, sum(tables.failed.values())
-    count = sum(tally.counts.values()) - broken  # what does not fit its schema was not read
+    count = sum(tally.counts.values())
     damaged = bool(found.losses or tally.orphans)
-    lost: int | None = None if damaged else broken
+    missing: int | None = None if damaged else 0
     if found.statistics is not None:
-        lost = max(found.statistics.message_count - count, 0)
+        missing = max(found.statistics.message_count - count, 0)
+    lost = (
+        None if missing is None else missing + broken
+    )  # what does not fit its schema is lost, too
     topics = {number: channel.topic for number, channel in found.channels.items()}
-    missing = None if lost is None else lost - broken
     findings = faults.losses(found.losses, tally.first, missing, topics)
     findings += faults.appended(found.sections)
     findings += faults.left_out(tally.orphans, tables)
@@ -197,10 +201,11 @@ def _health(tables: Tables, tally: Tally, frames: Mapping[str, pl.DataFrame]) ->
     twice = salvage.repeated(found.path, suspects) if suspects else {}
     for topic, frame in frames.items():
         findings += faults.repeats(topic, frame, tally.first or 0, twice.get(topic, []))
-    findings += faults.clocks(frames)
+    told = stored_findings.of_record(found.metadata)
+    findings += faults.clocks(frames, told)
     noted = {channel.topic: channel.metadata for channel in found.channels.values()}
     findings += dates.impossible(frames, noted)
-    findings += stored_findings.of_record(found.metadata)
+    findings += told
     whole = found.statistics is not None and lost == 0 and not damaged and not found.unvouched
     return Health(
         "fast" if whole else "salvage", count, lost, found.chunks, found.chunks_lost,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import polars as pl
 
@@ -22,6 +23,8 @@ from shiplog.report.judgement import FEWEST_WINDOWS
 from shiplog.report.text_table import table
 
 MOST_FINDINGS = 16  # lines on one log
+MOST_NAMED = 4  # channels in one line
+PLURAL = {"has": "have", "is": "are"}
 MOST_ALIKE = 3  # findings of a kind and channel that are listed one by one
 
 # A lower rate is reported: a manoeuvring ship turns by degrees between two samples.
@@ -66,8 +69,8 @@ def _instruments(instruments: Sequence[Instrument]) -> list[str]:
         if one.rate_hz < SELDOM_HZ:
             rates.setdefault(float(f"{one.rate_hz:.2g}"), []).append(one.channel)
     lines = [
-        f"  rate: {listed(names, most=4)} at {rate:g} Hz; what stands between two samples is "
-        "interpolated."
+        f"  rate: {listed(names, most=MOST_NAMED)} at {rate:g} Hz; what stands between two "
+        "samples is interpolated."
         for rate, names in sorted(rates.items())
     ]
     coarse = [
@@ -83,7 +86,7 @@ def _instruments(instruments: Sequence[Instrument]) -> list[str]:
 def _findings(findings: Sequence[Finding]) -> list[str]:
     """Each by itself where they are few of a kind and channel, else their number and largest."""
     groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in sorted(findings, key=lambda one: one.kind != "contradiction"):
+    for finding in sorted(_together(findings), key=lambda one: one.kind != "contradiction"):
         groups.setdefault((finding.kind, finding.channel), []).append(finding)
     lines = []
     for (kind, channel), group in groups.items():
@@ -102,6 +105,26 @@ def _findings(findings: Sequence[Finding]) -> list[str]:
     if any(len(group) > MOST_ALIKE for group in groups.values()) or left > 0:
         lines.append("  all of them, one by one, with --json.")
     return lines
+
+
+def _together(findings: Sequence[Finding]) -> list[Finding]:
+    """What several channels lack over one stretch as one finding: a row of a table was lost."""
+    alike: dict[tuple[str, str], list[Finding]] = {}
+    for number, one in enumerate(findings):
+        rest = one.sentence.removeprefix(f"{one.channel} ")
+        verb = rest.split(" ", 1)[0]
+        own = rest == one.sentence or one.kind not in ("gap", "blank") or verb not in PLURAL
+        alike.setdefault((one.kind, str(number) if own else rest), []).append(one)
+    merged = []
+    for (_, rest), group in alike.items():
+        if len(group) == 1:
+            merged += group
+            continue
+        verb, more = rest.split(" ", 1)
+        names = listed([one.channel for one in group], most=MOST_NAMED)
+        sentence = f"{names} {PLURAL[verb]} {more}"
+        merged.append(replace(group[0], channel=names, sentence=sentence))
+    return merged
 
 
 def _size(finding: Finding) -> float:

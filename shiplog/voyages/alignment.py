@@ -102,6 +102,8 @@ def aligned(reading: Reading, profile: Profile, sent: Mapping[str, Senders]) -> 
     mark_jumps(grid, profile, sampled)
     if timed.contradicted:
         grid.marks |= int(Quality.BLANK)
+        grid.findings = [f for f in grid.findings if f.kind not in ("gap", "blank")]
+    grid.findings = status.untold(grid.findings, reading.health.findings, profile)
     grid.findings.sort(key=lambda f: (f.start_s is None, f.start_s or 0.0))
     table = pl.DataFrame(
         {"time": grid.times}

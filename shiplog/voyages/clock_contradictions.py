@@ -9,6 +9,7 @@ delay that nothing states: then no row can be used until somebody says which.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from shiplog.voyages import clocks
 from shiplog.voyages.clocks import EARLY_S, LATEST_S, RECORDER, Clock
 
 HOUR_S = 3600.0
+ONE_OFFSET_S = 0.3  # two statements of one clock's offset differ by what it jitters
 PACE = 0.1  # of a voyage's length: a recorder whose clock ran otherwise wrote a replay
 
 
@@ -66,6 +68,20 @@ def agreed(reading: Reading, profile: Profile) -> Agreed:
             contradicted |= {clock.topic for clock in group}
             findings.append(_contradiction(group, reference, apart, profile))
     return Agreed(replace(reading, frames=frames), findings, frozenset(contradicted))
+
+
+def untold(health: Sequence[Finding], own: Sequence[Finding]) -> list[Finding]:
+    """What a log's reader found, but for differences of clocks of which ingest says more: that they
+    were taken out, or that they contradict each other."""
+    sizes = [
+        abs(one.value) for one in own
+        if one.value is not None and (one.kind == "clock_offset" or one.reason == "clock")
+    ]  # fmt: skip
+    return [
+        one for one in health
+        if one.kind != "clock_offset" or one.value is None
+        or not any(abs(abs(one.value) - size) <= ONE_OFFSET_S for size in sizes)
+    ]  # fmt: skip
 
 
 def _keeps_pace(reading: Reading, profile: Profile) -> bool:

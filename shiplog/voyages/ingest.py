@@ -18,6 +18,7 @@ from shiplog.logs.senders import Senders
 from shiplog.profile import Profile
 from shiplog.voyages import (
     alignment,
+    clock_contradictions,
     comparison,
     fields_read,
     plausible_measures,
@@ -71,7 +72,7 @@ def build(reading: Reading, profile: Profile, sent: Mapping[str, Senders] | None
         rows=table.height,
         seconds=round(grid.seconds, 3),
         findings=(
-            *reading.health.findings,
+            *clock_contradictions.untold(reading.health.findings, aligned.left_out),
             *aligned.left_out,
             *comparison.beside(grid.findings, compared.findings),
             *compared.findings,

@@ -178,7 +178,9 @@ def ordered(
     own[1:] &= np.diff(time) > 0
     dropped = len(time) - int(own.sum()) - int(spread.again.sum())
     time, value = time[own], value[own]
-    period, step = stamp_steps.period_and_step(time)
+    period, step = stamp_steps.period_and_step(time, blank)
+    if step and stamp_steps.goes_on(time, value):
+        period, step = float(np.median(np.diff(time))) * 1e-9, 0.0
     period = period or 1.0 / RATE_HZ
     tolerance = tolerance_s or max(1.5 * period, LEAST_TOLERANCE_S, period + step)
     if tolerance_s is None:
@@ -246,8 +248,23 @@ def onto(times: np.ndarray, samples: Samples) -> OnGrid:
     spike = usable & (
         (samples.spike[left] & (share < 1.0)) | (samples.spike[right] & (share > 0.0))
     )
-    blank = ~usable & _near(times, samples.blank)
+    blank = ~usable & (_near(times, samples.blank) | _beside_blank(times, samples))
     return OnGrid(value, ~usable & ~blank, blank, spike)
+
+
+def _beside_blank(times: np.ndarray, samples: Samples) -> np.ndarray:
+    """Which grid times [m] lie between two messages no further apart than the tolerance, of which
+    one has no value: nothing was lost there, it was not measured."""
+    if len(samples.blank) == 0:
+        return np.zeros(len(times), bool)
+    came = np.concatenate((samples.time, samples.blank))
+    order = np.argsort(came, kind="stable")
+    none, came = order >= len(samples.time), came[order]
+    right = np.searchsorted(came, times, side="left").clip(1, len(came) - 1)
+    left = right - 1
+    inside = (came[left] <= times) & (times <= came[right])
+    close = (came[right] - came[left]) * 1e-9 <= samples.tolerance_s
+    return inside & close & (none[left] | none[right])
 
 
 def _held(times: np.ndarray, samples: Samples) -> OnGrid:

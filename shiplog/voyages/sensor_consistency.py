@@ -28,6 +28,7 @@ from shiplog import channels, frames
 from shiplog.channels import DEGREE, Quality
 from shiplog.logs.health_report import NotCompared
 from shiplog.profile import Profile
+from shiplog.voyages import velocity_filter
 from shiplog.voyages.fault_detection import stretches
 from shiplog.voyages.resampling import RATE_HZ
 from shiplog.voyages.robust_regression import (
@@ -279,13 +280,28 @@ def _of_velocity(motion: Motion, profile: Profile) -> Iterator[Estimate | NotCom
     if body:
         value, low, high = (v / DEGREE for v in found.interval(OFFSET))
         yield Estimate("heading_offset", "heading", value, low, high, 0.0, HEADING_DEG, "deg")
-    yield _scale("velocity_scale", "velocity", found.interval(SPEED_SCALE))
+    scale = _scale("velocity_scale", "velocity", found.interval(SPEED_SCALE))
+    if _filtered(scale, found, motion, profile):
+        yield _unfound("the velocity's scale", "a filter as late as it is takes as much of turns")
+    else:
+        yield scale
     if one_receiver(profile) or cancelling:
         return
     least = max(ANTENNA_M, ANTENNA_LENGTHS * length)
     for index, channel in ((AHEAD, "position ahead"), (STARBOARD, "position starboard")):
         value, low, high = found.interval(index)
         yield Estimate("antenna_offset", channel, value, low, high, 0.0, least, "m")
+
+
+def _filtered(scale: Estimate, found: RobustFit, motion: Motion, profile: Profile) -> bool:
+    """Whether a velocity shows too little as one does that a filter makes late."""
+    late = float(found.value[TAU_V] - (found.value[TAU_P] if _separable(profile) else 0.0))
+    if not scale.notable or late < CLOCK_S:
+        return False
+    body = _in_body_axes(profile)
+    velocity = _turned(motion.heading, motion.velocity) if body else motion.velocity
+    share = velocity_filter.takes(velocity, late, STEP_S)
+    return velocity_filter.explains(scale.value, 0.5 * (scale.high - scale.low), share)
 
 
 def one_receiver(profile: Profile) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 import polars as pl
 
 from shiplog.exceptions import LogUnreadable, listed
+from shiplog.logs.health_report import Finding
 from shiplog.logs.read import Reading
 from shiplog.profile import Profile, Source
 from shiplog.profile_channels import NEEDED
@@ -28,6 +29,8 @@ from shiplog.voyages.left_out import LeftOut
 GNSS = ("position", "velocity")
 SENSORS = (*GNSS, "heading", "yaw_rate", "wind")
 ALL = (*SENSORS, "actuator")
+# s: between a log's first message and its voyage's first row, and a message and the next
+START_S = 2.0
 FLAG = {0.0, 1.0}
 MOST_REASONS = 3  # that a sentence names
 
@@ -152,6 +155,26 @@ def heeded(reading: Reading, profile: Profile) -> tuple[Reading, list[LeftOut]]:
             raise _none_valid(channel, source, frame.height, why, reading.contents.path.name)
         refused.append(_left_out(channel, source, times, frame.height, why))
     return replace(reading, frames=frames), refused
+
+
+def untold(found: Sequence[Finding], told: Sequence[Finding], profile: Profile) -> list[Finding]:
+    """Findings of the grid without the blank stretches that the log's conversion told of, topic by
+    topic, as what the instrument itself calls no measurement."""
+    stretches: dict[str, list[tuple[float, float]]] = {}
+    for one in told:
+        if one.kind == "status" and one.start_s is not None and one.end_s is not None:
+            stretches.setdefault(one.channel, []).append((one.start_s, one.end_s))
+    topics = {getattr(source, "name", name): source.topic for name, source in sources(profile)}
+
+    def known(one: Finding) -> bool:
+        inside = stretches.get(topics.get(one.channel, ""), ())
+        if one.kind != "blank" or not inside:
+            return False
+        if one.start_s is None or one.end_s is None:
+            return True  # what is summed up
+        return any(a - START_S <= one.start_s and one.end_s <= b + START_S for a, b in inside)
+
+    return [one for one in found if not known(one)]
 
 
 def _rules(name: str, source: Source) -> list[Rule]:

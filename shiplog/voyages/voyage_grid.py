@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shiplog import channels, frames
+from shiplog import frames
 from shiplog.channels import Quality
 from shiplog.logs.health_report import Finding
 from shiplog.profile import Profile
@@ -25,6 +25,7 @@ STEP_S = resampling.STEP_NS * 1e-9
 JUMP_S = 3.0
 JUMP_LENGTHS = 0.1
 JUMP_RAD = math.radians(30.0)
+UNSEEN_S = 10.0  # a ship of any size holds its rate of turn for a part of that
 MOST_STEPS = 2.0  # in which an instrument counts: a difference that rounding alone makes
 
 
@@ -40,6 +41,7 @@ class VoyageGrid:
     columns: dict[str, np.ndarray] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
     marks: np.ndarray = field(init=False)
+    unknown: dict[str, np.ndarray] = field(default_factory=dict)  # of a source: rows [m] bool
 
     def __post_init__(self) -> None:
         self.marks = np.zeros(len(self.times), np.int32)
@@ -53,6 +55,7 @@ class VoyageGrid:
         """A source's values on the grid [m, k]; its gaps, blanks and spikes noted. Of one that is
         too slow throughout, `sampling_findings` says so once."""
         placed = resampling.onto(self.times, samples)
+        self.unknown[name] = placed.gap | placed.blank | placed.spike
         left_out = self.explained.get(name, self.times[:0])
         said = rows_explained(self.times, samples.time, left_out)
         self.marks[said & (placed.blank | placed.gap)] |= int(Quality.BLANK)
@@ -92,6 +95,8 @@ def mark_holds(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
             name, samples, sampled, grid.times, grid.columns, over_ground, profile
         )
         fault_detection.mark(grid.marks, rows, Quality.HELD)
+        for first, last in rows:
+            grid.unknown[name][first : last + 1] = True
         intervals = [fault_detection.seconds(i) for i in rows]
         lasted = [end - start for start, end in intervals]
         frozen = [i for i, s in zip(rows, lasted, strict=True) if s > fault_detection.FROZEN_S]
@@ -127,7 +132,8 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
 
     found = []
     scale = held_values.METRE if profile.sensors.kind("position") == "geodetic" else 1.0
-    steps = _jumps(grid, sampled["position"], position, over_ground, scale=scale)
+    of_position = ("position", "velocity", "heading")
+    steps = _jumps(grid, sampled, of_position, position, over_ground, scale=scale)
     for row, step in steps:
         lost = _worth(step, over_ground[row])
         if lost > JUMP_S and step > JUMP_LENGTHS * profile.ship.length_m:
@@ -136,7 +142,9 @@ def mark_jumps(grid: VoyageGrid, profile: Profile, sampled: dict[str, resampling
     if profile.sensors.yaw_rate is None:  # a derivative is not compared with what it is of
         turns, lasting = _steps(grid, sampled["heading"]), None
     else:
-        turns = _jumps(grid, sampled["heading"], heading[:, None], turning[:, None], 2.0 * math.pi)
+        of_heading = ("heading", "yaw_rate")
+        full = 2.0 * math.pi
+        turns = _jumps(grid, sampled, of_heading, heading[:, None], turning[:, None], full)
         lasting = turning
     for row, step in turns:
         if step > JUMP_RAD:
@@ -156,27 +164,50 @@ def _over_ground(grid: VoyageGrid) -> np.ndarray:
 
 def _jumps(
     grid: VoyageGrid,
-    samples: resampling.Samples,
+    sampled: Mapping[str, resampling.Samples],
+    sources: tuple[str, ...],
     gone: np.ndarray,
     rate: np.ndarray,
     period: float | None = None,
     scale: float = 1.0,
 ) -> list[tuple[int, float]]:
-    """Rows and sizes of the steps of one channel, whose values [m, k] and rates these are; but for
-    those that are a step in which the instrument counts there, of samples `scale` times as large.
-    An actuator beyond its limits says nothing of the motion.
+    """Rows and sizes of the steps of the first of some sources, whose values [m, k] and rates of
+    the others these are, in rows in which all of them were measured, whatever else was; but for
+    those that are a step in which the instrument counts there, of samples `scale` times as large,
+    and those that the ship can have gone while nobody measured.
     """
-    bad = (channels.UNUSABLE | Quality.HELD) & ~Quality.LIMITS
-    usable = (grid.marks & int(bad)) == 0
+    samples = sampled[sources[0]]
+    usable = ~np.logical_or.reduce([grid.unknown[name] for name in sources])
+    usable &= np.isfinite(gone).all(axis=1) & np.isfinite(rate).all(axis=1)
     every = max(round(samples.period_s / STEP_S), 1)
     if every > 1:
         usable &= samples.nearest_rows(grid.times)
     found = fault_detection.jumps(gone, rate, usable, samples.noise, every, period, lively=True)
+    found = _not_unseen(found, usable, rate)
     at = np.searchsorted(samples.time, grid.times[[row for row, _ in found]])
     counted = fault_detection.steps_around(samples.value, [(int(i), int(i)) for i in at])
     return [
         one for one, step in zip(found, counted * scale, strict=True) if one[1] > MOST_STEPS * step
     ]
+
+
+def _not_unseen(
+    found: list[tuple[int, float]], usable: np.ndarray, rate: np.ndarray
+) -> list[tuple[int, float]]:
+    """The steps without those that a ship can have gone since the last usable row [m]: over
+    UNSEEN_S its rate was interpolated, and it can have gone to any side as fast as it mostly does.
+    """
+    if not found:
+        return found
+    rows = np.flatnonzero(usable)
+    mostly = float(np.quantile(np.linalg.norm(rate[usable], axis=1), 0.95))
+    kept = []
+    for row, step in found:
+        before = rows[np.searchsorted(rows, row) - 1] if len(rows) and rows[0] < row else row
+        gap = (row - before) * STEP_S
+        if gap <= UNSEEN_S or step > 2.0 * gap * mostly:
+            kept.append((row, step))
+    return kept
 
 
 def _steps(grid: VoyageGrid, samples: resampling.Samples) -> list[tuple[int, float]]:

@@ -274,6 +274,25 @@ def test_ros1_names_with_capitals_are_read(tmp_path):
     assert frames["/odd"]["CamelCase_"].to_list() == list(range(20))
 
 
+@pytest.mark.parametrize(
+    ("text", "pack", "fields"),
+    [("float32 RPM\nbool EN\n", "<fB", {"RPM": 120.0, "EN": 1.0}),
+     ("geometry/XY Pos\n" + "=" * 80 + "\nMSG: geometry/XY\nfloat64 X\nfloat64 Y\n", "<dd",
+      {"Pos.X": 3.0, "Pos.Y": -4.0}),
+     ("int16[2] RudderAngle\nfloat64 COG\n", "<hhd", {"COG": 271.5})],
+    ids=["short", "nested", "beside a list"],
+)  # fmt: skip
+def test_ros1_capitals_of_own_types(tmp_path, text, pack, fields):
+    values = {"<fB": (120.0, 1), "<dd": (3.0, -4.0), "<hhd": (5, -5, 271.5)}[pack]
+    data = [struct.pack(pack, *values)] * 5
+    frames, lost = logged(ros1(tmp_path / "own.bag", {"/own": ("usv/msg/Own", text, data)}),
+                          tmp_path / "out")  # fmt: skip
+    assert not lost
+    assert {name: frames["/own"][name].to_list() for name in fields} == {
+        name: [value] * 5 for name, value in fields.items()
+    }
+
+
 def test_ros1_letters_beyond_ascii_cost_nothing(tmp_path):
     texts = [b"M\xfcritz", b"plain", b"\xff\xfe"]
     data = [struct.pack("<I", len(t)) + t + struct.pack("<d", i) for i, t in enumerate(texts)]

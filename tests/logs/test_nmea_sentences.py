@@ -81,6 +81,20 @@ def test_a_minus_before_a_western_longitude_says_west_once():
     assert math.isnan(east_positive("3.2", ""))
 
 
+@pytest.mark.parametrize(
+    ("line", "kind"),
+    [("$GNRMC,101010,A,-3745.6000,S,-12227.0000,W,0.1,0.0,230324,,,A", "rmc"),
+     ("$GNGGA,101010,-3745.6000,S,-12227.0000,W,4,12,0.7,3.0,M,,M,,", "gga"),
+     ("$GPGLL,-3745.6000,S,-12227.0000,W,101010,A", "gll"),
+     ("$GNGNS,101010,-3745.6000,S,-12227.0000,W,AA,12,0.7,3.0,,,", "gns")],
+)  # fmt: skip
+def test_a_minus_and_a_letter_are_one_sign_in_every_sentence(line, kind):
+    found = facts(line)
+    (place,) = [value for name, value in found.items() if name in (kind, "fix")]
+    numbers = [n for n in np.ravel(np.array(place[0], float))][:2]
+    assert numbers == pytest.approx([-37.76, -122.45])
+
+
 NOT_MEASURED = {
     "$GPGGA,123519,4807.038,N,01131.000,E,0,00,,,M,,M,,": ("gga", "no fix"),
     "$GPGGA,123519,4807.038,N,01131.000,E,6,00,,,M,,M,,": ("gga", "dead reckoning"),

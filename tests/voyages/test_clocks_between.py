@@ -260,3 +260,21 @@ def test_a_sound_voyage_has_nothing_to_be_said_of_its_clocks(voyage, hz, jitter,
     done = voyage(parts)
     assert not [f for f in done.report.findings if f.kind in CLOCKS]
     assert (done.report.usable_s or 0) > (90 if jitter < 0.3 or hz > 2 else 60)
+
+
+@pytest.mark.parametrize("each", [7, 20, 50])
+@pytest.mark.parametrize("hz", [1.0, 5.0])
+def test_messages_that_are_lost_evenly_are_told_from_coarse_stamps_by_the_motion(each, hz):
+    """Every so many seconds a sentence is cut; or UTC counts in steps of the median period. The
+    stamps are the same; what the ship does in the long step is not."""
+    count = 1500
+    exact = np.arange(count) / hz
+    kept = np.arange(count) % each != each // 2
+    time = np.rint(exact[kept] * 1e9).astype(np.int64)
+    lost = resampling.ordered(time, np.sin(exact[kept] * 0.05)[:, None], None)
+    assert (lost.step_s, lost.period_s) == (0.0, pytest.approx(1 / hz))
+    even = np.arange(len(time)) * np.ptp(time) * 1e-9 / (len(time) - 1)
+    coarse = resampling.ordered(time, np.sin(even * 0.05)[:, None], None)
+    assert coarse.step_s == pytest.approx(1 / hz)
+    still = resampling.ordered(time, np.zeros((len(time), 1)), None)
+    assert still.step_s == pytest.approx(1 / hz)

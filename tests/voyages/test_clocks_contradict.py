@@ -241,3 +241,10 @@ def test_a_delay_that_comes_and_goes_moves_no_stamp(voyage, clean, most):
     done = voyage(parts)
     assert done.table.equals(clean.table)
     assert not [f for f in done.report.findings if "held against" in f.sentence]
+
+
+@pytest.mark.parametrize("seconds", [18.0, 37.0, -120.0])
+def test_one_difference_of_clocks_is_one_finding(voyage, seconds):
+    """The reader of the log sees it, too, and cannot say what ingest made of it."""
+    done = voyage(moved(seconds, GNSS))
+    assert len([f for f in done.report.findings if f.unit == "s" and f.value]) == 1

@@ -294,13 +294,19 @@ def test_polarity_and_neutral_pulse_are_what_the_data_say(tmp_path, gain, stated
     assert "CHECK: the neutral pulse" in left
 
 
-def test_the_number_of_an_output_and_what_never_moves_are_no_thrusters(tmp_path):
-    _, profile, text = drafted(tmp_path, **{
-        "SERVO_OUTPUT_RAW.port": np.ones(len(T)), "thruster_bow": np.zeros(len(T)),
-        "rudder": np.sin(T), "rpm": np.full(len(T), 90.0)})  # fmt: skip
+@pytest.mark.parametrize(
+    "dead",
+    [{"SERVO_OUTPUT_RAW.port": np.ones(len(T)), "thruster_bow": np.zeros(len(T))},
+     {"thruster_port": np.zeros(len(T)), "thruster_starboard": np.zeros(len(T))},
+     {"motor_3": np.full(len(T), -1.0)}],
+    ids=["an output's number", "two that stand at 0", "one that is off"],
+)  # fmt: skip
+def test_the_number_of_an_output_and_what_never_moves_are_no_thrusters(tmp_path, dead):
+    driven = {"rudder": np.sin(T), "rpm": np.full(len(T), 90.0)}
+    _, profile, text = drafted(tmp_path, **dead, **driven)
     assert {a.name for a in profile.actuators} == {"rudder", "rpm"}
     named = next(line for line in text.splitlines() if "called like an actuator" in line)
-    assert "CHECK" in named and "SERVO_OUTPUT_RAW.port" in named and "thruster_bow" in named
+    assert "CHECK" in named and all(name in named for name in dead)
 
 
 @pytest.mark.parametrize("names", [("rud_p", "rud_s"), ("rud_port", "rud_stbd"), ("RudP", "RudS")])
@@ -352,14 +358,22 @@ def test_tables_of_no_clock_are_one_sentence_and_no_empty_draft(tmp_path):
     assert "30 tables" in refused.value.message
 
 
-def test_two_receivers_in_one_table_are_said(tmp_path):
+@pytest.mark.parametrize(
+    ("north", "east", "after"), [(12.0, 0.0, 0.003), (0.0, 7.0, 0.25), (-4.0, 3.0, 0.1)]
+)
+def test_two_receivers_in_one_table_are_said(tmp_path, north, east, after):
     frame = table()
-    other = frame.with_columns(pl.col("lat") + 12.0 / METRE, pl.col("time") + 0.003)
+    other = frame.with_columns(
+        pl.col("lat") + north / METRE,
+        pl.col("lon") + east / METRE / math.cos(math.radians(54.0)),
+        pl.col("time") + after,
+    )
     both = pl.concat((frame, other)).sort("time")
     both.write_csv(tmp_path / "t.csv")
     text = draft_table(tmp_path / "t.csv")
     line = next(one for one in text.splitlines() if 'channel = "time"' in one)
-    assert "CHECK" in line and "two receivers" in line and "12 m" in line
+    apart = f"{math.hypot(north, east):.3g} m"
+    assert "CHECK" in line and "two receivers" in line and apart in line
     assert "333 Hz" not in text
 
 

@@ -355,3 +355,39 @@ def test_a_name_with_quotation_marks_or_a_line_end_is_drafted_as_it_is(tmp_path)
     vessels.write_parquet(tmp_path / "fleet.parquet")
     profile = profiles.parse(draft_table(tmp_path / "fleet.parquet", 'the "B"'), "draft")
     assert (profile.ship.name, profile.table["vessel"].only) == ('the "B"', 'the "B"')
+
+
+def at_sea(count=400):
+    """Two knots and more on a turning course: latitude, longitude in deg, speed in knots."""
+    second = np.arange(count)
+    course = np.radians(60.0 + 40.0 * np.sin(second / 40.0))
+    knots = 4.0 + 1.5 * np.sin(second / 55.0)
+    north, east = (np.cumsum(knots * 1852 / 3600 * g(course)) for g in (np.cos, np.sin))
+    lat, lon = 59.0 + north / 111_320.0, 20.0 + east / (111_320.0 * np.cos(np.radians(59.0)))
+    return second, lat, lon, knots, np.degrees(course)
+
+
+def minutes(degrees, letter, width):
+    return [f"{int(d):0{width}d}{d % 1 * 60:07.4f}{letter}" for d in degrees]
+
+
+@pytest.mark.parametrize("form", ["day or month", "am and pm", "letters", "letters apart"])
+@pytest.mark.parametrize(("unit", "factor"), [("kn", 1.0), ("m/s", 1852 / 3600), ("km/h", 1.852)])
+def test_a_speed_is_in_the_unit_of_the_way_whatever_is_still_asked(tmp_path, form, unit, factor):
+    """That a date may have the day first, or that a place has letters, hides no motion."""
+    second, lat, lon, knots, course = at_sea()
+    clock = [f"{10 + s // 3600:02d}:{s // 60 % 60:02d}:{s % 60:02d}" for s in second]
+    place = {"Lat": lat.round(7), "Lon": lon.round(7)}
+    when = {"Time": [f"05/06/2021 {one}" for one in clock]}
+    if form == "am and pm":
+        when = {"Time": [f"05/06/2021 {one} am" for one in clock]}
+    elif form == "letters":
+        place = {"Lat": minutes(lat, "N", 2), "Lon": minutes(lon, "E", 3)}
+        when = {"Date": ["05/06/21"] * len(clock), "Time": clock}
+    elif form == "letters apart":
+        place = {"Lat": [f"N {d:.7f}" for d in lat], "Lon": [f"E {d:.7f}" for d in lon]}
+    columns = {**when, **place, "SOG": (knots * factor).round(3), "COG": course.round(2)}
+    pl.DataFrame(columns).write_csv(tmp_path / "t.csv")
+    text = draft_table(tmp_path / "t.csv")
+    (line,) = [one for one in text.splitlines() if one.startswith('"SOG"')]
+    assert f'unit = "{unit}"' in line and "fits how fast the position changes" in line

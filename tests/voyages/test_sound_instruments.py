@@ -327,3 +327,26 @@ def test_numbers_of_a_few_digits_are_not_held(tmp_path, digits):
     other.mkdir()
     found = [f for f in stored(other, parts, text).report.findings if f.kind == "held"]
     assert any(f.channel == "heading" and f.start_s == pytest.approx(200.0, abs=3) for f in found)
+
+
+@pytest.mark.parametrize(
+    ("hz", "rows", "size"),
+    [(10.0, (1200,), 90.0), (1.0, (120, 250), -60.0), (5.0, (600, 601), 45.0)],
+    ids=["10 Hz", "1 Hz, twice", "5 Hz, two samples"],
+)  # fmt: skip
+def test_beside_a_spike_the_heading_is_differentiated_over_it(tmp_path, hz, rows, size):
+    """Of a heading without a gyro: the rate in rows that bear no mark is the ship's."""
+    kind = Instruments(hz=hz, fix=(0.0, 0.0), sog=(0.0, 0.0), cog=(0.0, 0.0), compass=(0.0, 0.0),
+                       gyro=None)  # fmt: skip
+    parts, text = record(kind)
+    heading = parts["/compass"].columns["heading"].copy()
+    heading[list(rows)] = (heading[list(rows)] + size) % 360.0
+    parts["/compass"] = replace(parts["/compass"], columns={"heading": heading})
+    voyage = stored(tmp_path, parts, text)
+    times = voyage.table["time"].to_physical().to_numpy()
+    rate = truth((times - sailing.START) * 1e-9)["rate"]
+    off = np.abs(np.degrees(voyage.table["yaw_rate"].to_numpy()) - rate)[usable(voyage)]
+    assert [f.kind for f in voyage.report.findings if f.kind in FALSE] == ["spike"] * len(
+        {row // 2 for row in rows}
+    )
+    assert off.max() < 0.2  # deg/s, of 2.8; beside the spike it was hundreds

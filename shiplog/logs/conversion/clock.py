@@ -32,6 +32,14 @@ SAME_STEP = 1.5  # times the median: a row after the next minute's beginning is 
 WIDTHS = {"%Y": 4, "%j": 3}  # digits of a form's parts; all others have two
 
 
+class DateOpen(ProfileError):
+    """A date can be read with the day or with the month first."""
+
+    def __init__(self, problem: str, hint: str, either: pl.Series) -> None:
+        super().__init__(problem, hint=hint)
+        self.either = either  # ns in one of the two ways: within a day they differ by a constant
+
+
 def instants(values: pl.Series, unit: str | None = None, form: str | None = None) -> pl.Series:
     """Times [Int64, ns], null where there is none, or a word among numbers.
 
@@ -312,11 +320,12 @@ def _best(texts: pl.Series, forms, kind, written: pl.Series | None = None) -> pl
         raise _no_form(quoted)
     sample = next(iter(quoted.drop_nulls()), "")
     if len(read) > 1 and read[0][0] == read[1][0] and not read[0][2].equals(read[1][2]):
-        raise ProfileError(
+        raise DateOpen(
             f"The times of column {texts.name!r}, such as {sample!r}, can be read with the "
             f"{_leads(read[0][1])} or with the {_leads(read[1][1])} first.",
             hint="say which in [table]: format = "
             f"{_as_written(read[0][1], sample)!r} or {_as_written(read[1][1], sample)!r}.",
+            either=read[0][2],
         )
     return read[0][2].rename(texts.name)
 

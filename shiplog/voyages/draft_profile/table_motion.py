@@ -10,7 +10,7 @@ import polars as pl
 
 from shiplog import units
 from shiplog.exceptions import ShiplogError
-from shiplog.logs.conversion import clock
+from shiplog.logs.conversion import cells, clock
 from shiplog.voyages.draft_profile.column_names import UNIT_UNSTATED, FoundColumn, with_doubts
 from shiplog.voyages.draft_profile.motion import Motion
 
@@ -27,9 +27,12 @@ def seconds_of(labels: list[FoundColumn], rows: pl.DataFrame) -> np.ndarray | No
     if label is None:
         return None
     try:
-        time = clock.instants(rows[label.column], label.unit).cast(pl.Float64).to_numpy() * 1e-9
+        instants = clock.instants(rows[label.column], label.unit)
+    except clock.DateOpen as which:
+        instants = which.either  # how fast a ship goes does not depend on its date
     except ShiplogError:
         return None
+    time = instants.cast(pl.Float64).to_numpy() * 1e-9
     if not np.isfinite(time).all() or len(time) < 2:
         return None
     steps = np.diff(time)
@@ -40,6 +43,9 @@ def values_of(one: FoundColumn, rows: pl.DataFrame) -> np.ndarray:
     """A column in SI [n], a coordinate in deg; NaN where it holds no number."""
     column = rows[one.column]
     number = clock.number_of(column) if column.dtype == pl.String else column
+    if one.channel in cells.HEMISPHERES and column.dtype == pl.String:
+        letters, farthest = cells.HEMISPHERES[one.channel], cells.FARTHEST_DEG[one.channel]
+        number = number.fill_null(cells.coordinates(column, letters, farthest))
     raw = number.cast(pl.Float64, strict=False).fill_null(math.nan).to_numpy()
     factor = 1.0 if one.channel in ("latitude", "longitude") else units.factor(one.unit or "1")
     return (raw - one.offset) * one.sign * factor
