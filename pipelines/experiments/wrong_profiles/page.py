@@ -39,7 +39,8 @@ INGESTED = """
 
 {seen}
 
-The undetermined ones:
+The undetermined ones. A wind is determined less sharply than the others: its copy is a wind whose
+gusts go with the ship's motion, up to 1.4 times as gusty as the first (at 0.15 m/s in 2 m/s).
 
 {left}
 """
@@ -48,7 +49,8 @@ DIAGNOSED = """
 
 Season 3 is read through the wrong profile and judged by a model of the right one, identified from
 voyages 1 to 4. `refused` is exit 1: voyages and model have two profiles of one ship that differ in
-a size, a place or a lever arm.
+a size, a place or a lever arm. Where the voyages read a field with another unit, sign, zero or
+order than those of the model, a note of the verdict says so.
 
 {verdicts}
 """
