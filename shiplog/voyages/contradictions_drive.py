@@ -155,7 +155,8 @@ def _bow(t: Track, e: Evidence, found: Sequence[Driven]) -> Finding | None:
         return None
     if abs(way.angle) > 180.0 - ALONG_DEG:
         return _reversed(t, way, found)
-    if BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1] and way.spread > SPREAD:
+    turns = way.spread > SPREAD or (way.sense and _fast(e))
+    if BEAM_DEG[0] < abs(way.angle) < BEAM_DEG[1] and turns:
         return _abeam(t, way)
     return None
 
@@ -166,10 +167,8 @@ def _nowhere(t: Track, e: Evidence) -> Finding | None:
     parts = [part[0] for part in actuators.thrust(t).values()]
     if e.moved is None or not parts or actuators.can_push_sideways(t):
         return None
-    speed = float(np.median(np.abs(e.moved.by_velocity))) / e.moved.windows.seconds
-    fast = speed > FAST_FROUDE * math.sqrt(GRAVITY * t.profile.ship.length_m)
     together = e.joined is not None and e.joined.left.get("as it is", 1.0) < JOINED
-    if not (fast and together and min(e.apart, default=0.0) > APART_WAY):
+    if not (_fast(e) and together and min(e.apart, default=0.0) > APART_WAY):
         return None
     if _driven_share(t, parts) < MOSTLY or len(e.moved.by_velocity) < FEWEST_WINDOWS:
         return None
@@ -179,13 +178,24 @@ def _nowhere(t: Track, e: Evidence) -> Finding | None:
     if angle_heading(t.profile) and declared(t.profile, "heading") == "rad":
         reason, line = "unit", unit_line(t.profile, "heading", "deg")
         lines = f"Change: {line}, if degrees are read as radians."
-    left = min(e.apart)
+    left, speed = min(e.apart), _speed(e)
     sentence = (
         f"The heading has nothing in common with the way over ground of a ship that {_names(t)} "
         f"drives ahead at {speed:.2g} m/s: it leaves {100 * left:.0f} % of the way unexplained, "
         f"and position and velocity agree. {lines}"
     )
     return of_voyage(t, "heading", (left, None, None), "1", reason, sentence)
+
+
+def _speed(e: Evidence) -> float:
+    """Of the windows under way, m/s."""
+    if e.moved is None:
+        return 0.0
+    return float(np.median(np.abs(e.moved.by_velocity))) / e.moved.windows.seconds
+
+
+def _fast(e: Evidence) -> bool:
+    return _speed(e) > FAST_FROUDE * math.sqrt(GRAVITY * e.profile.ship.length_m)
 
 
 def _driven_share(t: Track, forces: list[np.ndarray]) -> float:

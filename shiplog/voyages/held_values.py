@@ -94,7 +94,8 @@ def held(
         bias = _bias(samples, turning)
     sure = moving if samples.resolution == 0.0 else []  # no value of so many digits comes twice
     unsure = [run for run in runs if run not in sure]
-    shown = kept(unsure, off, 3.0 * other.noise + other.resolution, bias)
+    by_noise = 2.0 * other.noise * math.sqrt(math.log(max(len(samples.time), 1) / ACCIDENT))
+    shown = kept(unsure, off, by_noise + other.resolution, bias)
     return sorted(kept(sure, None, 0.0) + shown)
 
 

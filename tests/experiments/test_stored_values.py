@@ -54,9 +54,11 @@ FOUND = {
     7067: "latitude and longitude exchanged, far from the profile's datum",
     7218: "degrees read as radians of a fast boat at 2 Hz are no heading at all",
     7219: "a heading frozen for 200 s, and the way swings by 20 deg",
+    9514: "a heading that is 90 deg off, of a ship whose course bends by a few tens of degrees",
     5033: "sound: a noisy heading in 0.1 deg comes to the same number twice",
     7070: "sound: the same without a gyro, beside a noisy position",
     5049: "sound: a delay of 4 s explained the noise of a second, and no way of a minute",
+    9745: "sound: a velocity in steps of 0.05 m/s at anchor",
     7096: "sound: the same of a position at 1 Hz",
 }
 
