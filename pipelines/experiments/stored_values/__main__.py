@@ -2,7 +2,8 @@
 
     python -m pipelines.experiments.stored_values --voyages 1000 --jobs 2 --out OUT
 
-OUT/outcomes.jsonl has a line a voyage; a run that was stopped goes on. `--one SEED` prints one.
+OUT/outcomes.jsonl has a line a voyage; a run that was stopped goes on. `--one SEED` prints one,
+`--markdown docs/stored_values.md` writes the page.
 """
 
 from __future__ import annotations
@@ -16,6 +17,23 @@ from pathlib import Path
 from pipelines.experiments.stored_values.judge import Outcome, outcome_of
 from pipelines.experiments.stored_values.page import page
 
+TITLE = """# Stored values: right, or a finding that says so
+
+    {command}
+
+A ship is sailed by a closed form, seen by instruments, written by a recorder and read as a user
+would: `convert` where it is no MCAP, then `ingest`. The truth has its own dynamics, geodesy and
+writers, and shares no code with shiplog. Nine kinds of ships under way (a VLCC at dead slow, a
+ferry stern first, an azimuth ship sideways, a planing USV) and two at rest; fine, usual and coarse
+instruments at 1 to 50 Hz; MCAP, CSV, Parquet, NMEA 0183, a folder of tables, a ROS 2 bag.
+
+In two voyages of three one thing is changed: a unit, sign, frame, clock, order or value. The voyage
+is right where no more than 1 % of its usable rows are beyond six standard deviations of the
+instrument, and named where a finding, or the refusal, has the changed thing. Sound voyages are to
+have no finding at all. Intervals are of 90 % (Clopper and Pearson, 1934).
+
+"""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -24,6 +42,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("stored_values"))
     parser.add_argument("--one", type=int, help="print what becomes of the voyage of this seed")
+    parser.add_argument("--markdown", type=Path, metavar="PATH", help="write the page there")
     given = parser.parse_args()
     if given.one is not None:
         for key, value in asdict(outcome_of(given.one)).items():
@@ -42,6 +61,12 @@ def main() -> None:
     chosen = [done[s] for s in range(given.seed, given.seed + given.voyages)]
     text = page(chosen)
     (given.out / "page.md").write_text(text, encoding="utf-8")
+    if given.markdown is not None:
+        command = (
+            f"python -m pipelines.experiments.stored_values --voyages {given.voyages} "
+            f"--seed {given.seed} --markdown docs/stored_values.md"
+        )
+        given.markdown.write_text(f"{TITLE.format(command=command)}{text}", encoding="utf-8")
     print(text)
 
 
