@@ -54,8 +54,8 @@ POINTS_KEPT = 4  # most derivatives of a point change one side of an equation, o
 # practical sizes: less is no fault of an instrument that anyone would correct
 CLOCK_S, HEADING_DEG, BIAS_DEGPS, SCALE = 0.05, 0.3, 0.02, 0.005
 ANTENNA_M, ANTENNA_LENGTHS = 0.03, 0.01
-# Over which the two sides are compared with and without a delay, s. A gyro drifts in two minutes.
-RATE_SLOW_S, WAY_SLOW_S = (32,), (32, 128)
+# Over which the two sides are compared with and without a delay, s. A gyro drifts in half a minute.
+RATE_SLOW_S, WAY_SLOW_S = (8,), (32, 128)
 CANCEL, TOGETHER = 0.3, 0.9  # a delay and an antenna that undo each other: share left, correlation
 
 TAU_R, RATE_SCALE, RATE_BIAS = range(3)

@@ -13,6 +13,9 @@ from shiplog.voyages.resampling import RATE_HZ
 
 STEP_S = 1.0 / RATE_HZ
 SURE_HALF_INTERVALS = 2.0  # half intervals that a value must be from zero, to be reported
+# The same of position against velocity: a receiver's error wanders for a minute and longer, which
+# no block of the fit holds, and a slow ship's changes of velocity are as slow.
+SURE_OF_TWO = 3.0
 CERTAIN = 4.0  # the same, to be corrected with --correct
 MOST_SCALE = 0.9  # of a scale beyond 1: the search's limit
 DELAY_SHARE = 0.8  # of the largest delay: what ends beyond it was not found
@@ -42,7 +45,8 @@ class Estimate:
     @property
     def notable(self) -> bool:
         """Well off none, and large enough to matter."""
-        return self._off > self.least and self._off > SURE_HALF_INTERVALS * self._half
+        sure = SURE_OF_TWO if self.rival else SURE_HALF_INTERVALS
+        return self._off > self.least and self._off > sure * self._half
 
     @property
     def certain(self) -> bool:
