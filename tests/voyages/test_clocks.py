@@ -76,9 +76,15 @@ def test_stamps_that_cannot_be_are_moved_onto_the_recorders_clock(voyage, by, da
     assert moved.value == pytest.approx(by * 1e-9, abs=1e-3)
 
 
-@pytest.mark.parametrize("recorder", [0, IN_1970, IN_2015], ids=["right", "1970", "2015"])
-@pytest.mark.parametrize("by", [IN_1970, IN_2015, IN_2123], ids=["1970", "2015", "2123"])
-@pytest.mark.parametrize("topics", [("/gyro",), ("/position", "/velocity")], ids=["gyro", "gnss"])
+GYRO, GNSS = ("/gyro",), ("/position", "/velocity")
+
+
+@pytest.mark.parametrize(
+    ("topics", "by", "recorder"),
+    [(GYRO, IN_1970, 0), (GNSS, IN_1970, IN_2015), (GYRO, IN_2015, IN_1970), (GNSS, IN_2015, 0),
+     (GYRO, IN_2123, IN_2015), (GNSS, IN_2123, IN_1970), (GNSS, IN_1970, IN_1970),
+     (GYRO, IN_2015, IN_2015)],
+)  # fmt: skip
 def test_one_clock_of_several_is_moved_onto_the_one_that_can_be_right(voyage, topics, by, recorder):
     clean = voyage(sailing.series())
     done = voyage(stamped(by, topics, recorder))
