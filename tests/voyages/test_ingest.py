@@ -343,6 +343,13 @@ def test_a_profile_that_cannot_be_is_refused_with_advice(old, new, expected):
 DAY = 86_400_000_000_000
 
 
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    """The circle as it is, ingested; nobody changes it."""
+    folder = tmp_path_factory.mktemp("clean")
+    return ingest(sailing.write(folder / "turn.mcap", sailing.series()), sailing.profile())
+
+
 def restamped(parts, topic, rows, by):
     """Stamps moved by so many ns; the recorder's clock tells the truth."""
     one = parts[topic]
@@ -361,10 +368,8 @@ def restamped(parts, topic, rows, by):
     ids=["ten days late", "ten days early", "1970", "1970, an order", "week rollover", "an hour",
          "two minutes", "starts in 1970", "GNSS starts in 1970", "an order starts in 1970"],
 )  # fmt: skip
-def test_a_stamp_that_cannot_belong_is_left_out_and_reported(voyage, topic, rows, by):
-    parts = sailing.series()
-    clean = voyage(parts)
-    done = voyage(restamped(parts, topic, rows, by))
+def test_a_stamp_that_cannot_belong_is_left_out_and_reported(voyage, clean, topic, rows, by):
+    done = voyage(restamped(sailing.series(), topic, rows, by))
     assert done.table.height <= clean.table.height
     both = done.table.join(clean.table, on="time", suffix="_clean")
     assert both.height == done.table.height  # no row at any other time
