@@ -61,6 +61,28 @@ def shared_data() -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def trained_here():
+    """Networks are trained in this process, task by task: to start another one and to load torch
+    there takes longer than a short training. The queue of processes has tests of its own."""
+    from pipelines import train_networks
+    from shiplog.exceptions import ShiplogError
+    from shiplog.training.queue import Event
+
+    def work(tasks, workers=None):
+        for task in tasks:
+            yield Event(task, 0.0)
+            try:
+                result = task.function(*task.arguments, report=lambda share: None)
+                yield Event(task, 1.0, True, result)
+            except ShiplogError as error:
+                yield Event(task, 0.0, True, failure=str(error))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train_networks, "work", work)
+        yield
+
+
 @pytest.fixture(scope="session")
 def no_viewer():
     """Skip, or fail where CI has installed what the headless viewer needs."""

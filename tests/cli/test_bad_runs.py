@@ -19,6 +19,7 @@ from safetensors.numpy import load_file, save_file
 from pipelines.experiments import simulated_ship
 from shiplog import cli, files
 
+pytestmark = pytest.mark.usefixtures("trained_here")
 HULL = ("--model", "mmg", "--no-fit", "--without", "propeller", "--without", "rudder")
 
 

@@ -38,7 +38,7 @@ def store(logs, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def run(store):
+def run(store, trained_here):
     out = store.parent / "run"
     code, reported, _ = call("train", "--store", store, "--out", out, "--seeds", 2, *FAST)
     assert code == 0 and "Split by" in reported

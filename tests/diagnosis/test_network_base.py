@@ -25,6 +25,7 @@ from shiplog.training.run_config import Config, Fast, NetworkSettings
 from shiplog.voyages.split_settings import Split
 from shiplog.voyages.store import Store
 
+pytestmark = pytest.mark.usefixtures("trained_here")
 SEED = 7101
 
 

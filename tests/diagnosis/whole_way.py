@@ -51,10 +51,10 @@ def log(case: cases.Case, leg: cases.Leg, folder):
     return path
 
 
-def judged(campaign, observed, sets=5):
+def judged(campaign, observed, sets=2):
     """A trial of a record, and the decision before anything was held out.
 
-    sets  that are searched: here one cause acts at most, and what is behind is tested elsewhere
+    sets  of causes that are searched: here one cause acts at most, found when each is tried alone
     """
     trial, point = evidence.begin(Trial.of(campaign, observed), {})
     with pytest.MonkeyPatch.context() as patch:

@@ -15,6 +15,7 @@ from shiplog.paths import sample_logs
 from shiplog.training.run_config import Fast
 from shiplog.voyages.store import Store
 
+pytestmark = pytest.mark.usefixtures("trained_here")
 VOYAGES = [f"voyage_{i}" for i in range(1, 7)]
 
 

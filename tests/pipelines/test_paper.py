@@ -227,11 +227,14 @@ def test_the_first_half_is_half_of_what_can_be_used():
     assert _halved("a[600:3600]", elapsed) == "a[600:3100]"
 
 
-def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path, undrawn):
-    """Its parts train, validate and test; the reference set is half of the training part."""
+def test_one_long_voyage_is_an_experiment_of_its_own(tmp_path, monkeypatch, undrawn):
+    """Its parts train, validate and test; the reference set is half of the training part. Trained
+    here and not in a pool of processes, which need longer to start."""
+    monkeypatch.setattr(gpu, "find", lambda: torch.device("cpu"))
     store = sailing.store_of(tmp_path, ["a"], seconds=300.0)
     code, _, output = call("paper", "--store", store.path, "--out", tmp_path / "out", *FEW,
-                         "--data", "ref", "--data", "d-ref")  # fmt: skip
+                           "--data", "ref", "--data", "d-ref", "--recipe", "paper",
+                           "--device", "cuda")  # fmt: skip
     assert code == 0, output
     losses = pl.read_parquet(tmp_path / "out" / "tables" / "test_losses.parquet")
     assert losses.select("set", "seed").rows() == [

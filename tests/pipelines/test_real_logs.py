@@ -11,7 +11,7 @@ from shiplog.voyages import one_hertz
 from shiplog.voyages.split import plan
 from shiplog.voyages.store import Store
 
-pytestmark = pytest.mark.shared
+pytestmark = [pytest.mark.shared, pytest.mark.usefixtures("trained_here")]
 TWIN = "turn_cut_14-Sep-2020_15_58_08"  # the first 287 s of turn_14-Sep-2020_15_58_08
 
 

@@ -37,6 +37,13 @@ def voyage(tmp_path):
     return build
 
 
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    """The circle on one clock, ingested; nobody changes it."""
+    folder = tmp_path_factory.mktemp("clean")
+    return ingest(sailing.write(folder / "turn.mcap", sailing.series()), sailing.profile())
+
+
 def offsets(report):
     return [f for f in report.findings if f.kind == "clock_offset"]
 
@@ -53,8 +60,7 @@ def assert_same(table, clean, moved_s=0.0):
 
 
 @pytest.mark.parametrize("by", [IN_1970, IN_2123], ids=["1970", "2123"])
-def test_where_no_clock_can_be_right_the_voyage_is_as_measured_without_a_date(voyage, by):
-    clean = voyage(sailing.series())
+def test_where_no_clock_can_be_right_the_voyage_is_as_measured_without_a_date(voyage, clean, by):
     done = voyage(stamped(by, recorder=by))
     assert_same(done.table, clean.table, by * 1e-9)
     (finding,) = offsets(done.report)
@@ -65,8 +71,7 @@ def test_where_no_clock_can_be_right_the_voyage_is_as_measured_without_a_date(vo
 @pytest.mark.parametrize(
     ("by", "day"), [(IN_1970, "1970-01-01"), (IN_2123, "2123-11-15")], ids=["1970", "2123"]
 )
-def test_stamps_that_cannot_be_are_moved_onto_the_recorders_clock(voyage, by, day):
-    clean = voyage(sailing.series())
+def test_stamps_that_cannot_be_are_moved_onto_the_recorders_clock(voyage, clean, by, day):
     done = voyage(stamped(by))
     assert_same(done.table, clean.table)
     *told, moved = offsets(done.report)
@@ -76,11 +81,18 @@ def test_stamps_that_cannot_be_are_moved_onto_the_recorders_clock(voyage, by, da
     assert moved.value == pytest.approx(by * 1e-9, abs=1e-3)
 
 
-@pytest.mark.parametrize("recorder", [0, IN_1970, IN_2015], ids=["right", "1970", "2015"])
-@pytest.mark.parametrize("by", [IN_1970, IN_2015, IN_2123], ids=["1970", "2015", "2123"])
-@pytest.mark.parametrize("topics", [("/gyro",), ("/position", "/velocity")], ids=["gyro", "gnss"])
-def test_one_clock_of_several_is_moved_onto_the_one_that_can_be_right(voyage, topics, by, recorder):
-    clean = voyage(sailing.series())
+GYRO, GNSS = ("/gyro",), ("/position", "/velocity")
+
+
+@pytest.mark.parametrize(
+    ("topics", "by", "recorder"),
+    [(GYRO, IN_1970, 0), (GNSS, IN_1970, IN_2015), (GYRO, IN_2015, IN_1970), (GNSS, IN_2015, 0),
+     (GYRO, IN_2123, IN_2015), (GNSS, IN_2123, IN_1970), (GNSS, IN_1970, IN_1970),
+     (GYRO, IN_2015, IN_2015)],
+)  # fmt: skip
+def test_one_clock_of_several_is_moved_onto_the_one_that_can_be_right(
+    voyage, clean, topics, by, recorder
+):
     done = voyage(stamped(by, topics, recorder))
     assert_same(done.table, clean.table)
     (moved,) = [f for f in offsets(done.report) if "They were moved" in f.sentence]
@@ -88,8 +100,7 @@ def test_one_clock_of_several_is_moved_onto_the_one_that_can_be_right(voyage, to
     assert moved.channel == ("/gyro" if topics == ("/gyro",) else "log")
 
 
-def test_a_recorder_that_was_not_set_is_reported_and_changes_nothing(voyage, tmp_path):
-    clean = voyage(sailing.series())
+def test_a_recorder_that_was_not_set_is_reported_and_changes_nothing(voyage, clean, tmp_path):
     done = voyage(stamped(0, recorder=IN_1970))
     assert_same(done.table, clean.table)
     (finding,) = offsets(check(tmp_path / "turn.mcap"))
@@ -105,9 +116,8 @@ def test_a_clock_within_a_day_of_the_others_is_left_to_what_the_sensors_say(voya
     assert [f for f in offsets(done.report) if "moved" in f.sentence] == []
 
 
-def test_simulated_time_keeps_its_pace(voyage):
+def test_simulated_time_keeps_its_pace(voyage, clean):
     """Stamps that count from 0, twice as fast as the clock of the computer that recorded them."""
-    clean = voyage(sailing.series())
     parts = {
         topic: replace(
             one, time=one.time - sailing.START,
