@@ -331,7 +331,7 @@ def test_numbers_of_a_few_digits_are_not_held(tmp_path, digits):
 
 @pytest.mark.parametrize(
     ("hz", "rows", "size"),
-    [(10.0, (1200,), 90.0), (1.0, (120, 250), -60.0), (5.0, (600, 601), 45.0)],
+    [(10.0, (1200,), 90.0), (1.0, (120, 200), -60.0), (5.0, (600, 601), 45.0)],
     ids=["10 Hz", "1 Hz, twice", "5 Hz, two samples"],
 )  # fmt: skip
 def test_beside_a_spike_the_heading_is_differentiated_over_it(tmp_path, hz, rows, size):
